@@ -1,0 +1,72 @@
+// A scene: which things exist on this station and in which numbers, read from a TOML file or a built-in name.
+// Set-up code: may allocate, never throws, never crashes on a bad file; every error is one line.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "hal/sim/config.hpp"
+#include "rt/control/config.hpp"
+#include "vision/config.hpp"
+
+namespace punctum::tools {
+
+enum class ClockKind : std::uint8_t { real, virtual_time };
+
+// Frames from a folder, a glob or a video file instead of a camera.
+struct RecordedFrames {
+  std::string frames;
+  double fps = 25;
+  double pixel_m = 0.825e-6;
+};
+
+struct Scene {
+  std::string name;    // of the file without folder and suffix, or the built-in name
+  std::string source;  // path as given, or "built-in"
+  std::string title;
+  double seconds = 0;  // time limit of the run; 0 = until the task is done or someone stops it
+  ClockKind clock = ClockKind::real;
+
+  // Where the programs run. -1 = not pinned.
+  int core_priority = 80;  // SCHED_FIFO of the control core
+  int core_cpu = -1;
+  int vision_cpu = -1;
+  int vision_nice = 5;
+
+  rt::ServoConfig servo;                        // what the core does
+  std::optional<sim::SimConfig> sim;            // simulated devices; hand, stage and e-stop lines always
+  std::optional<RecordedFrames> recorded;       // camera = recorded frames
+  std::optional<vision::VisionConfig> vision;   // absent: no vision process
+
+  [[nodiscard]] bool simulated_camera() const noexcept { return sim && sim->microscope.has_value(); }
+  // A task that ends by itself: cells to inject. Otherwise the run is open-ended and a time limit ends it well.
+  [[nodiscard]] bool has_task() const noexcept { return servo.phases.has_value() && servo.cells > 0; }
+};
+
+// A built-in name (builtin_names()) or a path; each override is "table.key=value" or "table=on|off".
+// The error is one line: `file:line:column: key: what is wrong, what is allowed`.
+[[nodiscard]] tl::expected<Scene, std::string> load_scene(std::string_view name_or_path,
+                                                          const std::vector<std::string>& overrides = {});
+
+// The same for text already in memory; `source` stands in the messages, `folder` resolves relative paths.
+[[nodiscard]] tl::expected<Scene, std::string> parse_scene(std::string_view text, std::string_view source,
+                                                           const std::vector<std::string>& overrides = {},
+                                                           std::string_view folder = {});
+
+// The resolved scene, every key of every table that is there; reads back to the same numbers, bit for bit.
+[[nodiscard]] std::string to_toml(const Scene& scene);
+
+[[nodiscard]] std::vector<std::string_view> builtin_names();
+[[nodiscard]] std::optional<std::string_view> builtin_text(std::string_view name);
+
+// Tables a scene may have and which of them this one has, for `explain`.
+struct TableState {
+  std::string name;
+  bool present = false;
+};
+[[nodiscard]] std::vector<TableState> tables(const Scene& scene);
+
+}  // namespace punctum::tools

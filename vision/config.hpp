@@ -9,6 +9,8 @@ namespace punctum::vision {
 
 enum class Method : std::uint8_t { paper, truth };  // truth: the simulated world's own, no picture drawn
 
+enum class Side : std::uint8_t { automatic, left, right };  // of the picture's border
+
 struct HolderVision {
   std::string template_path;     // empty: cut from the first frame or drawn from the geometry
   int window_px = 16;            // correlation is searched +- this round the last position
@@ -29,9 +31,14 @@ struct VisionConfig {
   double pixel_m = 0.825e-6;
   std::optional<HolderVision> holder = HolderVision{};
   bool needle = true;            // an injection pipette is in the scene
+  Side needle_from = Side::automatic;  // the border it comes through; the holder is at the other one
   bool inner = true;             // follow the inner membrane too
   SnakeParams snake;
-  double R_min_m = 35e-6;        // circular Hough transform
+  bool refine = true;            // beyond the paper: every angle of a contour is moved to the sub-pixel edge
+  int contour_points = 256;      // of a closed contour, >= 128
+  int dilation_px = 4;           // vertical, before the classes of pipette and cell are labelled
+  double puncture_px = 1.5;      // recoil of the contact points against the needle that tells a puncture
+  double R_min_m = 35e-6;        // circular Hough transform, outer membrane
   double R_max_m = 80e-6;
   double E_Pa = 35.3e3;          // for the force column of offline tracking
   double nu = 0.5;

@@ -1,0 +1,125 @@
+// The simulated cell: zona (outer) and inner membrane as concentric elastic spheres, held by suction.
+//
+// Quasi-static membranes from MembraneTruth, recoil integrated exactly, contact and punctures located inside the
+// step. Off-centre contact: the axisymmetric law acts along the local normal at the entry point, with the depth's
+// component along it; needle and normal differ by a few degrees. World frame, SI units.
+// The constructor solves the tables (allocates); everything else is real-time safe and deterministic.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <type_traits>
+
+#include "hal/sim/config.hpp"
+#include "hal/sim/membrane_truth.hpp"
+
+namespace punctum::sim {
+
+enum class Membrane : std::uint8_t { outer, inner };
+
+struct MembraneState {
+  bool punctured = false;
+  double puncture_time_s = -1;    // on CellState::time_s
+  double puncture_depth_m = 0;    // of the dimple, along the needle, when it gave way
+  double dimple_m = 0;            // depth of the dimple along the local normal, now
+};
+
+// Trivially copyable: goes into the bench snapshot.
+struct CellState {
+  double time_s = 0;              // advanced by step(); the plant may set it to its own time before each step
+  MembraneState outer, inner;
+  bool contact = false;           // the needle touches or has entered the cell
+  bool attached = true;           // false: torn off the holding pipette
+  bool far_wall_pierced = false;
+  bool torn = false;              // ripped open by sideways motion of the needle
+  double first_contact_time_s = -1;  // located inside the step
+  double clear_time_s = -1;       // the tip has last left the cell after a puncture
+  double leak = 0;                // 0 .. 1, fluid lost through a rip or a pierced wall
+  double hole_m[3] = {};          // where the needle went through the undeformed outer surface
+  double offset_m[3] = {};        // of the whole cell once it is torn off
+  // Of the last contact, for the picture and the truth beside it:
+  double entry_m[3] = {};         // needle axis meets the undeformed outer surface
+  double normal_m[3] = {-1, 0, 0};  // inward normal there (unit), the dimple's axis
+  double lean_m[3] = {};          // sideways displacement of the dimple's bottom so that it meets the tip
+
+  [[nodiscard]] bool lost() const noexcept { return !attached || far_wall_pierced || torn; }
+};
+static_assert(std::is_trivially_copyable_v<CellState>);
+
+// The needle over one step; both are interpolated linearly in between.
+struct TipMotion {
+  Vec3 tip_begin_m = Vec3::Zero();
+  Vec3 tip_end_m = Vec3::Zero();
+  Vec3 axis_begin = -Vec3::UnitX();  // unit, out of the tip
+  Vec3 axis_end = -Vec3::UnitX();
+  double vacuum_Pa = -1;             // of the holding pipette now; negative = its nominal value
+};
+
+// At the end of the step.
+struct CellForce {
+  Vec3 force_N = Vec3::Zero();    // on the needle, all parts
+  double membrane_N = 0;          // zona + inner membrane along the needle, >= 0
+  double outer_N = 0;             // zona alone, along its normal
+  double inner_N = 0;
+  double drag_N = 0;              // viscous drag and grip of the hole, along the axis, signed like -velocity
+  bool contact = false;
+  double depth_m = 0;             // of the tip past the undeformed outer membrane along the axis; < 0 outside
+  double wd_m = 0;                // depth of the outer dimple along the axis
+  double a_m = 0;                 // its half-width where the depth has fallen to 1 %
+  double inner_wd_m = 0;
+  double chord_m = 0;             // from entry to the far wall along the axis
+  double strain = 0;              // largest, of the intact outer membrane
+  double stress_N_m = 0;          // meridional tension over the reference length at the tip's rim
+  double pressure_Pa = 0;         // inside
+  Vec3 entry_m = Vec3::Zero();    // valid when the needle's axis meets the cell
+  bool aims_at_cell = false;
+};
+
+class Cell {
+ public:
+  static constexpr int kContour = 2 * MembraneTruth::kProfile - 2;  // points of a closed contour (512)
+
+  Cell(const CellParams& params, const NeedleParams& needle, const std::optional<HolderParams>& holder,
+       std::uint64_t seed, int cell_index);
+
+  // Another individual of the same kind: its size and stiffness differ by `spread`. The tables are kept: the
+  // patch under the tip scales with the cell's size.
+  void renew(std::uint64_t seed, int cell_index) noexcept;
+
+  [[nodiscard]] CellForce step(CellState& state, const TipMotion& motion, double dt_s) const noexcept;
+
+  // Closed contour as the picture plane shows it (world x, y, metres), from the bottom of the dimple round the cell
+  // and back, first point not repeated. Returns the points written: kContour, or 0 when the membrane does not
+  // exist or `out` is too small.
+  int contour(const CellState& state, Membrane which, std::span<std::array<double, 2>> out) const noexcept;
+
+  // This individual, undeformed.
+  [[nodiscard]] Vec3 centre_m(const CellState& state) const noexcept;
+  [[nodiscard]] double R_m() const noexcept { return R_m_; }
+  [[nodiscard]] double R_inner_m() const noexcept { return R_inner_m_; }  // 0: no inner membrane
+  [[nodiscard]] double outer_Eh_N_m() const noexcept { return outer_Eh_; }
+  [[nodiscard]] double puncture_depth_m() const noexcept { return outer_puncture_m_; }  // normal, outer
+  [[nodiscard]] double inner_puncture_depth_m() const noexcept { return inner_puncture_m_; }
+  [[nodiscard]] Vec3 holder_mouth_m() const noexcept;  // centre of the mouth: the same for every individual
+  [[nodiscard]] const MembraneTruth& table(Membrane which) const noexcept {
+    return which == Membrane::outer ? *outer_table_ : *inner_table_;
+  }
+
+ private:
+  struct Pose;
+  [[nodiscard]] Pose pose(const CellState& state, const TipMotion& motion, double s) const noexcept;
+
+  CellParams params_;
+  double needle_radius_m_;
+  std::optional<HolderParams> holder_;
+  std::shared_ptr<const MembraneTruth> outer_table_, inner_table_;
+  Vec3 centre_m_ = Vec3::Zero();
+  double R_m_ = 0, R_inner_m_ = 0;
+  double outer_Eh_ = 0, inner_Eh_ = 0;
+  double outer_puncture_m_ = 0, inner_puncture_m_ = 0;
+};
+
+}  // namespace punctum::sim

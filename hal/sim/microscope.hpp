@@ -2,7 +2,7 @@
 //
 // Every outline is filled with the exact area it covers of each pixel, then blurred with the point-spread
 // function of its depth, so a contour handed in is the geometric edge before blur. Runs in the vision
-// program: it allocates at construction and when the holding pipette moves, never in between.
+// program; allocates.
 #pragma once
 
 #include <array>
@@ -16,16 +16,17 @@
 namespace punctum::sim {
 
 struct NeedleInPicture {
-  Vec3 tip_m = Vec3::Zero();      // centre of the tip's end face; its z is the depth in focus
-  Vec3 axis = -Vec3::UnitX();     // pointing out of the tip
+  Vec3 tip_m = Vec3::Zero();   // centre of the tip's end face; its z is the depth in focus
+  Vec3 axis = -Vec3::UnitX();  // pointing out of the tip
 };
 
 struct CellInPicture {
-  std::span<const Vec3> outer;      // closed polyline in order, world frame: outer face of zona or chorion
-  std::span<const Vec3> inner;      // edge of ooplasm or yolk; empty = no inner membrane
-  Vec3 centre_m = Vec3::Zero();     // the grain of the ooplasm is fixed to it; its z is the depth in focus
+  // Closed polylines in order, x and y in the world frame, first point not repeated.
+  std::span<const std::array<double, 2>> outer;  // outer face of zona or chorion
+  std::span<const std::array<double, 2>> inner;  // edge of ooplasm or yolk; empty = no inner membrane
+  Vec3 centre_m = Vec3::Zero();  // the grain of the ooplasm is fixed to it; its z is the depth in focus
   double zona_h_m = 0;
-  std::uint64_t identity = 0;       // another cell, another grain
+  std::uint64_t identity = 0;  // another cell, another grain
 };
 
 // What is in front of the objective at one exposure. What is absent is not drawn; a value that is not finite

@@ -36,13 +36,14 @@ struct Scene {
   int vision_cpu = -1;
   int vision_nice = 5;
 
-  rt::ServoConfig servo;                        // what the core does
-  std::optional<sim::SimConfig> sim;            // simulated devices; hand, stage and e-stop lines always
-  std::optional<RecordedFrames> recorded;       // camera = recorded frames
-  std::optional<vision::VisionConfig> vision;   // absent: no vision process
+  rt::ServoConfig servo;                       // what the core does
+  std::optional<sim::SimConfig> sim;           // simulated devices; hand, stage and e-stop lines always
+  std::optional<RecordedFrames> recorded;      // camera = recorded frames
+  std::optional<vision::VisionConfig> vision;  // absent: no vision process
 
   [[nodiscard]] bool simulated_camera() const noexcept { return sim && sim->microscope.has_value(); }
-  // A task that ends by itself: cells to inject. Otherwise the run is open-ended and a time limit ends it well.
+  // A task that ends by itself: cells to inject. Otherwise the run is open-ended and a time limit ends it
+  // well.
   [[nodiscard]] bool has_task() const noexcept { return servo.phases.has_value() && servo.cells > 0; }
 };
 

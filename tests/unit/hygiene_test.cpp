@@ -1,0 +1,108 @@
+// What is tracked speaks of the thing only: no path of one machine, nothing left open, no large file.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <regex>
+#include <sstream>
+#include <string>
+#include <vector>
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// The files git tracks; empty where this tree is not a clone.
+std::vector<std::string> tracked_files() {
+  const auto close = [](std::FILE* f) { pclose(f); };
+  const std::unique_ptr<std::FILE, decltype(close)> pipe(
+      popen("git -c safe.directory='*' -C '" PUNCTUM_SOURCE_DIR "' ls-files 2>/dev/null", "r"), close);
+  std::vector<std::string> files;
+  std::array<char, 4096> line{};
+  while (pipe != nullptr && std::fgets(line.data(), line.size(), pipe.get()) != nullptr) {
+    std::string file = line.data();
+    file.resize(file.find_last_not_of('\n') + 1);
+    if (fs::is_regular_file(fs::path(PUNCTUM_SOURCE_DIR) / file)) {  // not one just deleted
+      files.push_back(file);
+    }
+  }
+  return files;
+}
+
+struct Rule {
+  const char* name;
+  std::regex pattern;
+};
+
+const std::vector<Rule>& rules() {
+  // Classes of one letter keep these lines from matching themselves.
+  static const std::vector<Rule> table = {
+      {"a path of one machine", std::regex("/([w]ork|[r]oot|[f]arm)/|/[h]ome/(?!newcomer)|[C]:\\\\\\\\")},
+      {"left open", std::regex("\\b([T]ODO|[F]IXME|[X]XX|[H]ACK)\\b")},
+      {"speaks of how it was written",
+       std::regex("\\b(([t]his|[l]ast|[n]ext|[p]revious) session|[i]ssue #?[0-9]+|[h]elper agent|[C]laude|"
+                  "[L]LM|[C]hatGPT|[C]opilot)\\b",
+                  std::regex::icase)},
+      {"a merge left open", std::regex("^(<{7}|>{7}) ")},
+  };
+  return table;
+}
+
+std::string breaches(const std::string& file, std::istream& in) {
+  std::string found;
+  std::string line;
+  for (int number = 1; std::getline(in, line); ++number) {
+    for (const Rule& rule : rules()) {
+      if (std::regex_search(line, rule.pattern)) {
+        found += "\n  " + file + ":" + std::to_string(number) + ": " + rule.name + ": " + line.substr(0, 120);
+      }
+    }
+  }
+  return found;
+}
+
+TEST(Hygiene, TrackedFilesSpeakOfTheThingOnly) {
+  const std::vector<std::string> files = tracked_files();
+  if (files.empty()) {
+    GTEST_SKIP() << "not a git clone";
+  }
+  std::string found;
+  for (const std::string& file : files) {
+    if (file != "LICENSE" && !file.starts_with("tests/fuzz/")) {
+      std::ifstream in(fs::path(PUNCTUM_SOURCE_DIR) / file);
+      found += breaches(file, in);
+    }
+  }
+  EXPECT_EQ(found, "");
+}
+
+TEST(Hygiene, NoTrackedFileIsLargerThanAMebibyte) {
+  for (const std::string& file : tracked_files()) {
+    EXPECT_LE(fs::file_size(fs::path(PUNCTUM_SOURCE_DIR) / file), 1U << 20U) << file;
+  }
+}
+
+TEST(Hygiene, TopLevelIsTheOneOfTheDesign) {
+  const std::regex expected(
+      "CMakeLists\\.txt|CMakePresets\\.json|README\\.md|LICENSE|rt|vision|hal|tools|tests|toolchain|\\..*");
+  for (const std::string& file : tracked_files()) {
+    const std::string top = file.substr(0, file.find('/'));
+    EXPECT_TRUE(std::regex_match(top, expected)) << top;
+  }
+}
+
+TEST(Hygiene, EachRuleFindsWhatItIsFor) {
+  const std::string planted[] = {"see /wo" + std::string("rk/x"), "// TO" + std::string("DO: later"),
+                                 "as in the last ses" + std::string("sion"), std::string(7, '<') + " HEAD"};
+  for (const std::string& line : planted) {
+    std::istringstream in(line);
+    EXPECT_NE(breaches("planted", in), "") << line;
+  }
+  std::istringstream clean("the phase of a session of work; hacking; a path rt/control/servo.cpp");
+  EXPECT_EQ(breaches("clean", clean), "");
+}
+
+}  // namespace

@@ -1,0 +1,103 @@
+# shellcheck shell=bash
+# Sourced by tools/run, tools/test and toolchain/checks/*: steps that stay quiet while all is well.
+# A step's output goes to a log; its progress is shown, and on failure the part of the log that matters.
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+export LC_ALL=C.UTF-8
+cores=$(nproc)
+# A compiler at work takes up to 1.5 GB.
+jobs=$(awk -v n="$cores" '/MemAvailable/ { m = int($2 / 1500000) } END { if (m < 1) m = 1; print (m < n) ? m : n }' /proc/meminfo)
+
+say() { printf '%-10s %s\n' "$1" "$2" >&2; }
+fail() {
+  printf '%s\n' "$*" >&2
+  exit 1
+}
+
+running=
+trap 'if [ -n "$running" ]; then kill "$running" 2>/dev/null; wait "$running"; fi; exit 130' INT TERM HUP
+
+# What is worth seeing of a failed step's log: the compiler's first complaints, else its end.
+show_failure() {
+  local log=$1
+  if grep -q -m1 '^FAILED: ' "$log"; then
+    sed -n '/^FAILED: /,$p' "$log" | cut -c1-400 | head -n 60
+  else
+    cut -c1-400 "$log" | tail -n 60
+  fi >&2
+}
+
+# step NAME WHAT LOG COMMAND...: runs COMMAND with its output in LOG; returns its exit code.
+step() {
+  local name=$1 what=$2 log=$3 start=$SECONDS told=0 code=0 progress seconds
+  shift 3
+  mkdir -p "$(dirname "$log")"
+  "$@" >"$log" 2>&1 </dev/null 9>&- &
+  running=$!
+  sleep 0.1
+  while kill -0 "$running" 2>/dev/null; do
+    seconds=$((SECONDS - start))
+    progress=$(tail -c 4000 "$log" | tr '\r' '\n' | grep -aoE '^(\[[0-9]+/[0-9]+\]|[0-9]+/[0-9]+ Test)' | tail -n 1) || true
+    if [ -t 2 ]; then
+      printf '\r%-10s %s %s %d s \033[K' "$name" "$what" "$progress" "$seconds" >&2
+    elif [ $((seconds - told)) -ge 30 ]; then
+      told=$seconds
+      say "$name" "$what ... $progress $seconds s"
+    fi
+    sleep 0.5
+  done
+  wait "$running" || code=$?
+  running=
+  seconds=$((SECONDS - start))
+  if [ -t 2 ]; then printf '\r\033[K' >&2; fi
+  if [ "$code" -eq 0 ]; then
+    say "$name" "$what ($seconds s)"
+  else
+    say "$name" "$what FAILED after $seconds s; the whole output is in $log"
+    show_failure "$log"
+  fi
+  return "$code"
+}
+
+# One build at a time in one tree; a second caller waits.
+lock_build() {
+  mkdir -p "$root/build" 2>/dev/null && [ -w "$root/build" ] ||
+    fail "$root/build belongs to another user: remove it, or run this as that user"
+  exec 9>"$root/build/.lock"
+  if ! flock -n 9; then
+    say wait "another build runs in this tree"
+    flock 9
+  fi
+}
+unlock_build() { exec 9>&-; }
+
+# install_packages SET...: what toolchain/packages lists and this machine lacks; no apt call when nothing is missing.
+install_packages() {
+  local sets=" $* " set package missing=() as_root=()
+  while read -r set package _; do
+    case "$set" in '' | '#'*) continue ;; esac
+    [[ $sets == *" $set "* ]] || continue
+    [ "$(dpkg-query -W -f '${Status}' "$package" 2>/dev/null)" = 'install ok installed' ] || missing+=("$package")
+  done <"$root/toolchain/packages"
+  if [ ${#missing[@]} -eq 0 ]; then
+    say packages "all there"
+    return
+  fi
+  if [ "$(id -u)" -ne 0 ]; then
+    command -v sudo >/dev/null || fail "missing packages, and neither root nor sudo to install them. As root: apt-get install --no-install-recommends ${missing[*]}"
+    as_root=(sudo)
+    # sudo may ask for a password here, once, where there is a terminal; later calls stay silent.
+    sudo -n true 2>/dev/null || sudo -v || fail "sudo was refused. As root: apt-get install --no-install-recommends ${missing[*]}"
+  fi
+  local apt=(env DEBIAN_FRONTEND=noninteractive apt-get -q -y -o DPkg::Lock::Timeout=300 -o Acquire::Retries=3)
+  step packages "read the package lists" "$root/build/apt-update.log" "${as_root[@]}" "${apt[@]}" update || exit 1
+  step packages "install ${missing[*]}" "$root/build/apt-install.log" \
+    "${as_root[@]}" "${apt[@]}" install --no-install-recommends "${missing[@]}" || exit 1
+}
+
+# build PRESET TARGET: configures and builds; quick when nothing has changed.
+build() {
+  local preset=$1 target=$2 dir=$root/build/$1
+  (cd "$root" && step configure "$preset" "$dir/configure.log" cmake --preset "$preset") || return 1
+  (cd "$root" && step build "$preset" "$dir/build.log" cmake --build --preset "$preset" --target "$target" -j "$jobs")
+}

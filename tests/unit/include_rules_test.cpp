@@ -53,10 +53,10 @@ const std::vector<Room>& rooms() {
       {.folder = "vision/", .may_use = {"rt/station/"}, .library = "Eigen/.*|tl/expected.hpp|opencv2/.*"},
       {.folder = "tools/",
        .may_use = {"rt/", "hal/", "vision/"},
-       .library = "Eigen/.*|tl/expected.hpp|opencv2/.*|toml\\+\\+/.*"},
+       .library = "Eigen/.*|tl/expected.hpp|opencv2/.*|fmt/.*|toml\\+\\+/.*"},
       {.folder = "tests/",
        .may_use = {"rt/", "hal/", "vision/", "tools/"},
-       .library = "Eigen/.*|tl/expected.hpp|opencv2/.*|toml\\+\\+/.*|gtest/.*|gmock/.*"},
+       .library = "Eigen/.*|tl/expected.hpp|opencv2/.*|fmt/.*|toml\\+\\+/.*|gtest/.*|gmock/.*"},
   };
   return table;
 }

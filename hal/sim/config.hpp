@@ -17,6 +17,7 @@ struct HandParams {
   double coulomb_N = 0.04;
   double encoder_step_m = 0.03e-3;
   double force_max_N = 8.5;
+  double workspace_m = 0.08;          // half-width; she uses the clutch before its border
 };
 
 // The biologist: an arm behind the handle that follows an intention.
@@ -33,6 +34,7 @@ struct OperatorParams {
   double dwell_s = 1.5;
   double withdrawal_speed_m_s = 30e-6;
   double tilt_rad = 0.03;             // handle orientation, 1 sigma
+  double give_way_1_s = 2.0;          // rate at which she follows a sideways force instead of resisting it
 };
 
 struct StageParams {
@@ -139,6 +141,8 @@ struct SimConfig {
   int estop_event_count = 0;
   // What the operator's hand is coupled by; the same numbers as the core's mapping.
   double position_scale = 500;
+  int cells = 1;                      // to inject, the same as the core's; 0 = until the time limit
+  double relay_timeout_s = 0.05;      // without a heartbeat; then drive power goes off
 };
 
 }  // namespace punctum::sim

@@ -1,0 +1,40 @@
+// The force sensor in the needle's holder: axial force, compression positive, first-order lag and noise.
+#pragma once
+
+#include <cstdint>
+
+#include "hal/devices.hpp"
+#include "hal/sim/config.hpp"
+#include "hal/sim/failures.hpp"
+#include "hal/sim/noise.hpp"
+
+namespace punctum::sim {
+
+struct ForceSensorPlantState {
+  double lagged_N = 0;
+  double reading_N = 0;
+};
+
+// saturate: it reads its full scale.
+class SimForceSensor final : public hal::ForceSensor {
+ public:
+  static constexpr double kFullScale_N = 200e-6;
+
+  SimForceSensor(const ForceSensorParams& params, std::uint64_t seed);
+
+  // axial_N: the needle's true force, held over the interval.
+  void step(std::int64_t t_ns, double dt_s, double axial_N, Failure failure) noexcept;
+
+  [[nodiscard]] hal::Status read(double& axial_force_N) noexcept override;
+
+  [[nodiscard]] const ForceSensorPlantState& state() const noexcept { return state_; }
+  void restore(const ForceSensorPlantState& state) noexcept { state_ = state; }
+
+ private:
+  ForceSensorParams params_;
+  Noise noise_;
+  ForceSensorPlantState state_;
+  FailingReader<ForceSensorPlantState> reader_;
+};
+
+}  // namespace punctum::sim

@@ -1,0 +1,39 @@
+// The injector: a valve that opens and shuts with a first-order lag, shut without power.
+#pragma once
+
+#include <cstdint>
+
+#include "hal/devices.hpp"
+#include "hal/sim/config.hpp"
+#include "hal/sim/failures.hpp"
+
+namespace punctum::sim {
+
+struct InjectorPlantState {
+  double opening = 0;      // 0 shut .. 1 open
+  double delivered_s = 0;  // time integral of the opening
+  std::uint32_t gate = 0;  // as commanded
+  std::uint32_t powered = 0;
+};
+
+// nan: reading fails. saturate: the valve's contact reports open, whatever it does.
+class SimInjector final : public hal::Injector {
+ public:
+  explicit SimInjector(const InjectorParams& params) : params_(params) {}
+
+  void step(std::int64_t t_ns, double dt_s, bool power, Failure failure) noexcept;
+
+  void gate(bool open) noexcept override;
+  [[nodiscard]] hal::Status read(bool& open) noexcept override;
+
+  [[nodiscard]] const InjectorPlantState& state() const noexcept { return state_; }
+  void restore(const InjectorPlantState& state) noexcept { state_ = state; }
+
+ private:
+  InjectorParams params_;
+  InjectorPlantState state_;
+  FailingReader<InjectorPlantState> reader_;
+  Failure failure_ = Failure::none;
+};
+
+}  // namespace punctum::sim

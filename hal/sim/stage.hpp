@@ -1,0 +1,60 @@
+// The micromanipulator: three axes and a tilting needle, behind a drive.
+//
+// The tip follows its set-point as a first-order lag whose speed is bounded, solved in closed form along the
+// straight line to the set-point. Encoders and set-points are in the stage's own frame, which lies
+// registration_m beside the picture's. Quick stop and loss of power brake on a ramp, then hold; motion is
+// possible again after enable() went off and on.
+#pragma once
+
+#include <cstdint>
+
+#include "hal/devices.hpp"
+#include "hal/sim/config.hpp"
+#include "hal/sim/failures.hpp"
+#include "hal/sim/point.hpp"
+
+namespace punctum::sim {
+
+struct StagePlantState {
+  Point tip_m;  // truth, world frame
+  Point axis{-1, 0, 0};
+  Point set_point_m;  // world frame, as the drive understood it
+  Point set_axis{-1, 0, 0};
+  Point velocity_m_s;
+  std::uint8_t enable_line = 0;    // as the core wants it
+  std::uint8_t powered = 0;        // enable line and relay
+  std::uint8_t quick_stopped = 0;  // until the enable line goes off
+  std::uint8_t braking = 0;
+  std::uint32_t reserved = 0;
+};
+
+// saturate: the drive gives kSaturatedSpeed of its speed. freeze: the drive hangs: it brakes and hears
+// nothing. disconnect: it brakes (link loss). drop: it goes on to its last set-point and holds there.
+class SimStage final : public hal::Stage {
+ public:
+  static constexpr double kSaturatedSpeed = 0.02;
+  static constexpr double kTiltMax_rad = 0.35;  // of the axis from where it started
+
+  explicit SimStage(const StageParams& params);
+
+  void step(std::int64_t t_ns, double dt_s, bool power, Failure failure) noexcept;
+
+  [[nodiscard]] hal::Status read(hal::StageState& out) noexcept override;
+  [[nodiscard]] hal::Status command(const hal::StageCommand& set_point) noexcept override;
+  void quick_stop() noexcept override;
+  void enable(bool on) noexcept override;
+
+  [[nodiscard]] const StagePlantState& state() const noexcept { return state_; }
+  void restore(const StagePlantState& state) noexcept { state_ = state; }
+
+ private:
+  void brake(double dt_s) noexcept;
+  void follow(double dt_s, double speed_m_s) noexcept;
+
+  StageParams params_;
+  StagePlantState state_;
+  FailingReader<StagePlantState> reader_;
+  Failure failure_ = Failure::none;
+};
+
+}  // namespace punctum::sim

@@ -1,0 +1,41 @@
+// The holding vacuum: a pump that keeps its pressure whatever happens to the rest.
+#pragma once
+
+#include <cstdint>
+
+#include "hal/devices.hpp"
+#include "hal/sim/config.hpp"
+#include "hal/sim/failures.hpp"
+#include "hal/sim/noise.hpp"
+
+namespace punctum::sim {
+
+struct VacuumPlantState {
+  double pressure_Pa = 0;  // truth, below ambient, positive
+  double reading_Pa = 0;
+};
+
+// saturate: the pump fails, the pressure goes to ambient with kLeak_s. The other failures concern the gauge
+// only.
+class SimVacuum final : public hal::HoldingVacuum {
+ public:
+  static constexpr double kLeak_s = 0.1;
+  static constexpr double kNoise_Pa = 2;  // of the gauge
+
+  SimVacuum(const HolderParams& params, std::uint64_t seed);
+
+  void step(std::int64_t t_ns, double dt_s, Failure failure) noexcept;
+
+  [[nodiscard]] hal::Status read(double& pressure_Pa) noexcept override;
+
+  [[nodiscard]] const VacuumPlantState& state() const noexcept { return state_; }
+  void restore(const VacuumPlantState& state) noexcept { state_ = state; }
+
+ private:
+  double target_Pa_;
+  Noise noise_;
+  VacuumPlantState state_;
+  FailingReader<VacuumPlantState> reader_;
+};
+
+}  // namespace punctum::sim

@@ -1,0 +1,54 @@
+// Time that passes only when everybody is ready, and the same clock as others see it.
+#pragma once
+
+#include <cstdint>
+
+#include "hal/devices.hpp"
+#include "hal/sim/bench.hpp"
+
+namespace punctum::sim {
+
+// The core's side: the owner of time. sleep_until_ns() moves time to t and then waits, and waits only there:
+// until every exposure due by t has been delivered, while a camera is attached, and until the recorder is
+// within half a ring, while one is attached. Each wait ends after bail_out_ns of real time; whoever was
+// waited for then counts as detached.
+class VirtualClock final : public hal::Clock {
+ public:
+  static constexpr std::int64_t kBailOut_ns = 10'000'000'000;
+
+  explicit VirtualClock(Bench& bench, std::int64_t start_ns = 0,
+                        std::int64_t bail_out_ns = kBailOut_ns) noexcept;
+  ~VirtualClock();  // tells the others that time has ended
+  VirtualClock(const VirtualClock&) = delete;
+  VirtualClock& operator=(const VirtualClock&) = delete;
+
+  [[nodiscard]] std::int64_t now_ns() const noexcept override;
+  void sleep_until_ns(std::int64_t t_ns) noexcept override;
+
+  // Before the first tick: waits, bounded, until a camera (and a recorder) has attached. False: none came.
+  bool await_camera() noexcept;
+  bool await_recorder() noexcept;
+
+ private:
+  Bench& bench_;
+  std::int64_t bail_out_ns_;
+};
+
+// Everybody else's side: reads the time of the bench and waits for it to come. In real time it is
+// CLOCK_MONOTONIC. sleep_until_ns() also returns when the plant has stopped, or when stop_waiting() was
+// called from a signal handler or another thread.
+class BenchClock final : public hal::Clock {
+ public:
+  explicit BenchClock(const Bench& bench) noexcept : bench_(bench) {}
+  [[nodiscard]] std::int64_t now_ns() const noexcept override;
+  void sleep_until_ns(std::int64_t t_ns) noexcept override;
+  void stop_waiting() noexcept { stop_.store(true, std::memory_order_relaxed); }
+
+ private:
+  const Bench& bench_;
+  std::atomic<bool> stop_{false};
+};
+
+[[nodiscard]] std::int64_t monotonic_ns() noexcept;
+
+}  // namespace punctum::sim

@@ -31,8 +31,8 @@ constexpr double kLightY = -0.8;
 constexpr double kRim_px = 1.3;
 constexpr double kOuterRim = 0.30;
 constexpr double kZonaInnerStep = 0.85;  // zona -> perivitelline space
-constexpr double kInnerStep = 0.45;      // perivitelline space -> ooplasm
-constexpr double kInnerRim = 0.55;
+constexpr double kInnerStep = 0.60;      // perivitelline space -> ooplasm
+constexpr double kInnerRim = 0.85;
 constexpr double kGrain = 0.22;       // standard deviation of the ooplasm's texture
 constexpr double kCellRelief = 0.25;  // contrast towards and away from the light
 constexpr double kOoplasmShade = 0.30;
@@ -47,7 +47,7 @@ constexpr double kNeedleEnd = 0.14;
 // Holding pipette.
 constexpr double kHolderEdge = 0.80;
 constexpr double kHolderBody = 0.10;
-constexpr double kHolderRelief = 0.22;
+constexpr double kHolderRelief = 0.20;
 constexpr double kHolderBore = 0.42;  // lumen behind the fire-polished mouth, over the outer radius
 
 constexpr int kGrainSide = 256;  // texture tile, a power of two
@@ -550,7 +550,7 @@ struct Microscope::Impl {
     const Box box = reach.meet(picture.grown(margin));
     if (box.empty()) return;
     layer.start(box);
-    const double lip = 0.5 * (outer_px - bore_px);  // radius of the fire-polished rim
+    const double lip = std::max(0.5 * (outer_px - bore_px), 0.5 * outer_px);  // radius of the fire-polished rim
     const double wide = std::max(bore_px, kHolderBore * outer_px);
     for (int y = box.y0; y < box.y1; ++y) {
       float* const row = layer.row(y - box.y0);
@@ -567,16 +567,15 @@ struct Microscope::Impl {
         if (inside > 0) {
           const double depth = std::max(-d, 0.0);
           // The wall bends light away near the silhouette.
-          double glass = kHolderEdge * std::exp(-depth * depth / (2 * 9.0)) +
-                         0.30 * std::exp(-depth / (0.16 * outer_px));
-          glass += kHolderBody + kHolderRelief * -v / outer_px * (kLightY < 0 ? 1 : -1);
+          double glass = kHolderEdge * std::exp(-depth * depth / 18) + 0.42 * std::exp(-depth / (0.22 * outer_px));
+          glass += kHolderBody - kHolderRelief * std::sin(0.5 * std::numbers::pi * v / outer_px);
           // The lumen narrows to the mouth.
           const double t = std::clamp(back / (1.3 * outer_px), 0.0, 1.0);
           const double bore = bore_px + (wide - bore_px) * t * t * (3 - 2 * t);
           const double to_bore = std::abs(v) - bore;
-          const double lumen = std::clamp(0.5 - to_bore, 0.0, 1.0);
-          const double open = std::clamp(back / 3.0, 0.0, 1.0);
-          glass += open * (0.38 * std::exp(-0.5 * to_bore * to_bore / 1.7) - 0.16 * lumen);
+          const double lumen = 1 / (1 + std::exp(to_bore / 0.6));
+          const double wall_line = std::exp(-0.5 * to_bore * to_bore / 2.5) + 0.35 * std::exp(-std::abs(to_bore) / 6);
+          glass = glass * (1 - 0.6 * lumen) + std::clamp(back / 3.0, 0.0, 1.0) * 0.45 * wall_line;
           take = inside * glass + (1 - inside) * take;
         }
         row[x - box.x0] = static_cast<float>(std::min(take, 0.93));

@@ -16,7 +16,11 @@ namespace {
 constexpr std::string_view kPrefix = "punctum.";
 constexpr const char* kDirectory = "/dev/shm";
 
-std::string shm_name(std::string_view name) { return "/" + std::string(kPrefix) + std::string(name); }
+std::string shm_name(std::string_view name) {
+  std::string path = "/";
+  path.append(kPrefix).append(name);
+  return path;
+}
 
 std::string reason() { return std::strerror(errno); }
 
@@ -187,9 +191,8 @@ std::size_t remove_stale_segments() {
   std::vector<std::string> paths;
   if (DIR* directory = ::opendir(kDirectory); directory != nullptr) {
     while (const dirent* entry = ::readdir(directory)) {
-      if (std::string_view(entry->d_name).substr(0, kPrefix.size()) == kPrefix) {
-        paths.push_back("/" + std::string(entry->d_name));
-      }
+      const std::string_view file = entry->d_name;
+      if (file.starts_with(kPrefix)) paths.push_back(shm_name(file.substr(kPrefix.size())));
     }
     ::closedir(directory);
   }

@@ -550,7 +550,8 @@ struct Microscope::Impl {
     const Box box = reach.meet(picture.grown(margin));
     if (box.empty()) return;
     layer.start(box);
-    const double lip = std::max(0.5 * (outer_px - bore_px), 0.5 * outer_px);  // radius of the fire-polished rim
+    const double lip =
+        std::max(0.5 * (outer_px - bore_px), 0.5 * outer_px);  // radius of the fire-polished rim
     const double wide = std::max(bore_px, kHolderBore * outer_px);
     for (int y = box.y0; y < box.y1; ++y) {
       float* const row = layer.row(y - box.y0);
@@ -567,14 +568,16 @@ struct Microscope::Impl {
         if (inside > 0) {
           const double depth = std::max(-d, 0.0);
           // The wall bends light away near the silhouette.
-          double glass = kHolderEdge * std::exp(-depth * depth / 18) + 0.42 * std::exp(-depth / (0.22 * outer_px));
+          double glass =
+              kHolderEdge * std::exp(-depth * depth / 18) + 0.42 * std::exp(-depth / (0.22 * outer_px));
           glass += kHolderBody - kHolderRelief * std::sin(0.5 * std::numbers::pi * v / outer_px);
           // The lumen narrows to the mouth.
           const double t = std::clamp(back / (1.3 * outer_px), 0.0, 1.0);
           const double bore = bore_px + (wide - bore_px) * t * t * (3 - 2 * t);
           const double to_bore = std::abs(v) - bore;
           const double lumen = 1 / (1 + std::exp(to_bore / 0.6));
-          const double wall_line = std::exp(-0.5 * to_bore * to_bore / 2.5) + 0.35 * std::exp(-std::abs(to_bore) / 6);
+          const double wall_line =
+              std::exp(-0.5 * to_bore * to_bore / 2.5) + 0.35 * std::exp(-std::abs(to_bore) / 6);
           glass = glass * (1 - 0.6 * lumen) + std::clamp(back / 3.0, 0.0, 1.0) * 0.45 * wall_line;
           take = inside * glass + (1 - inside) * take;
         }

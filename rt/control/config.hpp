@@ -28,6 +28,7 @@ struct ConeParams {
   double alpha_rad = 0.2;  // half-angle of the free core
   double eps_m = 2e-6;     // width of the C1 ramp (needle scale)
   double ramp_s = 0.2;     // moving or switching
+  double reach_m = 40e-6;  // half-width of the attraction; further off it lets go (needle scale)
 };
 
 // Withdrawal along the insertion axis only.
@@ -35,6 +36,7 @@ struct AxisParams {
   double K_N_m = 150;      // lateral, at the hand
   double eps_m = 1e-6;     // width of the C1 ramp (needle scale)
   double ramp_s = 0.2;
+  double B_inward_Ns_m = 5;  // in withdrawal, against motion back into the cell; 0 = off
 };
 
 struct DampingParams {
@@ -53,6 +55,7 @@ struct MappingParams {
   double position_scale = 500;      // k_p: hand metres per needle metre
   double force_scale = 1e5;         // k_f: hand newtons per needle newton
   double tremor_cutoff_Hz = 3.0;    // second-order low-pass on the set-point; 0 = off
+  double coupling_s = 0.3;          // forces return over this after a start, a clutch, a reset
   double max_tilt_rad = 0.1;        // the handle's orientation tilts the approach axis up to this; 0 = off
   Vec3 workspace_min_m{-280e-6, -180e-6, -60e-6};  // of the needle tip, world frame
   Vec3 workspace_max_m{280e-6, 180e-6, 60e-6};
@@ -74,6 +77,7 @@ struct PhaseParams {
   double contact_off_m = 0.5e-6;     // gap that ends it
   double indentation_on_m = 3e-6;    // w_d
   double withdrawal_speed_m_s = 5e-6;// outward speed that begins withdrawal once inside
+  double withdrawal_back_m = 2e-6;   // and the way back from the deepest point that it takes
   double clear_m = 10e-6;            // gap that ends withdrawal
   double timeout_s[7] = {120, 20, 30, 15, 20, 20, 60};  // per phase, alarm
 };
@@ -84,6 +88,10 @@ struct LocalModelParams {
   double max_rate_m_s = 100e-6;      // bounded correction of the membrane's position
   double stale_after_s = 0.30;       // age from which the rendered force fades
   double fade_s = 0.15;
+  double return_s = 0.4;             // the force returns over this once vision is back
+  double dimple_scale = 0.6;         // a = c + dimple_scale sqrt(2 R w_d), until vision has seen a dimple
+  double dimple_scale_rate_1_s = 0.5;  // bounded correction of it
+  double dimple_min_m = 2e-6;        // w_d from which a dimple's width is believed
 };
 
 struct InjectorParams {
@@ -109,6 +117,7 @@ struct ServoConfig {
   bool real_actuators = false;       // an overrun is then a fault, not an alarm
   double hand_timeout_s = 0.02;
   double hand_jump_m = 0.02;         // between two ticks at 1 kHz
+  double stage_timeout_s = 0.02;     // silent for longer: stage_lost
   int cells = 1;                     // to inject; 0 = until the time limit
   bool vision = true;                // observations are expected
 

@@ -1,0 +1,16 @@
+// Hand device frame (x right, y up, z towards the operator) and world frame (x right, y down, z away): a turn
+// by pi about x, its own inverse.
+#pragma once
+
+#include "hal/devices.hpp"
+
+namespace punctum::rt {
+
+[[nodiscard]] inline hal::Vec3 world_from_hand(const hal::Vec3& v) noexcept {
+  return {v.x(), -v.y(), -v.z()};
+}
+[[nodiscard]] inline hal::Vec3 hand_from_world(const hal::Vec3& v) noexcept {
+  return {v.x(), -v.y(), -v.z()};
+}
+
+}  // namespace punctum::rt

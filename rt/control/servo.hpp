@@ -1,0 +1,189 @@
+// The servo: everything one tick of the control core does.
+//
+// Built once at start from a scene's ServoConfig and the devices that exist; statically allocated (about
+// 0.7 MB, mostly the pose history). tick() is real-time safe: no heap, lock, system call, exception.
+// One thread calls it.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "hal/devices.hpp"
+#include "rt/control/config.hpp"
+#include "rt/control/limits.hpp"
+#include "rt/control/local_membrane_model.hpp"
+#include "rt/control/master_to_stage.hpp"
+#include "rt/control/phases.hpp"
+#include "rt/control/safety_latch.hpp"
+#include "rt/forces/cone_guide.hpp"
+#include "rt/forces/damping.hpp"
+#include "rt/forces/membrane.hpp"
+#include "rt/forces/velocity.hpp"
+#include "rt/forces/withdrawal_axis.hpp"
+#include "rt/station/observation.hpp"
+#include "rt/station/telemetry.hpp"
+
+namespace punctum::rt {
+
+struct Station;
+
+struct TickInfo {
+  std::uint64_t tick = 0;              // of the absolute grid, from 0; gaps are missed releases
+  std::int64_t release_ns = 0;         // of this tick on the grid
+  std::int64_t start_ns = 0;           // when it really began; devices are read at this time
+  double period_s = 0;                 // really elapsed since the previous tick
+  std::uint64_t missed_in_window = 0;  // missed releases in the last ServoConfig::overrun_window_s
+};
+
+// What exists. The hand is always there; a null pointer is a thing the scene does not have.
+struct Devices {
+  hal::HapticDevice& hand;
+  hal::Stage* stage = nullptr;
+  hal::EstopChain* estop = nullptr;
+  hal::Injector* injector = nullptr;
+  hal::HoldingVacuum* vacuum = nullptr;
+  hal::ForceSensor* force_sensor = nullptr;
+};
+
+enum class Outcome : std::uint8_t {
+  running,
+  done,   // all cells injected and clear, hand force at zero, stage at rest
+  ended,  // command `end`: the same rest, the task not finished
+  fault,  // latched and stopped, and nothing can clear it: a stop was commanded, or there is no reset button
+};
+
+class Servo {
+ public:
+  // t = 0 of telemetry is the first tick's release. `degraded` raises the alarm "without real-time rights".
+  Servo(const ServoConfig& config, const Devices& devices, Station& station, bool degraded = false) noexcept;
+  Servo(const Servo&) = delete;
+  Servo& operator=(const Servo&) = delete;
+
+  void tick(const TickInfo& now) noexcept;
+
+  // A stop (latched fault command_stop) or an orderly end, as by the command queue; for signals of the
+  // process.
+  void request_stop() noexcept { stop_requested_ = true; }
+  void request_end() noexcept { end_requested_ = true; }
+
+  // The run is over and everything is at rest: leave the loop. A latched fault that a reset could still
+  // clear does not finish the run.
+  [[nodiscard]] bool finished() const noexcept { return outcome() != Outcome::running; }
+  [[nodiscard]] Outcome outcome() const noexcept;
+  [[nodiscard]] Fault fault() const noexcept { return latch_.cause(); }
+  [[nodiscard]] StopStage stop_stage() const noexcept { return latch_.stage(); }
+  [[nodiscard]] Phase phase() const noexcept { return phases_ ? phases_->phase() : Phase::free; }
+  [[nodiscard]] std::uint32_t cells_done() const noexcept { return cells_done_; }
+  [[nodiscard]] bool force_is_zero() const noexcept { return hand_force_N_.isZero(0); }
+  [[nodiscard]] const TelemetrySample& sample() const noexcept { return sample_; }  // of the last tick
+
+ private:
+  // The steps of the tick, in its order.
+  Fault read_devices(const TickInfo& now) noexcept;
+  void take_commands() noexcept;
+  void take_newest_observation(const TickInfo& now) noexcept;
+  void estimate_velocity() noexcept;
+  void advance_phase() noexcept;
+  [[nodiscard]] hal::Vec3 sum_force_effects() noexcept;
+  [[nodiscard]] Fault check_tip_force() noexcept;
+  void choose_stage_set_point() noexcept;
+  void write_devices() noexcept;
+  void publish(const TickInfo& now) noexcept;
+
+  // Parts of read_devices.
+  [[nodiscard]] Fault read_estop() noexcept;
+  [[nodiscard]] Fault read_hand() noexcept;
+  [[nodiscard]] Fault read_stage() noexcept;
+  [[nodiscard]] Fault read_vacuum() noexcept;
+  [[nodiscard]] Fault check_overruns(const TickInfo& now) noexcept;
+  void read_sensors() noexcept;
+
+  [[nodiscard]] StageConstraint constraint() const noexcept;
+  [[nodiscard]] bool sighted() const noexcept;  // vision is not needed, or not stale
+  void anchor_at_tip() noexcept;
+
+  const ServoConfig config_;
+  const Devices devices_;
+  Station& station_;
+  const bool degraded_;
+
+  // What the scene has.
+  std::optional<Membrane> membrane_;
+  std::optional<ConeGuide> cone_;
+  std::optional<WithdrawalAxis> axis_;
+  std::optional<Damping> damping_;
+  std::optional<Phases> phases_;
+  std::optional<LocalMembraneModel> model_;
+
+  Foaw foaw_;
+  MasterToStage mapping_;
+  StageLimits stage_limits_;
+  SafetyLatch latch_;
+  LatchOutput stop_;
+
+  // This tick.
+  double dt_s_ = 0;
+  std::int64_t now_ns_ = 0;
+  std::uint64_t ticks_ = 0;
+  std::int64_t first_release_ns_ = 0;
+  std::uint32_t alarms_ = 0;
+
+  hal::HandState hand_;
+  double hand_age_s_ = 0;
+  bool hand_seen_ = false;
+  double since_hand_s_ = 0;
+  hal::StageState stage_;
+  double stage_age_s_ = 0;
+  bool stage_seen_ = false;
+  hal::EstopState estop_;
+  bool estop_readable_ = true;
+  double discrepancy_s_ = 0;
+  double vacuum_Pa_ = 0;
+  double vacuum_low_s_ = 0;
+  double sensor_N_ = 0;
+  double sensor_filtered_N_ = 0;
+  double sensor_age_s_ = 0;
+  bool injector_open_ = false;
+  std::uint64_t observation_head_ = 0;
+  std::uint64_t observations_ = 0;
+  std::uint64_t stale_ticks_ = 0;
+
+  // State of the loop.
+  bool stop_requested_ = false;
+  bool end_requested_ = false;
+  bool task_done_ = false;
+  bool ended_ = false;
+  std::uint32_t cells_done_ = 0;
+  std::uint64_t commands_refused_ = 0;
+  std::uint64_t faults_latched_ = 0;
+  Fault write_fault_ = Fault::none;  // found while writing, latched on the next tick
+  bool heartbeat_level_ = false;
+  double force_scale_wanted_ = 1;  // command force_scale
+  double force_scale_ = 1;
+  Ramp coupling_;  // of all forces: after a start, a clutch, a reset; to zero at the end
+  double depth_m_ = 0;
+  double outward_m_s_ = 0;  // low-passed
+  double depth_before_m_ = 0;
+  hal::Vec3 approach_ = -hal::Vec3::UnitX();  // axis, frozen from contact on
+  FixtureFrame insertion_;                    // the line of insertion, latched at the puncture
+  double tip_force_N_ = 0;
+  bool tip_force_soft_ = false;
+  bool was_sighted_ = false;
+  double injected_s_ = 0;  // gate open, this cell
+  bool gate_open_ = false;
+  double membrane_injected_J_ = 0;
+  std::int64_t stage_countdown_ = 0;
+
+  // Parts of the force, at the hand, world axes.
+  hal::Vec3 membrane_N_ = hal::Vec3::Zero();
+  hal::Vec3 cone_N_ = hal::Vec3::Zero();
+  hal::Vec3 axis_N_ = hal::Vec3::Zero();
+  hal::Vec3 damping_N_ = hal::Vec3::Zero();
+  hal::Vec3 hand_force_N_ = hal::Vec3::Zero();  // device frame, what goes out
+  hal::Vec3 force_before_stop_N_ = hal::Vec3::Zero();
+  RimForces rim_{};
+
+  TelemetrySample sample_;
+};
+
+}  // namespace punctum::rt

@@ -320,7 +320,12 @@ std::vector<Table> make_tables() {
                  auto& v = *s.vision;
                  return std::vector<Key>{choice("method", v.method, {"paper", "truth"}),
                                          flag("needle", v.needle),
+                                         choice("needle_from", v.needle_from, {"automatic", "left", "right"}),
                                          flag("inner", v.inner),
+                                         flag("refine", v.refine),
+                                         whole("contour_points", v.contour_points, 128, 4096),
+                                         whole("dilation_px", v.dilation_px, 0, 40),
+                                         real("puncture_px", v.puncture_px, 0.1, 50),
                                          micro("radius_min_um", v.R_min_m, 1, 5000),
                                          micro("radius_max_um", v.R_max_m, 1, 5000),
                                          whole("cpu", s.vision_cpu, -1, 1023),

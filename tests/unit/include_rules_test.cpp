@@ -49,6 +49,11 @@ const std::vector<Room>& rooms() {
        .may_use = {"rt/executive/", "rt/station/", "rt/forces/", "rt/control/"},
        .core = true,
        .library = "Eigen/.*"},
+      // The machine's clock, injected like any other, in a library of its own.
+      {.folder = "rt/executive/monotonic_clock.cpp",
+       .may_use = {"rt/executive/monotonic_clock.hpp"},
+       .core = true,
+       .library = "cerrno|ctime"},
       {.folder = "rt/platform/", .may_use = {"rt/"}, .library = "Eigen/.*|tl/expected.hpp"},
       {.folder = "vision/", .may_use = {"rt/station/"}, .library = "Eigen/.*|tl/expected.hpp|opencv2/.*"},
       {.folder = "tools/",

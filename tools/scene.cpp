@@ -53,7 +53,7 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 
 std::string unknown(std::string_view what, std::string_view given, const std::vector<std::string>& names) {
   std::string near;
-  std::size_t best = std::max<std::size_t>(3, given.size() / 3) + 1;
+  std::size_t best = std::max<std::size_t>(2, given.size() / 3) + 1;
   if (given.size() <= 60)
     for (const auto& n : names) {
       std::size_t d = edit_distance(given, n);
@@ -247,11 +247,9 @@ class Reader {
       const auto keys = list.keys(scene_, count - 1);
       const std::string name = fmt::format("{}[{}]", list.name, count - 1);
       given_[name] = at(here);
-      for (const char* must : {"device", "kind", "at_s"}) {
-        const bool known =
-            std::any_of(keys.begin(), keys.end(), [&](const Key& k) { return k.name == must; });
-        if (known && !content->contains(must)) return wrong(here, name, fmt::format("{} is missing", must));
-      }
+      for (const auto& k : keys)
+        if ((k.name == "device" || k.name == "kind" || k.name == "at_s") && !content->contains(k.name))
+          return wrong(here, name, fmt::format("{} is missing, allowed: {}", k.name, allowed(k)));
       for (const auto& [key, value] : *content)
         if (auto r = read_key(name, keys, key, value); !r) return r;
     }

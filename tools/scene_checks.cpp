@@ -76,9 +76,9 @@ std::optional<Problem> check_together(const Scene& s) {
   // Needle, cell and pipettes.
   const auto& needle = sim.needle;
   if (needle.shaft_radius_m < needle.radius_m)
-    return Problem{
-        "needle.shaft_radius_um",
-        fmt::format("is smaller than the tip, allowed: at least radius_um = {:g}", um(needle.radius_m))};
+    return Problem{"needle.shaft_radius_um",
+                   fmt::format("{:g} is smaller than the tip, allowed: at least radius_um = {:g}",
+                               um(needle.shaft_radius_m), um(needle.radius_m))};
   if (sim.cell) {
     const auto& c = *sim.cell;
     if (needle.radius_m * 4 > c.R_m)

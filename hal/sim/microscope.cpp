@@ -757,10 +757,12 @@ struct Microscope::Impl {
     const Box box = box_of(wall, margin).meet(near);
     if (box.empty()) return;
     levels.start(box);
-    levels.add(wall, kNeedleWall + kNeedleFringe);
+    levels.add(wall, kNeedleWall + 2 * kNeedleFringe);
     std::array<Pixel, 6> other;
-    strip(0, tip_radius + 1.6, shaft_radius + 1.6, other);
-    levels.add(other, -kNeedleFringe);
+    for (const double beside : {kRim_px, -std::min(kRim_px, 0.5 * tip_radius)}) {
+      strip(0, tip_radius + beside, shaft_radius + beside, other);
+      levels.add(other, -kNeedleFringe);
+    }
     strip(0, kNeedleBore * tip_radius, kNeedleBore * shaft_radius, other);
     levels.add(other, -kNeedleWall - kNeedleLumen + kNeedleEnd);
     strip(std::min(1.2, 0.5 * taper), kNeedleBore * tip_radius, kNeedleBore * shaft_radius, other);

@@ -37,7 +37,10 @@ step() {
   sleep 0.1
   while kill -0 "$running" 2>/dev/null; do
     seconds=$((SECONDS - start))
-    progress=$(tail -c 4000 "$log" | tr '\r' '\n' | grep -aoE '^(\[[0-9]+/[0-9]+\]|[0-9]+/[0-9]+ Test)' | tail -n 1) || true
+    # The last line it wrote; of a compiler's or a test's, how far it is.
+    progress=$(tail -c 2000 "$log" | tr '\r' '\n' | sed -En '/^\[[0-9]+\/[0-9]+\]|^ *[0-9]+\/[0-9]+ Test/s/^( *\[?[0-9]+\/[0-9]+\]?).*/\1/; /[^ ]/p' |
+      tail -n 1 | tr -cd '[:print:]' | cut -c1-90) || true
+    if [ -n "${PUNCTUM_PROGRESS:-}" ]; then printf '%-10s %s %s %d s\n' "$name" "$what" "$progress" "$seconds" >"$PUNCTUM_PROGRESS"; fi
     if [ -t 2 ]; then
       printf '\r%-10s %s %s %d s \033[K' "$name" "$what" "$progress" "$seconds" >&2
     elif [ $((seconds - told)) -ge 30 ]; then
@@ -61,8 +64,8 @@ step() {
 
 # One build at a time in one tree; a second caller waits.
 lock_build() {
-  mkdir -p "$root/build" 2>/dev/null && [ -w "$root/build" ] ||
-    fail "$root/build belongs to another user: remove it, or run this as that user"
+  mkdir -p "$root/build" 2>/dev/null || true
+  [ -w "$root/build" ] || fail "$root/build cannot be written to: remove it, or run this as its owner"
   exec 9>"$root/build/.lock"
   if ! flock -n 9; then
     say wait "another build runs in this tree"

@@ -141,6 +141,7 @@ class ExposureTaker {
   std::uint64_t next_ = 0;
   bool attached_ = false;
   bool taken_ = false;
+  std::int64_t deliver_ns_ = 0;  // of what is taken
 };
 
 // Takes every snapshot in order, for a recorder: in virtual time the clock waits for it.

@@ -48,7 +48,7 @@ class SimEstop final : public hal::EstopChain {
   EstopPlantState state_;
   FailingReader<EstopPlantState> reader_;
   Failure failure_ = Failure::none;
-  bool toggled_ = false;
+  std::int64_t now_ns_ = 0;
 };
 
 }  // namespace punctum::sim

@@ -3,9 +3,10 @@
 //
 // What she wants of the tip is a path in the picture: a minimum-jerk approach to a point before the membrane,
 // a push at steady speed until she sees it give way, the rest of the way in, the dwell with the injection
-// button down, the way out. She moves her hand by that path and corrects it by what she saw reaction_s ago,
-// so scale, clutch and registration do not matter to her. Across her line she gives way to a guiding force
-// and does not mind an error smaller than she can judge. Tremor of 8 to 12 Hz and a slow drift come on top.
+// button down, the way out. She moves her hand by that path and corrects it by what she saw a moment ago, so
+// scale, clutch and registration do not matter to her. Across her line she gives way to a guiding force and
+// does not mind an error smaller than she can judge. Tremor of 8 to 12 Hz and a slow drift come on top. When
+// the needle does not follow her she stops, and after a second draws back and starts over.
 #pragma once
 
 #include <array>
@@ -41,10 +42,10 @@ class Tremor {
 
 // What there is to see and feel, true and now; the person delays and misjudges it herself.
 struct PersonView {
-  Vec3 tip_m = Vec3::Zero();  // world frame
-  bool cell = false;
-  Vec3 entry_m = Vec3::Zero();   // where the undeformed membrane lies in the needle's way
+  Vec3 tip_m = Vec3::Zero();     // world frame
   Vec3 inward = -Vec3::UnitX();  // the needle's mounted axis
+  bool cell = false;
+  Vec3 centre_m = Vec3::Zero();  // of the undeformed cell
   double R_m = 0;
   bool punctured = false;  // the innermost membrane she wants to get through
   std::uint64_t cell_index = 0;
@@ -52,50 +53,52 @@ struct PersonView {
 };
 
 enum class Doing : std::uint32_t {
-  settle,
-  approach,
-  indent,
-  push_on,
-  inject,
+  settle,    // waits before she starts (over)
+  approach,  // to a point before the membrane
+  indent,    // pushes until she sees the membrane give way
+  push_on,   // to the wanted depth
+  inject,    // button down for the dwell
   withdraw,
-  next_cell,
-  go_back,
-  clutch,
-  rest,
-  strokes
+  next_cell,  // presses the button
+  go_back,    // to where the stage started
+  clutch,     // button down: brings the hand back to the middle of its workspace
+  rest,       // the task is over for her
+  strokes,    // no cell in the scene: to and fro
 };
 
 struct PersonState {
-  static constexpr int kLooks = 24;  // perceived pictures kept, kLook_s apart
+  static constexpr int kLooks = 8;  // pictures she remembers, kLook_s apart
 
-  Point intention_m;   // device frame, without tremor
-  Point shaken_m;      // with tremor and drift: what the arm is pulled to
+  Point intention_m;   // device frame, without tremor and drift
+  Point shaken_m;      // with them: what the arm is pulled to
   Point wanted_tip_m;  // world frame
-  Point path_from_m;
+  Point path_from_m;   // world frame
   Point path_to_m;
-  Point aim_offset_m;                          // her misjudgement of where the axis is
-  Point line{-1, 0, 0};                        // her idea of the axis
-  Point felt_m;                                // handle against intention, low-passed
-  std::array<Point, kLooks> looked_error_m{};  // wanted - seen
-  std::array<Point, kLooks> looked_tip_m{};
+  Point hand_from_m;                    // of the clutch, device frame
+  Point target_m;                       // where her line meets the undeformed membrane
+  Point line{-1, 0, 0};                 // her idea of the axis, into the cell
+  Point felt_m;                         // handle against intention, low-passed
+  Point puncture_tip_m;                 // where the tip was when the membrane gave way
+  std::array<Point, kLooks> error_m{};  // wanted - seen
+  std::array<Point, kLooks> tip_m{};    // seen
   std::uint64_t looks = 0;
   double next_look_s = 0;
-  double doing_s = 0;  // for how long
-  double path_s = 0;   // time along the path; stands still while the needle does not follow
-  double path_T_s = 0;
-  double travelled_m = 0;
-  double speed_m_s = 0;
-  double progress_s = 0;       // since the tip last moved on, as seen
-  double progress_m = 0;       // where it was then, along the line
-  double saw_puncture_s = -1;  // run time at which she became aware of it
+  double doing_s = 0;   // for how long
+  double path_s = 0;    // time along the path; slows down while the needle does not follow
+  double path_T_s = 0;  // 0: at path_speed_m_s along the line
+  double path_speed_m_s = 0;
+  double still_s = 0;     // since the needle last came on
+  double still_at_m = 0;  // where, along the way
+  double noticed_s = -1;  // run time at which she becomes aware of the puncture
   Doing doing = Doing::settle;
   Doing resume = Doing::settle;  // after the clutch
   std::uint32_t buttons = 0;
   std::uint32_t attempts = 0;  // at this cell
   std::uint32_t cells_done = 0;
-  std::uint32_t gave_up = 0;  // cells
-  std::uint64_t cell_index = 0;
-  double tilt_rad[2]{};
+  std::uint32_t given_up = 0;  // of them, never punctured
+  std::uint32_t clutched = 0;  // times
+  std::uint32_t judged = 0;    // times
+  double tilt_rad[2]{};        // of the handle
 };
 
 class Person {
@@ -112,21 +115,35 @@ class Person {
   [[nodiscard]] const Tremor& tremor() const noexcept { return tremor_; }
 
  private:
-  void look(double t_s, const PersonView& view) noexcept;
-  void begin(Doing doing) noexcept;
-  void begin_path(Doing doing, const Vec3& to, double duration_s) noexcept;
-  void decide(double t_s, const PersonView& view) noexcept;
-  [[nodiscard]] Vec3 wanted_velocity(double dt_s) noexcept;
-  [[nodiscard]] Vec3 seen_error() const noexcept;
-  [[nodiscard]] Vec3 seen_tip() const noexcept;
-  [[nodiscard]] bool held_up() const noexcept;
+  void begin(Doing doing, const PersonView& view) noexcept;
+  void begin_path(Doing doing, const PersonView& view, const Vec3& to, double least_s) noexcept;
   void judge(const PersonView& view) noexcept;
+  void look(const PersonView& view) noexcept;
+  void decide(double to_s, const PersonView& view) noexcept;
+  void after_withdrawal(const PersonView& view) noexcept;
+  void maybe_clutch(const PersonView& view, const Vec3& hand_velocity) noexcept;
+  void clutch(double dt_s) noexcept;
+  void strokes(double dt_s) noexcept;
+  void lead(double dt_s, const PersonView& view) noexcept;
+  [[nodiscard]] Vec3 drift_at(double t_s) const noexcept;
+  [[nodiscard]] std::size_t seen() const noexcept;
+  [[nodiscard]] Vec3 way() const noexcept;  // unit vector of the motion she is making
+  [[nodiscard]] bool moving() const noexcept;
+  [[nodiscard]] bool refused() const noexcept;
+
+  struct Wave {
+    double omega = 0;
+    double phase = 0;
+    double amplitude = 0;
+  };
 
   SimConfig config_;
   Tremor tremor_;
   Noise aim_;
-  Noise tilt_;
-  std::array<std::array<double, 9>, 3> drift_{};  // three slow lines per axis: angular rate, phase, amplitude
+  std::array<std::array<Wave, 3>, 2> drift_{};  // across the needle, at the needle, metres
+  std::array<Wave, 2> tilt_{};                  // phase unused: omega, phase and size of the sway
+  std::array<double, 2> tilt_mean_rad_{};
+  Vec3 across_, deep_;  // unit, perpendicular to the mounted axis; deep_ is mostly z
   PersonState state_;
 };
 

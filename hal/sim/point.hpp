@@ -8,6 +8,7 @@
 
 namespace punctum::sim {
 
+using hal::Quat;
 using hal::Vec3;
 
 struct Point {
@@ -17,6 +18,9 @@ struct Point {
 
   Point() = default;
   Point(double x_, double y_, double z_) : x(x_), y(y_), z(z_) {}
+  template <typename Derived>
+  Point(const Eigen::MatrixBase<Derived>& v)  // NOLINT(google-explicit-constructor)
+      : Point(Vec3(v)) {}
   Point(const Vec3& v) : x(v.x()), y(v.y()), z(v.z()) {}  // NOLINT(google-explicit-constructor)
   operator Vec3() const { return {x, y, z}; }             // NOLINT(google-explicit-constructor)
   [[nodiscard]] Vec3 vec() const { return {x, y, z}; }

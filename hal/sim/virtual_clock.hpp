@@ -1,6 +1,7 @@
 // Time that passes only when everybody is ready, and the same clock as others see it.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 
 #include "hal/devices.hpp"
@@ -29,9 +30,13 @@ class VirtualClock final : public hal::Clock {
   bool await_camera() noexcept;
   bool await_recorder() noexcept;
 
+  // From a signal handler: waits for nobody any more.
+  void stop_waiting() noexcept { stop_.store(true, std::memory_order_relaxed); }
+
  private:
   Bench& bench_;
   std::int64_t bail_out_ns_;
+  std::atomic<bool> stop_{false};
 };
 
 // Everybody else's side: reads the time of the bench and waits for it to come. In real time it is
@@ -48,7 +53,5 @@ class BenchClock final : public hal::Clock {
   const Bench& bench_;
   std::atomic<bool> stop_{false};
 };
-
-[[nodiscard]] std::int64_t monotonic_ns() noexcept;
 
 }  // namespace punctum::sim

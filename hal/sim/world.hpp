@@ -29,6 +29,7 @@ class World {
  public:
   // bench may be null: nothing is published. May take a second or so: the membrane is solved and tabled here.
   World(const SimConfig& config, Bench* bench, std::int64_t start_ns);
+  ~World();  // tells everybody on the bench that the plant has stopped
   World(const World&) = delete;
   World& operator=(const World&) = delete;
 
@@ -50,9 +51,12 @@ class World {
 
  private:
   static constexpr std::int64_t kPiece_ns = 1'000'000;  // longest piece the plant is stepped by
+  static constexpr std::int64_t kMostPieces = 2000;     // per step
 
   void step_piece(std::int64_t to_ns) noexcept;
-  void put_next_cell() noexcept;
+  void put_next_cell(bool button) noexcept;
+  void touch(const StagePlantState& before, double dt_s) noexcept;
+  [[nodiscard]] PersonView view() const noexcept;
   void take_snapshot() noexcept;
   void expose() noexcept;
   [[nodiscard]] double seconds(std::int64_t t_ns) const noexcept;
@@ -70,7 +74,8 @@ class World {
   std::optional<SimInjector> injector_;
   std::optional<SimVacuum> vacuum_;
   std::optional<SimForceSensor> force_sensor_;
-  Snapshot snapshot_;
+  Snapshot snapshot_;  // cell, cell_reading and what counts live here; the rest is copied in after a step
+  Exposure exposure_;
 };
 
 // What the plant came to after the core had died at `last`: nobody reads or writes any more.

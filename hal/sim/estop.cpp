@@ -1,0 +1,79 @@
+#include "hal/sim/estop.hpp"
+
+#include "hal/sim/point.hpp"
+
+namespace punctum::sim {
+namespace {
+constexpr double kResetAfter_s = 0.2;  // release to press
+constexpr double kResetFor_s = 0.1;
+}  // namespace
+
+SimEstop::SimEstop(const SimConfig& config)
+    : events_(config.estop_events),
+      event_count_(config.estop_event_count),
+      timeout_ns_(to_ns(config.relay_timeout_s)) {}
+
+void SimEstop::step(std::int64_t t_ns, double from_s, double to_s, Failure failure) noexcept {
+  failure_ = failure;
+  bool a = true;
+  bool b = true;
+  bool reset = false;
+  bool pulse = false;
+  for (int i = 0; i < event_count_; ++i) {
+    const EstopEvent& e = events_[static_cast<std::size_t>(i)];
+    const double end_s = e.at_s + e.for_s;
+    if (to_s >= e.at_s && to_s < end_s) {
+      a = a && !e.contact_a;
+      b = b && !e.contact_b;
+    }
+    if (e.at_s > from_s && end_s <= to_s && (e.contact_a || e.contact_b)) pulse = true;
+    const double press_s = end_s + kResetAfter_s;
+    if (e.reset_after && to_s >= press_s && to_s < press_s + kResetFor_s) reset = true;
+  }
+  if (failure == Failure::saturate) a = true;
+  state_.contact_a_closed = a ? 1 : 0;
+  state_.contact_b_closed = b ? 1 : 0;
+  state_.reset_pressed = reset ? 1 : 0;
+  state_.pulse_seen = pulse ? 1 : 0;
+
+  if (reset) {
+    state_.last_reset_ns = t_ns;
+    state_.was_reset = 1;
+  }
+  const bool beats = state_.heartbeat_seen != 0 && t_ns - state_.last_toggle_ns <= timeout_ns_;
+  if (state_.relay_closed != 0 && !beats) {
+    state_.relay_closed = 0;
+    state_.was_reset = 0;
+    state_.opened_ns = state_.last_toggle_ns + timeout_ns_;
+  } else if (state_.relay_closed == 0 && beats && (state_.was_reset != 0 || state_.opened_ns == 0)) {
+    state_.relay_closed = 1;
+  }
+  reader_.push(t_ns, state_, failure);
+  now_ns_ = t_ns;
+}
+
+hal::Status SimEstop::read(hal::EstopState& out) noexcept {
+  EstopPlantState s;
+  const hal::Status status = reader_.read(s);
+  if (status != hal::Status::ok) return status;
+  if (failure_ == Failure::nan) return hal::Status::fault;
+  out.contact_a_closed = s.contact_a_closed != 0;
+  out.contact_b_closed = s.contact_b_closed != 0;
+  out.reset_pressed = s.reset_pressed != 0;
+  out.pulse_seen = s.pulse_seen != 0;
+  return hal::Status::ok;
+}
+
+void SimEstop::heartbeat(bool level) noexcept {
+  if (!commands_arrive(failure_) || (level ? 1 : 0) == state_.heartbeat_level) return;
+  state_.heartbeat_level = level ? 1 : 0;
+  state_.heartbeat_seen = 1;
+  state_.last_toggle_ns = now_ns_;
+}
+
+void SimEstop::restore(const EstopPlantState& state, std::int64_t t_ns) noexcept {
+  state_ = state;
+  now_ns_ = t_ns;
+}
+
+}  // namespace punctum::sim

@@ -1,0 +1,238 @@
+#include "hal/sim/hand.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace punctum::sim {
+namespace {
+
+constexpr double kAtRest_m_s = 1e-12;  // slower is at rest as far as friction is concerned
+constexpr int kMaxPieces = 256;        // per call; a handle comes to rest long before
+
+// m x'' + c x' + K x = g0 + K u t, from x0, v0 at t = 0.
+class Slide {
+ public:
+  Slide(double m, double c, double K, double g0, double u, double x0, double v0) noexcept
+      : u_(u), x0_(x0), v0_(v0), with_spring_(K > 0) {
+    if (!with_spring_) {
+      rate_ = c / m;
+      g_ = g0 / m;
+      return;
+    }
+    // Particular solution A + u t; y = x - A - u t obeys y'' + 2 alpha y' + w2 y = 0.
+    alpha_ = c / (2 * m);
+    w2_ = K / m;
+    D_ = alpha_ * alpha_ - w2_;
+    root_ = std::sqrt(std::abs(D_));
+    A_ = (g0 - c * u) / K;
+    y0_ = x0 - A_;
+    P_ = v0 - u;
+    Q_ = -(w2_ * y0_ + alpha_ * P_);
+  }
+
+  [[nodiscard]] HandAxis at(double t) const noexcept {
+    if (!with_spring_) {
+      const double z = rate_ * t;
+      const double phi1 = z > 1e-8 ? -std::expm1(-z) / z : 1 - z / 2;
+      const double phi2 = z > 1e-2 ? (1 - phi1) / z : 0.5 - z / 6 + z * z / 24 - z * z * z / 120;
+      return {x0_ + t * (v0_ * phi1 + g_ * t * phi2), v0_ * std::exp(-z) + g_ * t * phi1};
+    }
+    const auto [C, S] = modes(t);
+    return {A_ + u_ * t + y0_ * C + (P_ + alpha_ * y0_) * S, u_ + P_ * C + Q_ * S};
+  }
+
+  // First time in (0, end] at which sign * velocity becomes negative, or end.
+  [[nodiscard]] double stops_at(double sign, double end) const noexcept {
+    // Between the zeros of the acceleration the velocity is monotone.
+    double from = 0;
+    for (int k = 0; k < kMaxPieces && from < end; ++k) {
+      const double to = std::min(end, next_turn(from));
+      if (sign * at(to).v_m_s < -kAtRest_m_s * 1e-2) return root(sign, from, to);
+      from = to;
+    }
+    return end;
+  }
+
+ private:
+  struct Modes {
+    double C;  // e^(-alpha t) cosh(sqrt(D) t)
+    double S;  // e^(-alpha t) sinh(sqrt(D) t) / sqrt(D)
+  };
+  [[nodiscard]] Modes modes(double t) const noexcept {
+    if (root_ * t < 1e-9) {
+      const double e = std::exp(-alpha_ * t);
+      return {e, e * t};
+    }
+    if (D_ < 0) {
+      const double e = std::exp(-alpha_ * t);
+      return {e * std::cos(root_ * t), e * std::sin(root_ * t) / root_};
+    }
+    const double slow = std::exp(-w2_ / (alpha_ + root_) * t);  // alpha - sqrt(D) without cancellation
+    const double fast = std::exp(-(alpha_ + root_) * t);
+    return {(slow + fast) / 2, -slow * std::expm1(-2 * root_ * t) / (2 * root_)};
+  }
+
+  // The first zero of the acceleration a0 C + a1 S after `from`.
+  [[nodiscard]] double next_turn(double from) const noexcept {
+    constexpr double never = 1e300;
+    if (!with_spring_) return never;
+    const double a0 = Q_ - alpha_ * P_;
+    const double a1 = P_ * D_ - alpha_ * Q_;
+    const double after = from * (1 + 1e-12) + 1e-15;
+    if (D_ < 0) {
+      if (root_ <= 0) return never;
+      double turn = std::atan2(-a0, a1 / root_) / root_;
+      const double half_turn = std::numbers::pi / root_;
+      turn += half_turn * std::ceil((after - turn) / half_turn);
+      return turn > from ? turn : turn + half_turn;
+    }
+    double turn = never;
+    if (root_ > 0) {
+      const double tanh_turn = -a0 * root_ / a1;
+      if (a1 != 0 && tanh_turn > 0 && tanh_turn < 1) turn = std::atanh(tanh_turn) / root_;
+    } else if (a1 != 0) {
+      turn = -a0 / a1;
+    }
+    return turn > after ? turn : never;
+  }
+
+  // The velocity changes sign between from and to, where it is monotone: bisection, then secant inside it.
+  [[nodiscard]] double root(double sign, double from, double to) const noexcept {
+    double a = from;
+    double b = to;
+    double va = std::max(0.0, sign * at(a).v_m_s);
+    double vb = sign * at(b).v_m_s;
+    for (int i = 0; i < 100 && b - a > 1e-16 + 4e-16 * b; ++i) {
+      double t = i % 3 == 2 ? a + (b - a) / 2 : a + (b - a) * va / (va - vb);
+      if (!(t > a && t < b)) t = a + (b - a) / 2;
+      const double v = sign * at(t).v_m_s;
+      if (v >= 0) {
+        a = t;
+        va = v;
+        if (v == 0) break;
+      } else {
+        b = t;
+        vb = v;
+      }
+    }
+    return a;
+  }
+
+  double u_, x0_, v0_;
+  bool with_spring_;
+  double rate_ = 0, g_ = 0;
+  double alpha_ = 0, w2_ = 0, D_ = 0, root_ = 0, A_ = 0, y0_ = 0, P_ = 0, Q_ = 0;
+};
+
+}  // namespace
+
+void advance(HandAxis& axis, const HandParams& hand, const ArmImpedance& arm, double force_N, double p0_m,
+             double u_m_s, double dt_s) noexcept {
+  const double m = hand.mass_kg;
+  const double K = arm.stiffness_N_m;
+  const double B = arm.damping_Ns_m;
+  const double c = B + hand.damping_Ns_m;
+  const double friction = hand.coulomb_N;
+  double t = 0;
+  double breaks_away = 0;  // sign of the motion that just began from rest
+  for (int piece = 0; piece < kMaxPieces && t < dt_s; ++piece) {
+    const double left = dt_s - t;
+    const double p = p0_m + u_m_s * t;
+    const double drive = force_N + K * p + B * u_m_s;  // all but friction, at x = 0 and v = 0
+    double sign = 0;
+    if (friction > 0) {
+      if (breaks_away != 0) {
+        sign = breaks_away;
+        breaks_away = 0;
+      } else if (std::abs(axis.v_m_s) > kAtRest_m_s) {
+        sign = axis.v_m_s > 0 ? 1 : -1;
+      } else {
+        axis.v_m_s = 0;
+        const double pull = drive - K * axis.x_m;
+        if (std::abs(pull) <= friction) {  // sticks until the arm's pull, linear in time, exceeds friction
+          const double ramp = K * u_m_s;
+          if (ramp == 0) return;
+          const double until = ((ramp > 0 ? friction : -friction) - pull) / ramp;
+          if (until >= left) return;
+          t += std::max(0.0, until);
+          breaks_away = ramp > 0 ? 1 : -1;
+          continue;
+        }
+        sign = pull > 0 ? 1 : -1;
+      }
+    }
+    const Slide slide(m, c, K, drive - sign * friction, u_m_s, axis.x_m, axis.v_m_s);
+    const double until = sign == 0 ? left : slide.stops_at(sign, left);
+    axis = slide.at(until);
+    if (until < left) axis.v_m_s = 0;
+    t += until;
+  }
+}
+
+SimHand::SimHand(const HandParams& params, const ArmImpedance& arm) : params_(params), arm_(arm) {}
+
+void SimHand::step(std::int64_t t_ns, double dt_s, const Vec3& p0, const Vec3& p1, bool power,
+                   Failure failure) noexcept {
+  failure_ = failure;
+  const bool on = power && failure != Failure::drop && failure != Failure::disconnect;
+  const double most = params_.force_max_N * (failure == Failure::saturate ? kSaturatedForce : 1.0);
+  Vec3 f = on ? state_.commanded_N.vec() : Vec3::Zero();
+  if (const double size = f.norm(); size > most) f *= most / size;
+
+  const Vec3 u = dt_s > 0 ? Vec3((p1 - p0) / dt_s) : Vec3::Zero();
+  Vec3 x = state_.position_m;
+  Vec3 v = state_.velocity_m_s;
+  const Vec3 before = x;
+  for (int i = 0; i < 3; ++i) {
+    HandAxis axis{x[i], v[i]};
+    advance(axis, params_, arm_, f[i], p0[i], u[i], dt_s);
+    x[i] = axis.x_m;
+    v[i] = axis.v_m_s;
+  }
+  state_.position_m = x;
+  state_.velocity_m_s = v;
+  state_.applied_N = f;
+  state_.work_J += f.dot(x - before);
+  state_.amplifier_on = on ? 1 : 0;
+  reader_.push(t_ns, state_, failure);
+}
+
+void SimHand::hold_by(double tilt_x_rad, double tilt_y_rad, std::uint32_t buttons) noexcept {
+  state_.tilt_rad[0] = tilt_x_rad;
+  state_.tilt_rad[1] = tilt_y_rad;
+  state_.buttons = buttons;
+}
+
+hal::Status SimHand::read(hal::HandState& out) noexcept {
+  HandPlantState s;
+  const hal::Status status = reader_.read(s);
+  if (status != hal::Status::ok) return status;
+  const Vec3 true_position = s.position_m;
+  Vec3 x;
+  for (int i = 0; i < 3; ++i) {
+    double xi = true_position[i];
+    if (failure_ == Failure::saturate) xi = std::clamp(xi, -kSaturatedReach_m, kSaturatedReach_m);
+    x[i] = params_.encoder_step_m > 0 ? params_.encoder_step_m * std::round(xi / params_.encoder_step_m) : xi;
+  }
+  if (failure_ == Failure::nan) x.setConstant(kNotANumber);
+  out.position_m = x;
+  const Vec3 turn(s.tilt_rad[0], s.tilt_rad[1], 0);
+  const double angle = turn.norm();
+  out.orientation = Quat::Identity();
+  if (angle > 0) out.orientation = Quat(Eigen::AngleAxisd(angle, turn / angle));
+  out.buttons = s.buttons;
+  return hal::Status::ok;
+}
+
+hal::Status SimHand::write_force(const Vec3& force_N) noexcept {
+  if (!commands_arrive(failure_)) return command_status(failure_);
+  if (!force_N.allFinite()) {  // the amplifier refuses what is not a number
+    state_.commanded_N = Point{};
+    return hal::Status::fault;
+  }
+  state_.commanded_N = force_N;
+  return hal::Status::ok;
+}
+
+}  // namespace punctum::sim

@@ -1,0 +1,240 @@
+#include "hal/sim/world.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+namespace punctum::sim {
+namespace {
+
+ArmImpedance arm_of(const OperatorParams& p) { return {p.arm_stiffness_N_m, p.arm_damping_Ns_m}; }
+
+}  // namespace
+
+World::World(const SimConfig& config, Bench* bench, std::int64_t start_ns)
+    : config_(config),
+      bench_(bench),
+      start_ns_(start_ns),
+      t_ns_(start_ns),
+      person_(config),
+      hand_(config.hand, arm_of(config.person)),
+      stage_(config.stage),
+      estop_(config) {
+  if (config.cell) cell_.emplace(*config.cell, config.needle, config.holder, config.seed, 0);
+  if (config.injector) injector_.emplace(*config.injector);
+  if (config.holder) vacuum_.emplace(*config.holder, config.seed);
+  if (config.force_sensor) force_sensor_.emplace(*config.force_sensor, config.seed);
+  snapshot_.start_ns = start_ns;
+  snapshot_.has_cell = cell_ ? 1 : 0;
+  // The tremor shakes her hand before the run begins: the handle is where it pulls it to.
+  person_.step(0, 0, view());
+  HandPlantState hand = hand_.state();
+  hand.position_m = person_.state().shaken_m;
+  hand_.restore(hand);
+  touch(stage_.state(), 0);
+  take_snapshot();
+}
+
+World::~World() {
+  if (bench_ != nullptr) bench_->finished.store(1, std::memory_order_release);
+}
+
+double World::seconds(std::int64_t t_ns) const noexcept {
+  return static_cast<double>(t_ns - start_ns_) * 1e-9;
+}
+
+PersonView World::view() const noexcept {
+  PersonView v;
+  v.tip_m = stage_.state().tip_m;
+  v.inward = config_.stage.axis.normalized();
+  v.hand_m = hand_.state().position_m;
+  v.cell = cell_.has_value();
+  if (cell_) {
+    v.centre_m = cell_->centre_m(snapshot_.cell);
+    v.R_m = cell_->R_m();
+    v.punctured = config_.cell->inner ? snapshot_.cell.inner.punctured : snapshot_.cell.outer.punctured;
+    v.cell_index = snapshot_.cell_index;
+  }
+  return v;
+}
+
+void World::step(std::int64_t to_ns) noexcept {
+  if (to_ns <= t_ns_) return;
+  // Pieces no longer than a millisecond; after a long halt of the process fewer, longer ones.
+  const std::int64_t piece_ns = std::max(kPiece_ns, (to_ns - t_ns_) / kMostPieces);
+  while (t_ns_ < to_ns) step_piece(std::min(to_ns, t_ns_ + piece_ns));
+  ++snapshot_.tick;
+  take_snapshot();
+  if (bench_ == nullptr) return;
+  bench_->snapshots.push(snapshot_);
+  expose();
+  if (bench_->virtual_time.load(std::memory_order_relaxed) == 0) {
+    bench_->now_ns.store(t_ns_, std::memory_order_release);
+  }
+}
+
+void World::step_piece(std::int64_t to_ns) noexcept {
+  const double from_s = seconds(t_ns_);
+  const double to_s = seconds(to_ns);
+  const double dt_s = to_s - from_s;
+  const auto failure = failures_at(config_, bench_ != nullptr ? &bench_->failures : nullptr, to_s);
+  const auto of = [&failure](Device d) { return failure[static_cast<std::size_t>(d)]; };
+  std::copy(failure.begin(), failure.end(), snapshot_.failure.begin());
+
+  estop_.step(to_ns, from_s, to_s, of(Device::estop));
+  const bool power = estop_.power();
+
+  const Vec3 p0 = person_.state().shaken_m;
+  person_.step(from_s, to_s, view());
+  const PersonState& person = person_.state();
+  hand_.hold_by(person.tilt_rad[0], person.tilt_rad[1], person.buttons);
+  hand_.step(to_ns, dt_s, p0, person.shaken_m, power, of(Device::hand));
+
+  const StagePlantState before = stage_.state();
+  stage_.step(to_ns, dt_s, power, of(Device::stage));
+  if (vacuum_) vacuum_->step(to_ns, dt_s, of(Device::vacuum));
+  put_next_cell((person.buttons & hal::kButtonNextCell) != 0);
+  touch(before, dt_s);
+  if (injector_) injector_->step(to_ns, dt_s, power, of(Device::injector));
+  if (force_sensor_) {
+    const double axial_N = -snapshot_.cell_reading.force_N.vec().dot(stage_.state().axis.vec());
+    force_sensor_->step(to_ns, dt_s, axial_N, of(Device::force_sensor));
+  }
+  t_ns_ = to_ns;
+}
+
+// On the button's rising edge, when the needle is out of the way.
+void World::put_next_cell(bool button) noexcept {
+  const bool edge = button && snapshot_.next_cell_was_down == 0;
+  snapshot_.next_cell_was_down = button ? 1 : 0;
+  if (!edge || !cell_ || snapshot_.cell_reading.contact != 0) return;
+  ++snapshot_.cell_index;
+  cell_->renew(config_.seed, static_cast<int>(snapshot_.cell_index));
+  snapshot_.cell = CellState{};
+}
+
+// The needle has moved from `before` to where the stage is now: what that does to the cell.
+void World::touch(const StagePlantState& before, double dt_s) noexcept {
+  if (!cell_) return;
+  TipMotion motion;
+  motion.tip_begin_m = before.tip_m;
+  motion.tip_end_m = stage_.state().tip_m;
+  motion.axis_begin = before.axis;
+  motion.axis_end = stage_.state().axis;
+  if (vacuum_) motion.vacuum_Pa = vacuum_->state().pressure_Pa;
+  CellState& s = snapshot_.cell;
+  s.time_s = seconds(t_ns_);
+  const CellForce f = cell_->step(s, motion, dt_s);
+  CellReading& r = snapshot_.cell_reading;
+  r.centre_m = cell_->centre_m(s);
+  r.R_m = cell_->R_m();
+  r.R_inner_m = cell_->R_inner_m();
+  r.entry_m = f.entry_m;
+  r.depth_m = f.depth_m;
+  r.wd_m = f.wd_m;
+  r.a_m = f.a_m;
+  r.inner_wd_m = f.inner_wd_m;
+  r.chord_m = f.chord_m;
+  r.force_N = f.force_N;
+  r.membrane_N = f.membrane_N;
+  r.outer_N = f.outer_N;
+  r.inner_N = f.inner_N;
+  r.drag_N = f.drag_N;
+  r.strain = f.strain;
+  r.pressure_Pa = f.pressure_Pa;
+  r.contact = f.contact ? 1 : 0;
+  r.aims_at_cell = f.aims_at_cell ? 1 : 0;
+}
+
+void World::take_snapshot() noexcept {
+  Snapshot& s = snapshot_;
+  s.t_ns = t_ns_;
+  s.hand = hand_.state();
+  s.person = person_.state();
+  s.stage = stage_.state();
+  s.estop = estop_.state();
+  if (injector_) s.injector = injector_->state();
+  if (vacuum_) s.vacuum = vacuum_->state();
+  if (force_sensor_) s.force_sensor = force_sensor_->state();
+  const auto when = [this](const MembraneState& m) {
+    return m.punctured ? start_ns_ + to_ns(m.puncture_time_s) : std::int64_t{0};
+  };
+  s.zona_puncture_ns = when(s.cell.outer);
+  s.puncture_ns = config_.cell && config_.cell->inner ? when(s.cell.inner) : s.zona_puncture_ns;
+}
+
+void World::expose() noexcept {
+  if (!config_.microscope) return;
+  const std::int64_t frame_ns = to_ns(1 / config_.microscope->fps);
+  const auto frame = static_cast<std::uint64_t>((t_ns_ - start_ns_) / frame_ns);
+  if (frame < next_frame_) return;
+  next_frame_ = frame + 1;
+  exposure_.frame = frame;
+  exposure_.exposure_ns = t_ns_;
+  const bool virtual_time = bench_->virtual_time.load(std::memory_order_relaxed) != 0;
+  exposure_.deliver_ns = virtual_time ? t_ns_ + to_ns(config_.microscope->latency_s) : 0;
+  exposure_.world = snapshot_;
+  const std::uint64_t i = bench_->exposed.load(std::memory_order_relaxed);
+  bench_->deliver_ns[i % kExposures].store(exposure_.deliver_ns, std::memory_order_relaxed);
+  bench_->exposures.push(exposure_);
+  bench_->exposed.store(i + 1, std::memory_order_release);
+}
+
+void World::restore(const Snapshot& from) noexcept {
+  snapshot_ = from;
+  start_ns_ = from.start_ns;
+  t_ns_ = from.t_ns;
+  person_.restore(from.person);
+  hand_.restore(from.hand);
+  stage_.restore(from.stage);
+  estop_.restore(from.estop, from.t_ns);
+  if (cell_) cell_->renew(config_.seed, static_cast<int>(from.cell_index));
+  if (injector_) injector_->restore(from.injector);
+  if (vacuum_) vacuum_->restore(from.vacuum);
+  if (force_sensor_) force_sensor_->restore(from.force_sensor);
+  if (config_.microscope) {
+    next_frame_ = static_cast<std::uint64_t>((t_ns_ - start_ns_) / to_ns(1 / config_.microscope->fps)) + 1;
+  }
+}
+
+UnattendedEnd run_unattended(const SimConfig& config, const Snapshot& from, Bench* bench, double for_s) {
+  constexpr std::int64_t tick_ns = 1'000'000;
+  constexpr double shut = 1e-3;  // of the injector's opening
+  const auto world = std::make_unique<World>(config, bench, from.start_ns);
+  world->restore(from);
+  UnattendedEnd end;
+  const auto at = [&from](const Snapshot& s) { return static_cast<double>(s.t_ns - from.t_ns) * 1e-9; };
+  const auto first = [](double& since, bool now, double t) {
+    if (!now) since = -1;
+    if (now && since < 0) since = t;
+  };
+  const std::int64_t last_ns = from.t_ns + to_ns(for_s);
+  for (std::int64_t t = from.t_ns + tick_ns; t <= last_ns; t += tick_ns) {
+    world->step(t);
+    const Snapshot& s = world->snapshot();
+    first(end.relay_opened_s, s.estop.relay_closed == 0, at(s));
+    first(end.stage_at_rest_s, s.stage.powered == 0 && s.stage.velocity_m_s.vec().isZero(0), at(s));
+    first(end.gate_shut_s, s.injector.opening < shut, at(s));
+    first(end.hand_force_off_s, s.hand.applied_N.vec().isZero(0), at(s));
+  }
+  end.last = world->snapshot();
+  end.stage_moved_m = (end.last.stage.tip_m.vec() - from.stage.tip_m.vec()).norm();
+  end.vacuum_kept = !config.holder || end.last.vacuum.pressure_Pa > 0.5 * config.holder->vacuum_Pa;
+  end.cell_held = !config.cell || !end.last.cell.lost();
+  end.safe = end.relay_opened_s >= 0 && end.stage_at_rest_s >= 0 && end.gate_shut_s >= 0 &&
+             end.hand_force_off_s >= 0 && end.vacuum_kept;
+  return end;
+}
+
+UnattendedEnd run_unattended(const SimConfig& config, Bench& bench, double for_s) {
+  Snapshot newest;
+  std::uint64_t index = 0;
+  if (bench.snapshots.newest(newest, index) != hal::Read::ok) return {};  // it died before its first tick
+  // Nobody waits any more: time is what the snapshots say.
+  bench.camera_pid.store(0, std::memory_order_relaxed);
+  UnattendedEnd end = run_unattended(config, newest, &bench, for_s);
+  bench.now_ns.store(end.last.t_ns, std::memory_order_release);
+  return end;
+}
+
+}  // namespace punctum::sim

@@ -47,7 +47,7 @@ struct DampingParams {
 
 // FOAW (Janabi-Sharifi 2000): longest window whose best-fit line stays within +-d of all samples.
 struct VelocityParams {
-  int window = 16;         // samples at most, <= 64
+  int window = 16;         // intervals between samples at most, <= 64
   double d_m = 0.03e-3;    // encoder step
 };
 

@@ -37,8 +37,12 @@ class StageLimits {
 
   void restart(const hal::Vec3& tip_m, const hal::Vec3& axis) noexcept;  // at rest there
 
-  // Where the hand's own point may be: the same position limits without dynamics.
-  [[nodiscard]] hal::Vec3 allowed(const hal::Vec3& wanted_m, const StageConstraint& c) const noexcept;
+  // Where the hand's own point may be: the same position limits without dynamics. The alarms say which bit.
+  struct Checked {
+    hal::Vec3 point_m;
+    std::uint32_t alarms;
+  };
+  [[nodiscard]] Checked check(const hal::Vec3& wanted_m, const StageConstraint& c) const noexcept;
 
   // The next set-point. A target that is not finite leaves it where it is.
   const hal::StageCommand& step(const hal::StageCommand& target, const StageConstraint& c,

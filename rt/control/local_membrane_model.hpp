@@ -49,7 +49,7 @@ class LocalMembraneModel {
   // sight.
   bool observe(const Observation& seen, bool inside) noexcept;
 
-  // Bounded-rate correction, age, fade. indented: the dimple may be used to learn its width.
+  // Bounded-rate correction, age, fade.
   void step(std::int64_t now_ns, const hal::Vec3& axis, double dt_s) noexcept;
 
   // A fresh cell: forget the old one; observations exposed before now do not count.
@@ -60,6 +60,7 @@ class LocalMembraneModel {
   [[nodiscard]] double R_m() const noexcept { return membrane_.R_m; }
   [[nodiscard]] double dimple_scale() const noexcept { return dimple_scale_; }
   [[nodiscard]] bool stale() const noexcept { return stale_; }
+  [[nodiscard]] bool overdue() const noexcept { return overdue_; }           // stale, and not just starting
   [[nodiscard]] double force_gain() const noexcept { return fade_.gain(); }  // 0 while stale
   [[nodiscard]] double age_s() const noexcept { return age_s_; }             // -1: nothing seen yet
   [[nodiscard]] bool contact_seen() const noexcept { return contact_; }
@@ -81,6 +82,9 @@ class LocalMembraneModel {
   std::int64_t not_before_ns_ = 0;
   bool seen_ = false;
   bool stale_ = true;
+  bool overdue_ = false;
+  bool started_ = false;
+  double centre_z_m_ = 0;
   double age_s_ = -1;
   Ramp fade_;
   bool contact_ = false;

@@ -14,14 +14,15 @@ class MasterToStage {
  public:
   explicit MasterToStage(const MappingParams& params) noexcept : params_(params) {}
 
-  // The needle stands still at tip_m; from here on the hand moves it relative to where the hand is now. The
-  // first anchor takes the handle's absolute orientation as tilt, later ones go on from the axis given.
+  // The needle stands still at tip_m; from here on the hand moves it relative to where the hand is now. Until
+  // the needle has been tilted once, the handle's orientation counts from the identity; later from the axis
+  // given.
   void anchor(const hal::HandState& hand, const hal::Vec3& tip_m, const hal::Vec3& axis) noexcept;
   [[nodiscard]] bool anchored() const noexcept { return anchored_; }
 
   // One tick. coupled = false (clutch): the hand moves freely, hand_point() stays. tilting = false: the axis
   // stays.
-  void step(const hal::HandState& hand, bool coupled, bool tilting, double dt_s) noexcept;
+  void step(const hal::HandState& hand, bool coupled, bool tilting) noexcept;
 
   // Moves the anchor so that hand_point() is `to`: at a limit the hand slips, nothing winds up.
   void slip(const hal::Vec3& to) noexcept;
@@ -35,8 +36,7 @@ class MasterToStage {
  private:
   MappingParams params_;
   bool anchored_ = false;
-  bool was_coupled_ = true;
-  bool was_tilting_ = true;
+  bool has_tilted_ = false;
   hal::Vec3 anchor_hand_m_ = hal::Vec3::Zero();
   hal::Vec3 anchor_tip_m_ = hal::Vec3::Zero();
   hal::Vec3 hand_point_m_ = hal::Vec3::Zero();

@@ -79,28 +79,35 @@ class Servo {
 
  private:
   // The steps of the tick, in its order.
-  Fault read_devices(const TickInfo& now) noexcept;
-  void take_commands() noexcept;
-  void take_newest_observation(const TickInfo& now) noexcept;
+  void begin(const TickInfo& now) noexcept;
+  [[nodiscard]] Fault read_devices(const TickInfo& now) noexcept;
+  void take_newest_observation() noexcept;
   void estimate_velocity() noexcept;
   void advance_phase() noexcept;
   [[nodiscard]] hal::Vec3 sum_force_effects() noexcept;
-  [[nodiscard]] Fault check_tip_force() noexcept;
+  [[nodiscard]] Fault limit_force(const hal::Vec3& wanted_N) noexcept;
+  void latch(Fault cause) noexcept;
   void choose_stage_set_point() noexcept;
   void write_devices() noexcept;
   void publish(const TickInfo& now) noexcept;
 
-  // Parts of read_devices.
+  // Parts of read_devices. Each returns what is wrong, Fault::none if nothing is.
   [[nodiscard]] Fault read_estop() noexcept;
   [[nodiscard]] Fault read_hand() noexcept;
   [[nodiscard]] Fault read_stage() noexcept;
   [[nodiscard]] Fault read_vacuum() noexcept;
   [[nodiscard]] Fault check_overruns(const TickInfo& now) noexcept;
+  [[nodiscard]] Fault take_commands() noexcept;
   void read_sensors() noexcept;
+  void follow_hand() noexcept;
 
   [[nodiscard]] StageConstraint constraint() const noexcept;
+  [[nodiscard]] bool inside() const noexcept;   // latched puncture
   [[nodiscard]] bool sighted() const noexcept;  // vision is not needed, or not stale
-  void anchor_at_tip() noexcept;
+  [[nodiscard]] bool ending() const noexcept { return task_done_ || end_requested_; }
+  [[nodiscard]] bool button(std::uint32_t b) const noexcept { return (hand_.buttons & b) != 0; }
+  void anchor(const hal::Vec3& tip_m, const hal::Vec3& axis) noexcept;
+  void render_membrane(double gain) noexcept;
 
   const ServoConfig config_;
   const Devices devices_;
@@ -122,27 +129,35 @@ class Servo {
   LatchOutput stop_;
 
   // This tick.
-  double dt_s_ = 0;
-  std::int64_t now_ns_ = 0;
   std::uint64_t ticks_ = 0;
+  double dt_s_ = 0;       // bounded: what ramps and filters advance by
+  double elapsed_s_ = 0;  // really
+  std::int64_t now_ns_ = 0;
   std::int64_t first_release_ns_ = 0;
   std::uint32_t alarms_ = 0;
 
+  // What the devices said.
   hal::HandState hand_;
-  double hand_age_s_ = 0;
   bool hand_seen_ = false;
-  double since_hand_s_ = 0;
+  bool hand_fresh_ = false;
+  double since_hand_s_ = 0;    // since its last good sample
+  double between_hand_s_ = 0;  // the last two good samples
   hal::StageState stage_;
-  double stage_age_s_ = 0;
   bool stage_seen_ = false;
+  bool stage_fresh_ = false;
+  bool stage_was_enabled_ = false;
+  double since_stage_s_ = 0;
   hal::EstopState estop_;
   bool estop_readable_ = true;
-  double discrepancy_s_ = 0;
+  double since_estop_s_ = 0;
+  double differing_s_ = 0;    // the two contacts
+  bool discrepancy_ = false;  // until both have been seen open together
   double vacuum_Pa_ = 0;
   double vacuum_low_s_ = 0;
   double sensor_N_ = 0;
   double sensor_filtered_N_ = 0;
-  double sensor_age_s_ = 0;
+  double since_sensor_s_ = 0;
+  bool sensor_seen_ = false;
   bool injector_open_ = false;
   std::uint64_t observation_head_ = 0;
   std::uint64_t observations_ = 0;
@@ -152,36 +167,41 @@ class Servo {
   bool stop_requested_ = false;
   bool end_requested_ = false;
   bool task_done_ = false;
-  bool ended_ = false;
   std::uint32_t cells_done_ = 0;
   std::uint64_t commands_refused_ = 0;
   std::uint64_t faults_latched_ = 0;
   Fault write_fault_ = Fault::none;  // found while writing, latched on the next tick
   bool heartbeat_level_ = false;
-  double force_scale_wanted_ = 1;  // command force_scale
+  double force_scale_wanted_ = 1;  // command force_scale, 0 .. 1
   double force_scale_ = 1;
-  Ramp coupling_;  // of all forces: after a start, a clutch, a reset; to zero at the end
+  Ramp presence_;  // of every force: from the start, after a reset, to the end
+  Ramp coupling_;  // of the forces that belong to the needle: off while the clutch is pressed
+  double fixture_gain_ = 0;
   double depth_m_ = 0;
-  double outward_m_s_ = 0;  // low-passed
-  double depth_before_m_ = 0;
-  hal::Vec3 approach_ = -hal::Vec3::UnitX();  // axis, frozen from contact on
+  double outward_m_s_ = 0;  // of the tip, low-passed
+  hal::Vec3 tip_before_m_ = hal::Vec3::Zero();
+  hal::Vec3 approach_ = -hal::Vec3::UnitX();  // axis of the needle, frozen from contact on
   FixtureFrame insertion_;                    // the line of insertion, latched at the puncture
-  double tip_force_N_ = 0;
+  double tip_force_N_ = 0;                    // measured, or the law's
   bool tip_force_soft_ = false;
   bool was_sighted_ = false;
-  double injected_s_ = 0;  // gate open, this cell
+  double injected_s_ = 0;            // gate open, this cell
+  std::uint32_t injected_cell_ = 0;  // the cell it counts for
   bool gate_open_ = false;
-  double membrane_injected_J_ = 0;
-  std::int64_t stage_countdown_ = 0;
+  int until_command_ = 0;  // ticks until the next stage set-point
+  double stored_J_ = 0;
+  double injected_J_ = 0;
+  double model_moved_m_ = 0;  // depth added by vision's correction on this tick
 
   // Parts of the force, at the hand, world axes.
   hal::Vec3 membrane_N_ = hal::Vec3::Zero();
   hal::Vec3 cone_N_ = hal::Vec3::Zero();
   hal::Vec3 axis_N_ = hal::Vec3::Zero();
   hal::Vec3 damping_N_ = hal::Vec3::Zero();
-  hal::Vec3 hand_force_N_ = hal::Vec3::Zero();  // device frame, what goes out
-  hal::Vec3 force_before_stop_N_ = hal::Vec3::Zero();
   RimForces rim_{};
+  hal::Vec3 hand_force_N_ = hal::Vec3::Zero();  // device frame, what goes out
+  hal::Vec3 live_force_N_ = hal::Vec3::Zero();  // limited, before the latch
+  hal::Vec3 force_before_stop_N_ = hal::Vec3::Zero();
 
   TelemetrySample sample_;
 };

@@ -1,0 +1,153 @@
+#include "rt/control/local_membrane_model.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace punctum::rt {
+namespace {
+
+// What an observation may claim at most; beyond it the frame is not believed.
+constexpr double kFarthest_m = 5e-3;
+constexpr double kLargestCell_m = 2e-3;
+constexpr double kScaleMin = 0.1;
+constexpr double kScaleMax = 3;
+
+[[nodiscard]] bool plausible(const double (&p)[3]) noexcept {
+  return std::abs(p[0]) < kFarthest_m && std::abs(p[1]) < kFarthest_m && std::abs(p[2]) < kFarthest_m;
+}
+[[nodiscard]] hal::Vec3 vec(const double (&p)[3]) noexcept { return {p[0], p[1], p[2]}; }
+
+// Moves `value` by what is left of a correction, at most `most`.
+void correct(double& value, double& left, double most) noexcept {
+  const double now = std::clamp(left, -most, most);
+  value += now;
+  left -= now;
+}
+
+}  // namespace
+
+void PoseHistory::push(const TipPose& pose) noexcept {
+  poses_[next_] = pose;
+  next_ = (next_ + 1) % kSize;
+  size_ = std::min(size_ + 1, kSize);
+}
+
+bool PoseHistory::at(std::int64_t t_ns, TipPose& out) const noexcept {
+  if (size_ == 0) return false;
+  const auto pose = [this](std::size_t i) -> const TipPose& {  // i = 0: the oldest
+    return poses_[(next_ + kSize - size_ + i) % kSize];
+  };
+  if (t_ns < pose(0).t_ns || t_ns > pose(size_ - 1).t_ns) return false;
+  std::size_t low = 0;  // the last pose not after t
+  std::size_t high = size_;
+  while (high - low > 1) {
+    const std::size_t middle = (low + high) / 2;
+    (pose(middle).t_ns <= t_ns ? low : high) = middle;
+  }
+  out = pose(low);
+  if (low + 1 < size_ && out.t_ns < t_ns) {
+    const TipPose& after = pose(low + 1);
+    const double part = static_cast<double>(t_ns - out.t_ns) / static_cast<double>(after.t_ns - out.t_ns);
+    out.tip_m += part * (after.tip_m - out.tip_m);
+    out.axis += part * (after.axis - out.axis);
+  }
+  out.t_ns = t_ns;
+  return true;
+}
+
+LocalMembraneModel::LocalMembraneModel(const LocalModelParams& params, double c_m, double R_m) noexcept
+    : params_(params), c_m_(c_m), R_default_m_(R_m), dimple_scale_(params.dimple_scale) {
+  membrane_.R_m = R_m;
+}
+
+bool LocalMembraneModel::observe(const Observation& seen, bool inside) noexcept {
+  TipPose pose;
+  if (seen.exposure_ns <= newest_exposure_ns_ && seen_) return false;
+  if (seen.exposure_ns < not_before_ns_ || !history_.at(seen.exposure_ns, pose)) return false;
+  const bool shows_needle = seen.has(Observation::tip_ok) && plausible(seen.tip_m);
+  const bool shows_cell = shows_needle && seen.has(Observation::outer_ok) && plausible(seen.centre_m) &&
+                          seen.R_m > c_m_ && seen.R_m < kLargestCell_m && std::abs(seen.gap_m) < kFarthest_m;
+  if (!shows_cell && !(inside && shows_needle && membrane_.known)) return false;
+
+  newest_exposure_ns_ = seen.exposure_ns;
+  seen_ = true;
+  ++used_;
+  contact_ = seen.has(Observation::contact);
+  punctured_ = seen.has(Observation::punctured);
+  if (!shows_cell) return true;
+  seen_gap_m_ = seen.gap_m;
+
+  // Where this frame puts the entry, in the stage's frame: by the difference from the tip it shows.
+  Membrane3D now = membrane_;
+  now.axis = pose.axis.normalized();
+  now.R_m = seen.R_m;
+  hal::Vec3 centre = pose.tip_m + (vec(seen.centre_m) - vec(seen.tip_m));
+  centre.z() = membrane_.known ? centre_z_m_ : pose.tip_m.z();
+  now.entry_m = centre - now.R_m * now.axis;
+  now.entry_m += (now.depth_m(pose.tip_m) + seen.gap_m) * now.axis;
+
+  if (!membrane_.known) {
+    membrane_ = now;
+    membrane_.known = true;
+    centre_z_m_ = centre.z();
+    entry_correction_m_.setZero();
+    R_correction_m_ = 0;
+    scale_correction_ = 0;
+    return true;
+  }
+  now.entry_m += now.R_m * (now.axis - membrane_.axis);  // the same cell on today's axis
+  entry_correction_m_ = params_.gain * (now.entry_m - membrane_.entry_m);
+  entry_correction_m_.z() = 0;
+  R_correction_m_ = params_.gain * (now.R_m - membrane_.R_m);
+
+  const bool shows_dimple = contact_ && !punctured_ && !inside && seen.wd_m > params_.dimple_min_m &&
+                            seen.wd_m < seen.R_m && seen.a_m > c_m_ && seen.a_m < 2 * seen.R_m;
+  if (shows_dimple) {
+    const double scale = (seen.a_m - c_m_) / std::sqrt(2 * seen.R_m * seen.wd_m);
+    scale_correction_ = params_.gain * (std::clamp(scale, kScaleMin, kScaleMax) - dimple_scale_);
+  }
+  return true;
+}
+
+void LocalMembraneModel::step(std::int64_t now_ns, const hal::Vec3& axis, double dt_s) noexcept {
+  if (!started_) {
+    started_ = true;
+    not_before_ns_ = now_ns;
+  }
+  // The cell stays where it is when the needle's axis tilts about it.
+  membrane_.entry_m += membrane_.R_m * (membrane_.axis - axis);
+  membrane_.axis = axis;
+
+  const double most_m = params_.max_rate_m_s * dt_s;
+  const double length = entry_correction_m_.norm();
+  const double part = length > most_m ? most_m / length : 1.0;
+  membrane_.entry_m += part * entry_correction_m_;
+  entry_correction_m_ *= 1 - part;
+  correct(membrane_.R_m, R_correction_m_, most_m);
+  correct(dimple_scale_, scale_correction_, params_.dimple_scale_rate_1_s * dt_s);
+
+  const double since_start_s = static_cast<double>(now_ns - not_before_ns_) * 1e-9;
+  age_s_ = seen_ ? static_cast<double>(now_ns - newest_exposure_ns_) * 1e-9 : -1;
+  stale_ = !seen_ || age_s_ > params_.stale_after_s;
+  overdue_ = stale_ && since_start_s > params_.stale_after_s;
+  fade_.step(!stale_, params_.return_s, params_.fade_s, dt_s);
+}
+
+void LocalMembraneModel::restart(std::int64_t now_ns) noexcept {
+  membrane_.known = false;
+  membrane_.R_m = R_default_m_;
+  entry_correction_m_.setZero();
+  R_correction_m_ = 0;
+  scale_correction_ = 0;
+  dimple_scale_ = params_.dimple_scale;
+  not_before_ns_ = now_ns;
+  started_ = true;
+  seen_ = false;
+  stale_ = true;
+  age_s_ = -1;
+  fade_.set(0);
+  contact_ = false;
+  punctured_ = false;
+}
+
+}  // namespace punctum::rt

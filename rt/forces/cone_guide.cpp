@@ -1,0 +1,104 @@
+#include "rt/forces/cone_guide.hpp"
+
+#include <cmath>
+
+namespace punctum::rt {
+namespace {
+
+// The free core widens outside the membrane only; its slope comes in over this part of d0, so the force stays
+// C1.
+constexpr double kCoreBlend = 0.25;
+
+// Integral of smooth_step(t/e) dt from 0: 0 inside, d - e/2 far outside, and its slope.
+struct Widening {
+  double value;
+  double slope;
+};
+[[nodiscard]] Widening widening(double d, double e) noexcept {
+  const double t = d / e;
+  if (t <= 0) return {0, 0};
+  if (t >= 1) return {d - e / 2, 1};
+  return {e * t * t * t * t * (t * (t - 3) + 2.5), smooth_step(t)};
+}
+
+// 1 in front and down to d0 behind the membrane, 0 from 2 d0 behind it.
+[[nodiscard]] Widening weight(double d, double d0) noexcept {
+  const double u = d / d0;
+  const double f = 1 / (1 + u * u);
+  const double slope = -2 * u / d0 * f * f;
+  const double t = u + 2;
+  const double window = smooth_step(t);
+  return {f * window, slope * window + f * smooth_step_slope(t) / d0};
+}
+
+}  // namespace
+
+Pull cone_pull(const ConeParams& params, double position_scale, const FixtureFrame& frame,
+               const hal::Vec3& tip_m) noexcept {
+  const hal::Vec3 V = tip_m - frame.entry_m;
+  const double along = frame.axis.dot(V);
+  const hal::Vec3 lateral = V - along * frame.axis;  // V - V_proj, eq. 6
+  const double d = -along;
+  const double r = lateral.norm();
+
+  Pull pull;
+  if (params.method == ConeParams::Method::paper) {
+    const double f = params.d0_m / (params.d0_m + std::max(d, 0.0));
+    pull.force_N = -params.K_N_m * f * position_scale * lateral;
+    pull.energy_J = 0.5 * params.K_N_m * f * position_scale * position_scale * r * r;
+    return pull;
+  }
+
+  const Widening f = weight(d, params.d0_m);
+  if (f.value == 0 && f.slope == 0) return pull;
+  const Widening core = widening(d, kCoreBlend * params.d0_m);
+  const double cos_alpha = std::cos(params.alpha_rad);
+  const double tan_alpha = std::tan(params.alpha_rad);
+  const double delta = (r - params.r0_m - tan_alpha * core.value) * cos_alpha;
+  if (delta <= 0) return pull;
+
+  const double spring = soft_spring(delta, params.eps_m);
+  const double energy = soft_spring_energy(delta, params.eps_m);
+  const double letting_go = 1 + 2 * energy / (params.reach_m * params.reach_m);
+  const double phi = energy / letting_go;
+  const double phi_slope = spring / (letting_go * letting_go);
+
+  const double KkP = params.K_N_m * position_scale;
+  const double from_r = f.value * phi_slope * cos_alpha;
+  const double from_d = f.slope * phi - f.value * phi_slope * tan_alpha * core.slope * cos_alpha;
+  // delta > 0 and r0 >= 0 mean r > 0. The gradient of d is -b.
+  pull.force_N = -KkP * from_r / r * lateral + KkP * from_d * frame.axis;
+  pull.energy_J = KkP * position_scale * f.value * phi;
+  return pull;
+}
+
+hal::Vec3 ConeGuide::step(const hal::Vec3& tip_m, const FixtureFrame& target, bool on, double dt_s) noexcept {
+  const double gain_before = ramp_.gain();
+  if (!on && gain_before == 0) {
+    stored_J_ = 0;
+    ramp_.set(0);
+    return hal::Vec3::Zero();
+  }
+  double energy_before = 0;
+  if (gain_before == 0) {
+    frame_ = target;
+  } else {
+    energy_before = gain_before * cone_pull(params_, scale_, frame_, tip_m).energy_J;
+    follow_frame(frame_, target, params_.ramp_s / 4, dt_s);
+  }
+  ramp_.step(on, params_.ramp_s, params_.ramp_s, dt_s);
+  const Pull pull = cone_pull(params_, scale_, frame_, tip_m);
+  stored_J_ = ramp_.gain() * pull.energy_J;
+  injected_J_ += stored_J_ - energy_before;
+  return ramp_.gain() * pull.force_N;
+}
+
+void follow_frame(FixtureFrame& frame, const FixtureFrame& target, double tau_s, double dt_s) noexcept {
+  const double part = tau_s > 0 ? 1 - std::exp(-dt_s / tau_s) : 1.0;
+  frame.entry_m += part * (target.entry_m - frame.entry_m);
+  const hal::Vec3 turned = frame.axis + part * (target.axis - frame.axis);
+  const double length = turned.norm();
+  frame.axis = length > 1e-3 ? hal::Vec3(turned / length) : target.axis;
+}
+
+}  // namespace punctum::rt

@@ -1,9 +1,9 @@
 // The simulated cell: zona (outer) and inner membrane as concentric elastic spheres, held by suction.
 //
-// Quasi-static membranes from MembraneTruth, recoil integrated exactly, contact and punctures located inside the
-// step. Off-centre contact: the axisymmetric law acts along the local normal at the entry point, with the depth's
-// component along it; needle and normal differ by a few degrees. World frame, SI units.
-// The constructor solves the tables (allocates); everything else is real-time safe and deterministic.
+// Quasi-static membranes from MembraneTruth, recoil integrated exactly, contact and punctures located inside
+// the step. Off-centre contact: the axisymmetric law acts along the local normal at the entry point, with the
+// depth's component along it; needle and normal differ by a few degrees. World frame, SI units. The
+// constructor solves the tables (allocates); everything else is real-time safe and deterministic.
 #pragma once
 
 #include <array>
@@ -22,28 +22,29 @@ enum class Membrane : std::uint8_t { outer, inner };
 
 struct MembraneState {
   bool punctured = false;
-  double puncture_time_s = -1;    // on CellState::time_s
-  double puncture_depth_m = 0;    // of the dimple, along the needle, when it gave way
-  double dimple_m = 0;            // depth of the dimple along the local normal, now
+  double puncture_time_s = -1;  // on CellState::time_s
+  double puncture_depth_m = 0;  // of the dimple, along the needle, when it gave way
+  double dimple_m = 0;          // depth of the dimple along its axis, now
+  double axis_m[3] = {-1, 0,
+                      0};  // of the dimple: inward normal where the needle's axis meets the surface (unit)
+  double lean[3] = {};     // sideways shift of the dimple's bottom per depth: it meets the tip
 };
 
 // Trivially copyable: goes into the bench snapshot.
 struct CellState {
-  double time_s = 0;              // advanced by step(); the plant may set it to its own time before each step
+  double time_s = 0;  // advanced by step(); the plant may set it to its own time before each step
   MembraneState outer, inner;
-  bool contact = false;           // the needle touches or has entered the cell
-  bool attached = true;           // false: torn off the holding pipette
+  bool contact = false;  // the needle touches or has entered the cell
+  bool attached = true;  // false: torn off the holding pipette
   bool far_wall_pierced = false;
-  bool torn = false;              // ripped open by sideways motion of the needle
+  bool torn = false;                 // ripped open by sideways motion of the needle
   double first_contact_time_s = -1;  // located inside the step
-  double clear_time_s = -1;       // the tip has last left the cell after a puncture
-  double leak = 0;                // 0 .. 1, fluid lost through a rip or a pierced wall
-  double hole_m[3] = {};          // where the needle went through the undeformed outer surface
-  double offset_m[3] = {};        // of the whole cell once it is torn off
-  // Of the last contact, for the picture and the truth beside it:
-  double entry_m[3] = {};         // needle axis meets the undeformed outer surface
-  double normal_m[3] = {-1, 0, 0};  // inward normal there (unit), the dimple's axis
-  double lean_m[3] = {};          // sideways displacement of the dimple's bottom so that it meets the tip
+  double clear_time_s = -1;          // the tip has last left the cell after a puncture
+  double leak = 0;                   // 0 .. 1, fluid lost through a rip or a pierced wall
+  double hole_m[3] = {};    // where the needle went through the undeformed outer surface; moves with the cell
+  double offset_m[3] = {};  // of the whole cell once it is torn off
+  // Where the needle's axis last met the cell:
+  double entry_m[3] = {};  // needle axis meets the undeformed outer surface
 
   [[nodiscard]] bool lost() const noexcept { return !attached || far_wall_pierced || torn; }
 };
@@ -55,26 +56,26 @@ struct TipMotion {
   Vec3 tip_end_m = Vec3::Zero();
   Vec3 axis_begin = -Vec3::UnitX();  // unit, out of the tip
   Vec3 axis_end = -Vec3::UnitX();
-  double vacuum_Pa = -1;             // of the holding pipette now; negative = its nominal value
+  double vacuum_Pa = -1;  // of the holding pipette now; negative = its nominal value
 };
 
 // At the end of the step.
 struct CellForce {
-  Vec3 force_N = Vec3::Zero();    // on the needle, all parts
-  double membrane_N = 0;          // zona + inner membrane along the needle, >= 0
-  double outer_N = 0;             // zona alone, along its normal
+  Vec3 force_N = Vec3::Zero();  // on the needle, all parts
+  double membrane_N = 0;        // zona + inner membrane along the needle, >= 0
+  double outer_N = 0;           // zona alone, along its normal
   double inner_N = 0;
-  double drag_N = 0;              // viscous drag and grip of the hole, along the axis, signed like -velocity
+  double drag_N = 0;  // viscous drag and grip of the holes along the needle's axis; > 0 pushes it inwards
   bool contact = false;
-  double depth_m = 0;             // of the tip past the undeformed outer membrane along the axis; < 0 outside
-  double wd_m = 0;                // depth of the outer dimple along the axis
-  double a_m = 0;                 // its half-width where the depth has fallen to 1 %
+  double depth_m = 0;  // of the tip past the undeformed outer membrane along the axis; < 0 outside
+  double wd_m = 0;     // depth of the outer dimple along the axis
+  double a_m = 0;      // its half-width where the depth has fallen to 1 %
   double inner_wd_m = 0;
-  double chord_m = 0;             // from entry to the far wall along the axis
-  double strain = 0;              // largest, of the intact outer membrane
-  double stress_N_m = 0;          // meridional tension over the reference length at the tip's rim
-  double pressure_Pa = 0;         // inside
-  Vec3 entry_m = Vec3::Zero();    // valid when the needle's axis meets the cell
+  double chord_m = 0;           // from entry to the far wall along the axis
+  double strain = 0;            // largest, of the intact outer membrane
+  double tension_N_m = 0;       // nominal meridional tension of the intact outer membrane at the tip's rim
+  double pressure_Pa = 0;       // inside
+  Vec3 entry_m = Vec3::Zero();  // valid when the needle's axis meets the cell
   bool aims_at_cell = false;
 };
 
@@ -91,9 +92,9 @@ class Cell {
 
   [[nodiscard]] CellForce step(CellState& state, const TipMotion& motion, double dt_s) const noexcept;
 
-  // Closed contour as the picture plane shows it (world x, y, metres), from the bottom of the dimple round the cell
-  // and back, first point not repeated. Returns the points written: kContour, or 0 when the membrane does not
-  // exist or `out` is too small.
+  // Closed contour as the picture plane shows it (world x, y, metres), from the bottom of the dimple round
+  // the cell and back, first point not repeated. Returns the points written: kContour, or 0 when the membrane
+  // does not exist or `out` is too small.
   int contour(const CellState& state, Membrane which, std::span<std::array<double, 2>> out) const noexcept;
 
   // This individual, undeformed.
@@ -111,9 +112,11 @@ class Cell {
  private:
   struct Pose;
   [[nodiscard]] Pose pose(const CellState& state, const TipMotion& motion, double s) const noexcept;
+  void relax(CellState& state, const Pose& pose, double dt_s) const noexcept;
+  void hold(CellState& state, const Vec3& force_on_needle, double vacuum_Pa) const noexcept;
+  [[nodiscard]] double seat_radius_m() const noexcept;
 
   CellParams params_;
-  double needle_radius_m_;
   std::optional<HolderParams> holder_;
   std::shared_ptr<const MembraneTruth> outer_table_, inner_table_;
   Vec3 centre_m_ = Vec3::Zero();

@@ -154,7 +154,7 @@ const std::vector<Broken>& broken() {
        "limits.penetration_depth_um = 90"},
       {"a zona that is broken before it is touched", kLeast + "[cell]\nzona_puncture_strain = 0.01\n",
        "b.toml:6:24: cell.zona_puncture_strain: is reached before the needle touches, allowed: above "
-       "zona_pretension = 0.01"},
+       "zona_pretension = 0.2"},
       {"soft above hard", kLeast + "[limits]\ntip_force_soft_uN = 70\n",
        "b.toml:6:21: limits.tip_force_soft_uN: is not below the hard limit, allowed: below tip_force_hard_uN "
        "= 60"},

@@ -1,0 +1,40 @@
+// Geometry of the indentation: undeformed membrane, entry point, gap, w_d, a, R (fig. 11).
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "vision/contour.hpp"
+
+namespace punctum::vision {
+
+// The membrane as it was, or would be, without needle.
+struct Undeformed {
+  Circle circle;      // fitted to the undeformed part
+  bool round = true;  // the circle describes it; else `shape`, a low-order closed curve, does
+  Contour shape;      // closed contour of it
+};
+
+// Fits it to the contour's points with weight > 0 (weight 0: dimple, arcs hidden or pressed by a pipette).
+[[nodiscard]] std::optional<Undeformed> fit_undeformed(const Contour& contour,
+                                                       std::span<const double> weights);
+
+// Where the line through `through` along `axis` first meets the closed contour.
+[[nodiscard]] std::optional<Point> entry_point(const Contour& shape, const Point& through, const Point& axis);
+
+// Depth of `contour` past `shape` along `axis` at signed lateral distance u from the line through `entry`.
+struct ProfilePoint {
+  double u = 0;
+  double depth = 0;
+};
+[[nodiscard]] std::vector<ProfilePoint> depth_profile(const Contour& contour, const Contour& shape,
+                                                      const Point& entry, const Point& axis, double reach);
+
+// a: half-width at which the depth has fallen to 1 % of wd. The profile of eq. 5's membrane,
+// w(r) = k [ln(a0/r) - (a0^2 - r^2) / (2 a0^2)], is fitted with w(c) = wd; where it has fallen to 1 % is
+// returned.
+[[nodiscard]] std::optional<double> half_width(const std::vector<ProfilePoint>& profile, double wd, double c,
+                                               double R);
+
+}  // namespace punctum::vision

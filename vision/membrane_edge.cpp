@@ -1,0 +1,322 @@
+#include "vision/membrane_edge.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace punctum::vision {
+
+std::vector<double> smooth_closed(const std::vector<double>& r, const std::vector<double>& weight,
+                                  const std::vector<double>& stiffness) {
+  // Symmetric positive definite: conjugate gradients from the weighted data, which is close already.
+  const std::size_t n = r.size();
+  if (n < 5) {
+    return r;
+  }
+  const auto apply = [&](const std::vector<double>& x) {
+    std::vector<double> y(n), d(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      d[i] = stiffness[i] * (x[(i + n - 1) % n] - 2 * x[i] + x[(i + 1) % n]);
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+      y[i] = weight[i] * x[i] + d[(i + n - 1) % n] - 2 * d[i] + d[(i + 1) % n];
+    }
+    return y;
+  };
+  // Holes are bridged linearly first, so that only short distances are left to the iteration.
+  std::vector<double> x = r;
+  std::vector<std::size_t> known;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (weight[i] > 1e-3) {
+      known.push_back(i);
+    }
+  }
+  if (known.empty()) {
+    return r;
+  }
+  for (std::size_t k = 0; k < known.size(); ++k) {
+    const std::size_t a = known[k], b = known[(k + 1) % known.size()];
+    const std::size_t gap = (b + n - a - 1) % n + 1;
+    for (std::size_t j = 1; j < gap; ++j) {
+      const double t = static_cast<double>(j) / static_cast<double>(gap);
+      x[(a + j) % n] = (1 - t) * r[a] + t * r[b];
+    }
+  }
+  std::vector<double> ax = apply(x), res(n), p(n), z(n), diagonal(n);
+  double rz = 0, start = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    diagonal[i] = weight[i] + stiffness[(i + n - 1) % n] + 4 * stiffness[i] + stiffness[(i + 1) % n] + 1e-12;
+    res[i] = weight[i] * r[i] - ax[i];
+    z[i] = res[i] / diagonal[i];
+    p[i] = z[i];
+    rz += res[i] * z[i];
+  }
+  start = rz;
+  for (int it = 0; it < 200 && rz > 1e-12 * start && rz > 1e-20; ++it) {
+    const std::vector<double> ap = apply(p);
+    double pap = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      pap += p[i] * ap[i];
+    }
+    if (!(pap > 0)) {
+      break;
+    }
+    const double alpha = rz / pap;
+    double next = 0;
+    for (std::size_t i = 0; i < n; ++i) {
+      x[i] += alpha * p[i];
+      res[i] -= alpha * ap[i];
+      z[i] = res[i] / diagonal[i];
+      next += res[i] * z[i];
+    }
+    const double beta = next / rz;
+    rz = next;
+    for (std::size_t i = 0; i < n; ++i) {
+      p[i] = z[i] + beta * p[i];
+    }
+  }
+  return x;
+}
+
+EdgePath closed_path(const GradientField& field, const EdgeBand& band, Polarity polarity, double floor,
+                     double saturation) {
+  EdgePath out;
+  const int n = static_cast<int>(band.middle.size());
+  const int m = 2 * static_cast<int>(band.half_width / band.step) + 1;
+  if (n < 16 || m < 5 || field.area.empty()) {
+    return out;
+  }
+  const int half = m / 2;
+  const std::size_t cells = static_cast<std::size_t>(n) * static_cast<std::size_t>(m);
+  std::vector<float> s(cells), cost(cells);
+  std::vector<double> shown(static_cast<std::size_t>(n), 0.0);
+  const auto id = [m](int i, int j) {
+    return static_cast<std::size_t>(i) * static_cast<std::size_t>(m) + static_cast<std::size_t>(j);
+  };
+  const double turn = 2 * std::numbers::pi / n;
+  std::vector<Point> ray(static_cast<std::size_t>(n));
+  double r_mean = 0;
+  for (int i = 0; i < n; ++i) {
+    ray[static_cast<std::size_t>(i)] = Point(std::cos(i * turn), std::sin(i * turn));
+    r_mean += band.middle[static_cast<std::size_t>(i)] / n;
+  }
+  // Outward normal of the band's middle line, a little smoothed: on the wall of a dimple it is far from
+  // radial.
+  std::vector<Point> normal(static_cast<std::size_t>(n));
+  for (int i = 0; i < n; ++i) {
+    const std::size_t b = static_cast<std::size_t>((i + n - 2) % n),
+                      f = static_cast<std::size_t>((i + 2) % n);
+    const Point t = band.middle[f] * ray[f] - band.middle[b] * ray[b];
+    const double l = cv::norm(t);
+    normal[static_cast<std::size_t>(i)] = l > 0 ? Point(t.y / l, -t.x / l) : ray[static_cast<std::size_t>(i)];
+  }
+  constexpr float kForbidden = 1e6F;
+  for (int i = 0; i < n; ++i) {
+    const std::size_t a = static_cast<std::size_t>(i);
+    for (int j = 0; j < m; ++j) {
+      const double r = band.middle[a] + (j - half) * band.step;
+      const Point p = band.centre + r * ray[a];
+      double v = r > 2 ? 1 : 0;
+      // One pixel from the border of the field nothing can be told.
+      if (p.x < field.area.x + 1 || p.y < field.area.y + 1 || p.x > field.area.x + field.area.width - 2 ||
+          p.y > field.area.y + field.area.height - 2) {
+        v = 0;
+      } else if (v > 0 && band.visible) {
+        v = band.visible(p);
+      }
+      double e = 0;
+      if (v > 0) {
+        const Point g = field.gradient(p);
+        e = g.dot(normal[a]);
+        e = polarity == Polarity::any ? std::abs(e) : polarity == Polarity::darker_out ? -e : e;
+        e *= v;
+      }
+      shown[a] = std::max(shown[a], v * (std::abs(j - half) < half / 2 + 1 ? 1.0 : 0.0));
+      s[id(i, j)] = static_cast<float>(e);
+      const bool allowed =
+          (band.lower.empty() || r >= band.lower[a]) && (band.upper.empty() || r <= band.upper[a]);
+      cost[id(i, j)] = !allowed ? kForbidden : v > 0 ? 0.0F : 1.0F;
+    }
+  }
+  std::vector<float> tops, all;
+  for (int i = 0; i < n; ++i) {
+    float top = 0;
+    for (int j = 0; j < m; ++j) {
+      if (cost[id(i, j)] == 0.0F) {
+        top = std::max(top, s[id(i, j)]);
+        all.push_back(std::abs(s[id(i, j)]));
+      }
+    }
+    if (shown[static_cast<std::size_t>(i)] > 0) {
+      tops.push_back(top);
+    }
+  }
+  const auto median = [](std::vector<float>& v) {
+    if (v.empty()) {
+      return 0.0;
+    }
+    std::nth_element(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2), v.end());
+    return static_cast<double>(v[v.size() / 2]);
+  };
+  if (!(saturation > 0)) {
+    saturation = std::max({0.7 * median(tops), 2 * floor, 1e-6});
+  }
+  out.saturation = saturation;
+  out.background = median(all);
+  for (std::size_t k = 0; k < cells; ++k) {
+    if (cost[k] == 0.0F) {
+      cost[k] = static_cast<float>(1 - std::clamp(static_cast<double>(s[k]) / saturation, -0.3, 1.0));
+    }
+  }
+  if (band.anchor) {
+    const int i = band.anchor->first;
+    for (int j = 0; j < m; ++j) {
+      const double d =
+          band.middle[static_cast<std::size_t>(i)] + (j - half) * band.step - band.anchor->second;
+      cost[id(i, j)] = static_cast<float>(std::min(40.0, 4 * d * d));
+    }
+  }
+  const double arc = std::max(0.5, r_mean * turn);
+  const int reach = std::clamp(static_cast<int>(std::lround(band.slope * arc / band.step)), 1, 8);
+  std::vector<float> bend(static_cast<std::size_t>(reach) + 1);
+  for (int k = 0; k <= reach; ++k) {
+    bend[static_cast<std::size_t>(k)] = static_cast<float>(band.stiffness * std::pow(k * band.step / arc, 2));
+  }
+  // Shortest path from angle `from` once round; with `fixed` >= 0 it starts and ends at that sample.
+  std::vector<float> reached(cells);
+  std::vector<std::int8_t> back(cells);
+  std::vector<int> path(static_cast<std::size_t>(n));
+  const auto search = [&](int from, int fixed) {
+    for (int j = 0; j < m; ++j) {
+      reached[id(0, j)] = fixed < 0 || j == fixed ? cost[id(from, j)] : kForbidden * 100;
+    }
+    for (int i = 1; i < n; ++i) {
+      const int at = (from + i) % n;
+      for (int j = 0; j < m; ++j) {
+        float best = std::numeric_limits<float>::max();
+        int from_k = 0;
+        for (int k = -reach; k <= reach; ++k) {
+          const int q = j + k;
+          if (q < 0 || q >= m) {
+            continue;
+          }
+          const float c = reached[id(i - 1, q)] + bend[static_cast<std::size_t>(std::abs(k))];
+          if (c < best) {
+            best = c;
+            from_k = k;
+          }
+        }
+        reached[id(i, j)] = best + cost[id(at, j)];
+        back[id(i, j)] = static_cast<std::int8_t>(from_k);
+      }
+    }
+    int end = 0;
+    float best = std::numeric_limits<float>::max();
+    for (int j = 0; j < m; ++j) {
+      const int k = fixed < 0 ? 0 : std::abs(j - fixed);
+      if (k > reach) {
+        continue;
+      }
+      const float c = reached[id(n - 1, j)] + bend[static_cast<std::size_t>(k)];
+      if (c < best) {
+        best = c;
+        end = j;
+      }
+    }
+    for (int i = n - 1; i >= 0; --i) {
+      path[static_cast<std::size_t>((from + i) % n)] = end;
+      end += i > 0 ? back[id(i, end)] : 0;
+    }
+  };
+  search(0, -1);
+  // The path is open at angle 0: go round again from the angle half a turn away, where it was not.
+  const int opposite = n / 2;
+  search(opposite, path[static_cast<std::size_t>(opposite)]);
+
+  out.raw.resize(static_cast<std::size_t>(n));
+  out.strength.resize(static_cast<std::size_t>(n));
+  out.seen.assign(static_cast<std::size_t>(n), 0);
+  std::vector<double> weight(static_cast<std::size_t>(n));
+  int visible = 0, seen = 0;
+  std::vector<float> levels;
+  for (int i = 0; i < n; ++i) {
+    const std::size_t a = static_cast<std::size_t>(i);
+    const int j = path[a];
+    const double e = static_cast<double>(s[id(i, j)]);
+    double offset = 0;
+    if (j > 0 && j + 1 < m) {
+      const double l = static_cast<double>(s[id(i, j - 1)]), u = static_cast<double>(s[id(i, j + 1)]);
+      const double den = l - 2 * e + u;
+      if (den < -1e-9 && e >= l && e >= u) {
+        offset = std::clamp(0.5 * (l - u) / den, -0.5, 0.5);
+      }
+    }
+    out.raw[a] = band.middle[a] + (j - half + offset) * band.step;
+    out.strength[a] = static_cast<float>(e);
+    if (shown[a] > 0) {
+      ++visible;
+      levels.push_back(static_cast<float>(e));
+      if (e > floor) {
+        ++seen;
+        out.seen[a] = 1;
+      }
+      out.mean_strength += std::clamp(e / saturation, 0.0, 1.0);
+    }
+    weight[a] = e > 0 ? std::pow(std::min(e / saturation, 1.0), 2) : 0;
+  }
+  out.level = median(levels);
+  out.visible = static_cast<double>(visible) / n;
+  out.support = visible > 0 ? static_cast<double>(seen) / visible : 0;
+  out.mean_strength = visible > 0 ? out.mean_strength / visible : 0;
+  if (band.anchor) {
+    const std::size_t a = static_cast<std::size_t>(band.anchor->first);
+    out.raw[a] = band.anchor->second;
+    weight[a] = 4;
+  }
+  out.r = out.raw;
+  // (weights of the smoother are set by the caller's stiffness; the default holds about 25 modes)
+  std::vector<double> stiff(static_cast<std::size_t>(n));
+  for (int i = 0; i < n; ++i) {
+    // Where the middle line itself is bent (a dimple), give way.
+    const std::size_t a = static_cast<std::size_t>(i);
+    const std::size_t b = static_cast<std::size_t>((i + n - 3) % n),
+                      f = static_cast<std::size_t>((i + 3) % n);
+    const double curvature = std::abs(band.middle[b] - 2 * band.middle[a] + band.middle[f]) / (9 * arc * arc);
+    stiff[a] = 30 * std::pow(n / 256.0, 4) / (1 + std::pow(curvature * 100, 2));
+  }
+  if (band.anchor) {
+    for (int d = -n / 16; d <= n / 16; ++d) {
+      std::size_t a = static_cast<std::size_t>((band.anchor->first + d + n) % n);
+      stiff[a] = std::min(stiff[a], 0.3);
+    }
+  }
+  std::vector<double> w = weight;
+  for (int round = 0; round < 3; ++round) {
+    out.r = smooth_closed(out.raw, w, stiff);
+    std::vector<double> d;
+    for (int i = 0; i < n; ++i) {
+      const std::size_t a = static_cast<std::size_t>(i);
+      if (out.seen[a]) {
+        d.push_back(std::abs(out.raw[a] - out.r[a]));
+      }
+    }
+    if (d.size() < 8) {
+      break;
+    }
+    std::nth_element(d.begin(), d.begin() + static_cast<std::ptrdiff_t>(d.size() / 2), d.end());
+    out.residual = 1.4826 * d[d.size() / 2];
+    const double limit = 4.7 * std::max(out.residual, 0.15);
+    for (int i = 0; i < n; ++i) {
+      const std::size_t a = static_cast<std::size_t>(i);
+      const double t = (out.raw[a] - out.r[a]) / limit;
+      w[a] = std::abs(t) < 1 ? weight[a] * std::pow(1 - t * t, 2) : 0;
+    }
+    if (band.anchor) {
+      w[static_cast<std::size_t>(band.anchor->first)] = 4;
+    }
+  }
+  return out;
+}
+
+}  // namespace punctum::vision

@@ -1,0 +1,988 @@
+#include "vision/tracker.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+#include <vector>
+
+#include "vision/circle_start.hpp"
+#include "vision/contact.hpp"
+#include "vision/dimple.hpp"
+#include "vision/impurities.hpp"
+#include "vision/membrane_edge.hpp"
+#include "vision/noise.hpp"
+#include "vision/puncture.hpp"
+#include "vision/snake.hpp"
+
+namespace punctum::vision {
+
+namespace {
+
+using Seconds = std::chrono::steady_clock;
+
+class Stopwatch {
+ public:
+  double lap_us() {
+    const auto now = Seconds::now();
+    const double us = std::chrono::duration<double, std::micro>(now - last_).count();
+    last_ = now;
+    return us;
+  }
+
+ private:
+  Seconds::time_point last_ = Seconds::now();
+};
+
+double median_of(std::vector<double> v) {
+  if (v.empty()) {
+    return 0;
+  }
+  std::nth_element(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2), v.end());
+  return v[v.size() / 2];
+}
+
+double angle_between(double a, double b) { return std::abs(std::remainder(a - b, 2 * std::numbers::pi)); }
+
+}  // namespace
+
+struct Tracker::Impl {
+  // A membrane that is being followed.
+  struct Followed {
+    bool known = false;
+    Point centre;
+    std::vector<double> r;  // per angle
+    Polarity polarity = Polarity::any;
+    double level = 0;  // usual edge along it
+    Contour nodes;     // of the snake
+    int bad = 0;       // frames in a row
+  };
+
+  VisionConfig config;
+  int width, height;
+  int angles;
+  Result result;
+  cv::Mat grey, mask, impurity_mask, binary, needle_pixels, cell_pixels, edge;
+  GradientField field;
+  HoldingPipette holder;
+  InjectionPipette needle;
+  std::optional<TubeTrace> holder_tube;
+  bool holder_given = false;
+  std::optional<Circle> seed;
+  Puncture puncture;
+  Followed outer, inner;
+  std::optional<Undeformed> rest;  // undeformed outer membrane, learnt while nothing touches it
+  int rest_frames = 0;
+  std::optional<Point> rest_holder;  // where the holder was then
+  std::array<std::optional<double>, 2> last_contact_s;
+  bool was_contact = false;
+  std::optional<Point> last_tip;
+  double tip_speed = 0;  // px/frame along the axis, smoothed
+  int frames = 0;
+  int starts = 0;
+  double gn = 0;  // noise of the gradient
+
+  Impl(const VisionConfig& c, int w, int h)
+      : config(c),
+        width(w),
+        height(h),
+        angles(std::clamp(c.contour_points, 128, 1024)),
+        holder(c.holder.value_or(HolderVision{})),
+        needle(c.needle_from, c.c_m / c.pixel_m),
+        puncture(c.puncture_px) {
+    cv::setNumThreads(1);
+  }
+
+  [[nodiscard]] double px(double m) const { return m / config.pixel_m; }
+
+  [[nodiscard]] bool hidden(const Point& p) const {
+    const int x = static_cast<int>(p.x + 0.5), y = static_cast<int>(p.y + 0.5);
+    return x < 0 || y < 0 || x >= mask.cols || y >= mask.rows || mask.at<std::uint8_t>(y, x) > 0;
+  }
+
+  void locate_pipettes(Stopwatch& watch);
+  void erase_pipettes();
+  bool start_membranes();
+  bool start_pair(const Circle& seed_circle);
+  void start_by_snake(const Circle& circle);
+  EdgePath search(const Point& centre, double lo, double hi, Polarity polarity, double saturation);
+  void follow(Followed& m, Membrane& out, const Followed* inside_of, const Followed* outside_of);
+  void remove_impurities();
+  void measure();
+  void classify_contact();
+  void decide_phase();
+  void write_verdict();
+  const Result& process(const hal::Frame& frame);
+};
+
+Tracker::Tracker(const VisionConfig& config, int width, int height)
+    : impl_(std::make_unique<Impl>(config, width, height)) {}
+Tracker::~Tracker() = default;
+Tracker::Tracker(Tracker&&) noexcept = default;
+Tracker& Tracker::operator=(Tracker&&) noexcept = default;
+
+void Tracker::seed_circle(const Circle& circle) { impl_->seed = circle; }
+void Tracker::holder_template(const cv::Mat& pattern) {
+  impl_->holder.use_template(pattern);
+  impl_->holder_given = true;
+}
+const Result& Tracker::process(const hal::Frame& frame) { return impl_->process(frame); }
+
+// ---- pipettes ----
+
+void Tracker::Impl::locate_pipettes(Stopwatch& watch) {
+  if (config.needle) {
+    if (!needle.started()) {
+      (void)needle.start(field, grey, result.noise);
+    }
+    result.needle = needle.find(field, grey, result.noise);
+  }
+  result.us.needle = watch.lap_us();
+  if (config.holder) {
+    // It comes from the border opposite to the needle.
+    if (!holder_tube) {
+      std::vector<Side> sides;
+      if (config.needle && needle.started()) {
+        sides = {needle.side() == Side::right ? Side::left : Side::right};
+      } else if (config.needle_from != Side::automatic) {
+        sides = {config.needle_from == Side::right ? Side::left : Side::right};
+      } else {
+        sides = {Side::left, Side::right};
+      }
+      for (const Side s : sides) {
+        const auto t =
+            trace_tube(field, s, 20, std::min(0.7 * height, 2.2 * px(config.R_max_m)), result.noise);
+        if (t && t->likeness > 0.5 && t->length > 8 && (!holder_tube || t->clarity > holder_tube->clarity)) {
+          holder_tube = t;
+        }
+      }
+    }
+    if (!holder.has_template()) {
+      result.holder.why = holder_tube ? holder.cut_template(grey, *holder_tube, result.noise)
+                                      : "no wide tube enters through the border";
+    }
+    if (holder.has_template()) {
+      result.holder = holder.find(grey);
+    }
+  }
+  result.us.holder = watch.lap_us();
+}
+
+void Tracker::Impl::erase_pipettes() {
+  mask.create(grey.size(), CV_8U);
+  mask.setTo(0);
+  std::vector<Polygon> polygons;
+  if (result.needle.ok) {
+    polygons.push_back(needle_polygon(result.needle, grey.size(), 2.5, 1.5));
+  }
+  if (holder_tube && config.holder) {
+    TubeTrace t = *holder_tube;
+    Point mouth = t.end();
+    if (result.holder.ok && !holder_given) {
+      mouth = result.holder.mouth;
+    }
+    polygons.push_back(holder_polygon(t, mouth, grey.size(), 2, -1));
+  }
+  draw_mask(mask, polygons);
+}
+
+void Tracker::Impl::remove_impurities() {
+  const double threshold = std::max(5 * gn, 0.25 * std::max(outer.level, inner.level));
+  cv::compare(field.sobel, threshold, binary, cv::CMP_GT);
+  cv::Mat open = binary.clone();
+  open.setTo(0, mask(field.area));
+  std::vector<Contour> keep;
+  for (const Followed* m : {&outer, &inner}) {
+    if (m->known) {
+      Contour c = from_polar(m->centre, m->r);
+      for (Point& p : c) {
+        p -= Point(field.area.x, field.area.y);
+      }
+      keep.push_back(std::move(c));
+    }
+  }
+  result.impurities = 0;
+  if (!keep.empty()) {
+    const double R = outer.known ? median_of(outer.r) : median_of(inner.r);
+    const auto found = find_impurities(open, keep, 0.45 * R, 6, 4, impurity_mask);
+    result.impurities = static_cast<int>(found.size());
+    cv::Mat grown;
+    cv::dilate(impurity_mask, grown, cv::Mat::ones(3, 3, CV_8U));
+    mask(field.area).setTo(255, grown);
+    binary.setTo(0, grown);
+  }
+  edge = field.sobel.clone();
+  erase(edge, mask, field.area.tl());
+}
+
+// ---- membranes ----
+
+EdgePath Tracker::Impl::search(const Point& centre, double lo, double hi, Polarity polarity,
+                               double saturation) {
+  EdgeBand band;
+  band.centre = centre;
+  band.step = std::max(0.5, (hi - lo) / 160);
+  band.half_width = (hi - lo) / 2;
+  band.middle.assign(static_cast<std::size_t>(angles), (lo + hi) / 2);
+  band.slope = 1.5;
+  band.stiffness = 0.5;
+  band.visible = [this](const Point& p) { return hidden(p) ? 0.0 : 1.0; };
+  return closed_path(field, band, polarity, 3 * gn, saturation);
+}
+
+bool Tracker::Impl::start_pair(const Circle& circle) {
+  const double r_min = px(config.R_min_m), r_max = px(config.R_max_m);
+  // The strongest closed edge round here, whatever it is; its centroid is the next centre.
+  const auto settle = [&](Point centre, double lo, double hi, Polarity polarity, double saturation,
+                          int rounds, Point& centre_out) {
+    EdgePath p;
+    for (int i = 0; i < rounds; ++i) {
+      p = search(centre, lo, hi, polarity, saturation);
+      if (p.r.empty()) {
+        return p;
+      }
+      centre_out = centre;
+      centre = centroid(from_polar(centre, p.r));
+    }
+    return p;
+  };
+  const double lo = seed ? 0.75 * circle.r : 0.6 * r_min, hi = seed ? 1.25 * circle.r : 1.08 * r_max;
+  struct Found {
+    EdgePath path;
+    Point centre;
+    Polarity polarity = Polarity::any;
+  };
+  const auto best_polarity = [&](Point centre, double from, double to, int rounds) {
+    Found best;
+    Point c;
+    best.path = settle(centre, from, to, Polarity::any, 0, rounds, c);
+    best.centre = c;
+    if (best.path.r.empty()) {
+      return best;
+    }
+    // A signed edge is worth more than one whose sign changes from place to place, if it is nearly as strong.
+    double top = 0;
+    Found alternative;
+    for (const Polarity q : {Polarity::brighter_out, Polarity::darker_out}) {
+      const EdgePath p = settle(best.centre, from, to, q, best.path.saturation, 2, c);
+      if (!p.r.empty() && p.mean_strength > top) {
+        top = p.mean_strength;
+        alternative = {p, c, q};
+      }
+    }
+    return top > 0.86 * best.path.mean_strength ? alternative : best;
+  };
+  Found main = best_polarity(circle.centre, lo, hi, 4);
+  if (main.path.r.empty() || main.path.visible < 0.45 || main.path.support < 0.6 ||
+      main.path.level < 1.8 * main.path.background || main.path.level < 4 * gn) {
+    result.outer.why = "no closed edge stands out";
+    return false;
+  }
+  const Contour contour = from_polar(main.centre, main.path.r);
+  const Point centre = centroid(contour);
+  const std::vector<double> r1 = polar_radii(contour, centre, angles);
+  if (r1.empty()) {
+    result.outer.why = "closed edge not star-shaped";
+    return false;
+  }
+  // A second one inside or outside it, ordered, with a gap.
+  const double mean = median_of(r1), gap = std::max(3.0, 0.035 * mean);
+  struct Second {
+    EdgePath path;
+    Polarity polarity = Polarity::any;
+    double quality = 0;
+  };
+  const auto second = [&](bool outside) {
+    Second best;
+    EdgeBand band;
+    band.centre = centre;
+    band.step = 0.5;
+    const double from = outside ? gap : -0.62 * mean,
+                 to = outside ? std::min(0.6 * mean, 1.08 * r_max - mean) : -gap;
+    if (to - from < 4) {
+      return best;
+    }
+    band.half_width = (to - from) / 2;
+    band.step = std::max(0.5, (to - from) / 120);
+    band.middle = r1;
+    for (double& r : band.middle) {
+      r += (from + to) / 2;
+    }
+    band.slope = 1.0;
+    band.stiffness = 0.8;
+    band.visible = [this](const Point& p) { return hidden(p) ? 0.0 : 1.0; };
+    for (const Polarity q : {main.polarity, Polarity::brighter_out, Polarity::darker_out, Polarity::any}) {
+      EdgePath p = closed_path(field, band, q, 3 * gn, 0);
+      if (p.r.empty() || p.visible < 0.4) {
+        continue;
+      }
+      const double handicap = q == main.polarity && q != Polarity::any ? 1.15
+                              : q == Polarity::any                     ? 0.8
+                                                                       : 1.0;
+      const double quality = handicap * p.level * p.support * std::min(1.0, p.visible / 0.8) /
+                             std::max({p.background, gn, 0.02});
+      if (quality > best.quality) {
+        best = {std::move(p), q, quality};
+      }
+    }
+    return best;
+  };
+  Second in = second(false), out = second(true);
+  const double needed = 2.2;  // times the median edge of its band
+  const auto good = [&](const Second& s) {
+    return s.quality > needed && s.path.level > 4 * gn && s.path.level > 0.12 * main.path.level;
+  };
+  const auto set = [&](Followed& m, const std::vector<double>& r, Polarity q, double level) {
+    m = {};
+    m.known = true;
+    m.centre = centre;
+    m.r = r;
+    m.polarity = q;
+    m.level = level;
+  };
+  outer = {};
+  inner = {};
+  const bool only_inner_possible = mean < 0.9 * r_min;  // too small for the outer one
+  if (!config.inner) {
+    // The outermost edge that is clear.
+    if (good(out) && out.path.level > 0.5 * main.path.level) {
+      set(outer, out.path.r, out.polarity, out.path.level);
+    } else {
+      set(outer, r1, main.polarity, main.path.level);
+    }
+    return true;
+  }
+  const bool main_is_inner = only_inner_possible || out.quality > in.quality || !good(in);
+  if (main_is_inner && (good(out) || out.quality > in.quality)) {
+    set(inner, r1, main.polarity, main.path.level);
+    if (good(out)) {
+      set(outer, out.path.r, out.polarity, out.path.level);
+    }
+  } else {
+    set(outer, r1, main.polarity, main.path.level);
+    if (good(in)) {
+      set(inner, in.path.r, in.polarity, in.path.level);
+    }
+  }
+  return true;
+}
+
+void Tracker::Impl::start_by_snake(const Circle& circle) {
+  outer = {};
+  outer.known = true;
+  outer.centre = circle.centre;
+  outer.r.assign(static_cast<std::size_t>(angles), circle.r);
+  outer.nodes = circle_contour(circle, config.snake.nodes);
+  inner = {};
+  if (config.inner) {
+    Circle c = circle;
+    c.r *= 0.86;
+    inner = outer;
+    inner.r.assign(static_cast<std::size_t>(angles), c.r);
+    inner.nodes = circle_contour(c, config.snake.nodes);
+  }
+}
+
+bool Tracker::Impl::start_membranes() {
+  ++starts;
+  const double r_min = px(config.R_min_m), r_max = px(config.R_max_m);
+  std::vector<Circle> circles;
+  if (seed) {
+    circles.push_back(*seed);
+  } else {
+    // The threshold follows the noise, and in pictures rich in texture the texture.
+    cv::Mat sample;
+    cv::resize(field.sobel, sample, cv::Size(), 0.25, 0.25, cv::INTER_NEAREST);
+    std::vector<float> v(sample.begin<float>(), sample.end<float>());
+    double texture = 0;
+    if (!v.empty()) {
+      std::nth_element(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(7 * v.size() / 10), v.end());
+      texture = static_cast<double>(v[7 * v.size() / 10]);
+    }
+    for (const CircleCandidate& c : find_circles(field, mask, std::max(4 * gn, texture), r_min, r_max, 4)) {
+      if (c.score >= 0.35) {
+        circles.push_back(c.circle);
+      }
+    }
+    if (circles.empty()) {
+      result.outer.why = "no circle found between " + std::to_string(std::lround(r_min)) + " and " +
+                         std::to_string(std::lround(r_max)) + " px radius";
+      return false;
+    }
+  }
+  if (!config.refine) {
+    start_by_snake(circles.front());
+    return true;
+  }
+  for (const Circle& c : circles) {
+    if (start_pair(c)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+void Tracker::Impl::follow(Followed& m, Membrane& out, const Followed* inside_of,
+                           const Followed* outside_of) {
+  out = {};
+  if (!m.known) {
+    out.why = "not found";
+    return;
+  }
+  // 1. The greedy snake from the last contour: structure, and the motion of the whole.
+  const Contour last = from_polar(m.centre, m.r);
+  Contour nodes = config.refine || m.nodes.size() < 3 ? spline_through(last, config.snake.nodes) : m.nodes;
+  const Point offset(field.area.x, field.area.y);
+  Contour local = nodes;
+  for (Point& p : local) {
+    p -= offset;
+  }
+  SnakeResult snake = evolve(edge, local, config.snake, 4 * gn);
+  for (Point& p : snake.nodes) {
+    p += offset;
+  }
+  out.nodes = snake.nodes;
+  out.snake_iterations = snake.iterations;
+  m.nodes = snake.nodes;
+  if (!config.refine) {
+    out.contour = spline_through(snake.nodes, angles);
+    const std::vector<double> r = polar_radii(out.contour, centroid(out.contour), angles);
+    const double area = signed_area(out.contour), before = signed_area(last);
+    double strength = 0;
+    for (const Point& p : snake.nodes) {
+      strength += cv::norm(field.gradient(p)) / static_cast<double>(snake.nodes.size());
+    }
+    if (r.empty() || area < 0.6 * before || area > 1.6 * before || strength < 3 * gn) {
+      out.why = "snake lost the edge";
+      m.known = false;
+      return;
+    }
+    m.centre = centroid(out.contour);
+    m.r = r;
+    out.support = 1;
+    out.visible = 1;
+    out.ok = true;
+    return;
+  }
+  std::vector<double> dx, dy;
+  for (std::size_t i = 0; i < nodes.size() && i < snake.nodes.size(); ++i) {
+    dx.push_back(snake.nodes[i].x - nodes[i].x);
+    dy.push_back(snake.nodes[i].y - nodes[i].y);
+  }
+  const Point shift(std::clamp(median_of(dx), -2.0, 2.0), std::clamp(median_of(dy), -2.0, 2.0));
+
+  // 2. The sub-pixel edge in a band round it; two hypotheses where the needle is: pushed in, or free.
+  const double R = median_of(m.r);
+  EdgeBand band;
+  band.centre = m.centre + shift;
+  band.middle = m.r;
+  band.half_width = std::clamp(0.11 * R, 6.0, 14.0);
+  band.slope = 1.0;
+  band.visible = [this](const Point& p) { return hidden(p) ? 0.0 : 1.0; };
+  if (inside_of && inside_of->known) {
+    band.upper = polar_radii(from_polar(inside_of->centre, inside_of->r), band.centre, angles);
+    for (double& r : band.upper) {
+      r -= 2.0;
+    }
+  }
+  if (outside_of && outside_of->known) {
+    band.lower = polar_radii(from_polar(outside_of->centre, outside_of->r), band.centre, angles);
+    for (double& r : band.lower) {
+      r += 2.0;
+    }
+  }
+  EdgePath path;
+  const double saturation = 0.7 * m.level;
+  const bool is_outer = &m == &outer;
+  std::optional<std::pair<int, double>> anchor;
+  double needle_angle = 0;
+  bool tip_inside = false;
+  if (result.needle.ok) {
+    const Point d = result.needle.tip - band.centre;
+    needle_angle = std::atan2(-result.needle.axis.y, -result.needle.axis.x);
+    // Direction of the entry, not of the axis: a needle off the middle enters at another angle.
+    if (const auto e = entry_point(last, result.needle.tip, result.needle.axis)) {
+      const Point f = *e - band.centre;
+      needle_angle = std::atan2(f.y, f.x);
+    }
+    const double ta = std::atan2(d.y, d.x);
+    const int index = static_cast<int>(std::lround(ta / (2 * std::numbers::pi) * angles) + angles) % angles;
+    anchor = std::make_pair(index, cv::norm(d));
+    const std::vector<double> free = rest ? polar_radii(rest->shape, band.centre, angles) : m.r;
+    tip_inside = !free.empty() && cv::norm(d) < free[static_cast<std::size_t>(index)] - 1.0;
+  }
+  path = closed_path(field, band, m.polarity, 3 * gn, saturation);
+  if (is_outer && result.needle.ok && anchor && tip_inside) {
+    // Score of the arcs beside the needle.
+    const auto beside = [&](const EdgePath& p) {
+      double s = 0;
+      for (int i = 0; i < angles; ++i) {
+        const double a = 2 * std::numbers::pi * i / angles;
+        if (angle_between(a, needle_angle) < 0.6) {
+          s +=
+              std::clamp(static_cast<double>(p.strength[static_cast<std::size_t>(i)]) / saturation, 0.0, 1.0);
+        }
+      }
+      return s;
+    };
+    EdgeBand pushed = band;
+    if (!puncture.punctured()) {
+      // The dimple goes on with the needle: the middle near the axis is moved to the tip.
+      const std::size_t k = static_cast<std::size_t>(anchor->first);
+      const double move = anchor->second - pushed.middle[k];
+      for (int i = 0; i < angles; ++i) {
+        const double a =
+            angle_between(2 * std::numbers::pi * i / angles, 2 * std::numbers::pi * anchor->first / angles);
+        const double u = a * R / std::max(4.0, 2.0 * result.needle.half_width);
+        pushed.middle[static_cast<std::size_t>(i)] += move / (1 + u * u);
+      }
+      pushed.anchor = anchor;
+      pushed.slope = 3;
+      pushed.stiffness = 0.1;
+    }
+    EdgePath p1 = closed_path(field, pushed, m.polarity, 3 * gn, saturation);
+    EdgeBand released = band;
+    if (rest) {
+      const std::vector<double> free = polar_radii(rest->shape, band.centre, angles);
+      if (!free.empty()) {
+        for (int i = 0; i < angles; ++i) {
+          const double a = angle_between(2 * std::numbers::pi * i / angles, needle_angle);
+          const double w = std::clamp((1.0 - a) / 0.3, 0.0, 1.0);
+          double& mid = released.middle[static_cast<std::size_t>(i)];
+          mid += w * (free[static_cast<std::size_t>(i)] - mid);
+        }
+      }
+      EdgePath p2 = closed_path(field, released, m.polarity, 3 * gn, saturation);
+      const double s0 = beside(path), s1 = beside(p1), s2 = beside(p2);
+      path = s1 >= s0 - 1 && s1 >= s2 - 1 ? p1 : s2 > s0 ? p2 : path;
+    } else {
+      path = beside(p1) >= beside(path) - 1 ? p1 : path;
+    }
+  }
+  if (path.r.empty()) {
+    out.why = "no band to search";
+    ++m.bad;
+    return;
+  }
+  out.contour = from_polar(band.centre, path.r);
+  out.support = path.support;
+  out.visible = path.visible;
+  out.residual_px = path.residual;
+  // 3. Is it still the same edge?
+  std::vector<double> jump;
+  for (int i = 0; i < angles; ++i) {
+    jump.push_back(std::abs(path.r[static_cast<std::size_t>(i)] - m.r[static_cast<std::size_t>(i)]));
+  }
+  const double moved = median_of(jump) + cv::norm(shift);
+  if (path.visible < 0.35) {
+    out.why = "mostly hidden";
+  } else if (path.support < 0.55) {
+    out.why = "edge seen over " + std::to_string(std::lround(100 * path.support)) + " % only";
+  } else if (path.level < 0.35 * m.level) {
+    out.why = "edge has faded";
+  } else if (moved > 0.6 * band.half_width) {
+    out.why = "contour jumped";
+  } else {
+    out.ok = true;
+  }
+  if (!out.ok) {
+    ++m.bad;
+    return;
+  }
+  m.bad = 0;
+  m.level += 0.1 * (path.level - m.level);
+  const Point centre = centroid(out.contour);
+  const std::vector<double> r = polar_radii(out.contour, centre, angles);
+  if (r.empty()) {
+    out.ok = false;
+    out.why = "contour crosses itself";
+    ++m.bad;
+    return;
+  }
+  // The centre stays where it is as long as it is inside by far: resampling costs accuracy.
+  if (cv::norm(centre - band.centre) > 0.06 * R) {
+    m.centre = centre;
+    m.r = r;
+  } else {
+    m.centre = band.centre;
+    m.r = path.r;
+  }
+}
+
+// ---- geometry, contact, puncture ----
+
+void Tracker::Impl::measure() {
+  const NeedleFix& n = result.needle;
+  if (inner.known && result.inner.ok) {
+    result.inner_radius_px = std::sqrt(std::abs(signed_area(result.inner.contour)) / std::numbers::pi);
+  }
+  if (!outer.known || !result.outer.ok) {
+    return;
+  }
+  const Contour& c = result.outer.contour;
+  const Point centre = centroid(c);
+  std::vector<double> weight(c.size(), 1.0);
+  Point entry_direction;
+  bool near = false;
+  if (n.ok) {
+    if (const auto e = entry_point(rest ? rest->shape : c, n.tip, n.axis)) {
+      entry_direction = *e - centre;
+      near = (*e - n.tip).dot(n.axis) < 8;  // touching, about to, or inside
+    }
+  }
+  for (std::size_t i = 0; i < c.size(); ++i) {
+    const Point d = c[i] - centre;
+    if (hidden(c[i])) {
+      weight[i] = 0;
+    }
+    if (near && std::abs(std::atan2(d.cross(entry_direction), d.dot(entry_direction))) < 0.9) {
+      weight[i] = 0;
+    }
+    if (holder_tube && result.holder.ok) {  // pressed or sucked in
+      const Point h = result.holder.mouth - centre;
+      if (std::abs(std::atan2(d.cross(h), d.dot(h))) < 0.6) {
+        weight[i] = 0;
+      }
+    }
+  }
+  const auto now = fit_undeformed(c, weight);
+  if (!now) {
+    return;
+  }
+  // While nothing touches it the undeformed membrane is learnt; then it is remembered and goes with the
+  // holder.
+  const bool touched = near || was_contact || puncture.punctured();
+  if (!rest || (!touched && now->round)) {
+    if (rest && rest->round && now->round &&
+        cv::norm(now->circle.centre - rest->circle.centre) < 0.05 * rest->circle.r) {
+      const double g = 1.0 / std::min(++rest_frames, 20);
+      Circle k = rest->circle;
+      k.centre += g * (now->circle.centre - k.centre);
+      k.r += g * (now->circle.r - k.r);
+      k.rms = now->circle.rms;
+      rest->circle = k;
+      rest->shape = circle_contour(k, angles);
+    } else {
+      rest = now;
+      rest_frames = 1;
+    }
+    rest_holder = result.holder.ok ? std::optional<Point>(result.holder.mouth) : std::nullopt;
+  } else if (!touched) {
+    rest = now;
+    rest_holder = result.holder.ok ? std::optional<Point>(result.holder.mouth) : std::nullopt;
+  } else if (rest_holder && result.holder.ok) {
+    const Point d = result.holder.mouth - *rest_holder;
+    if (cv::norm(d) > 1.0) {
+      rest->circle.centre += d;
+      for (Point& p : rest->shape) {
+        p += d;
+      }
+      rest_holder = result.holder.mouth;
+    }
+  }
+  result.undeformed = rest->circle;
+  if (!n.ok) {
+    return;
+  }
+  result.entry = entry_point(rest->shape, n.tip, n.axis);
+  if (!result.entry) {
+    return;
+  }
+  result.gap_px = (*result.entry - n.tip).dot(n.axis);
+  const int fitted =
+      static_cast<int>(std::count_if(weight.begin(), weight.end(), [](double w) { return w > 0; }));
+  result.gap_noise_px = std::hypot(0.1, 3 * result.outer.residual_px / std::sqrt(std::max(fitted, 1)));
+}
+
+void Tracker::Impl::classify_contact() {
+  const NeedleFix& n = result.needle;
+  if (!n.ok || !result.outer.ok) {
+    puncture.update({result.exposure_ns, false, false, 0, 0, 0, result.gap_px.value_or(0), n.half_width});
+    result.punctured = puncture.punctured();
+    was_contact = false;
+    return;
+  }
+  // The paper's test: needle and cell are two classes until they merge.
+  const cv::Rect a = field.area;
+  needle_pixels.create(binary.size(), CV_8U);
+  needle_pixels.setTo(0);
+  Polygon needle_local = needle_polygon(n, grey.size(), 1.5, 0.5);
+  for (Point& p : needle_local) {
+    p -= Point(a.x, a.y);
+  }
+  draw_mask(needle_pixels, {needle_local});
+  cell_pixels.create(binary.size(), CV_8U);
+  cell_pixels.setTo(0);
+  for (const Point& p : result.outer.contour) {
+    if (!hidden(p)) {
+      const Point q = p - Point(a.x, a.y);
+      cv::circle(cell_pixels,
+                 cv::Point(static_cast<int>(std::lround(q.x)), static_cast<int>(std::lround(q.y))), 1,
+                 cv::Scalar(255), cv::FILLED);
+    }
+  }
+  result.merged = merge_classes(binary, needle_pixels, cell_pixels, config.dilation_px).merged;
+
+  // Contact points along the needle's edges, near where the contour crosses them.
+  const double floor = std::max(3 * gn, 0.3 * outer.level);
+  std::array<std::optional<double>, 2> near;
+  for (int side = 0; side < 2; ++side) {
+    const Point across(-n.axis.y, n.axis.x);
+    const double u = (side == 0 ? -1 : 1) * (n.half_width + 2.5);
+    if (const auto e = entry_point(result.outer.contour, n.tip + u * across, n.axis)) {
+      near[static_cast<std::size_t>(side)] = -(*e - n.tip).dot(n.axis);
+    }
+  }
+  double s_mean = 0;
+  int s_count = 0;
+  if (near[0] || near[1]) {
+    result.points = contact_points(field, n, outer.polarity, floor, 2.5, 0.5 * outer.r.front(), near, 5);
+    for (int side = 0; side < 2; ++side) {
+      const std::size_t k = static_cast<std::size_t>(side);
+      if (!near[k]) {
+        result.points.point[k].reset();
+      }
+      if (result.points.point[k]) {
+        s_mean += result.points.behind_tip[k];
+        ++s_count;
+      } else if (near[k]) {  // not seen: the contour's own crossing
+        s_mean += *near[k];
+        ++s_count;
+      }
+    }
+  }
+  // With the gap known to a fraction of a pixel it decides; the merging confirms, or decides alone.
+  if (result.gap_px) {
+    const double limit = was_contact ? 1.0 : 0.35;
+    result.contact = *result.gap_px < limit && (result.merged || *result.gap_px < -1);
+  } else {
+    result.contact = result.merged;
+  }
+  PunctureInput in;
+  in.t_ns = result.exposure_ns;
+  in.contact = result.contact;
+  in.points = s_count > 0 && result.entry.has_value();
+  in.gap_px = result.gap_px.value_or(0);
+  in.radius_px = n.half_width;
+  if (in.points) {
+    s_mean /= s_count;
+    in.tip_px = -in.gap_px;
+    in.membrane_px = in.tip_px - s_mean;
+    in.depth_px = in.membrane_px;
+  }
+  result.punctured = puncture.update(in);
+  result.membrane_velocity_px_s = puncture.membrane_velocity_px_s();
+  was_contact = result.contact;
+
+  if (!result.gap_px) {
+    return;
+  }
+  if (!result.contact) {
+    result.wd_px = 0;
+    return;
+  }
+  const double R = rest ? rest->circle.r : median_of(outer.r);
+  // Until the puncture the membrane lies on the tip; afterwards its own contour tells what is left of the
+  // dimple.
+  result.wd_px =
+      result.punctured ? std::max(0.0, in.points ? in.depth_px : 0.0) : std::max(0.0, -*result.gap_px);
+  if (*result.wd_px > 0.7 && rest) {
+    const auto profile = depth_profile(result.outer.contour, rest->shape, *result.entry, n.axis, 0.9 * R);
+    std::vector<ProfilePoint> seen;
+    for (const ProfilePoint& p : profile) {
+      if (std::abs(p.u) > n.half_width + 2.5) {
+        seen.push_back(p);
+      }
+    }
+    result.a_px = half_width(seen, *result.wd_px, n.half_width, R);
+  }
+}
+
+void Tracker::Impl::decide_phase() {
+  const double um = 1e-6 / config.pixel_m;
+  if (last_tip && result.needle.ok) {
+    tip_speed += 0.4 * ((result.needle.tip - *last_tip).dot(result.needle.axis) - tip_speed);
+  }
+  last_tip = result.needle.ok ? std::optional<Point>(result.needle.tip) : std::nullopt;
+  rt::Phase& p = result.phase;  // still the last frame's
+  const double gap = result.gap_px.value_or(std::numeric_limits<double>::infinity());
+  if (p == rt::Phase::puncture || p == rt::Phase::withdrawal) {
+    if (gap > 10 * um) {
+      p = rt::Phase::clear;
+    } else if (tip_speed < -0.15) {
+      p = rt::Phase::withdrawal;
+    }
+  } else if (result.punctured) {
+    p = rt::Phase::puncture;
+  } else if (result.contact && result.wd_px.value_or(0) > 3 * um) {
+    p = rt::Phase::indentation;
+  } else if (result.contact) {
+    p = rt::Phase::contact;
+  } else if (p != rt::Phase::clear || gap < 5 * um) {
+    p = rt::Phase::free;
+  }
+}
+
+void Tracker::Impl::write_verdict() {
+  std::string v;
+  const auto add = [&v](const std::string& s) { v += (v.empty() ? "" : "; ") + s; };
+  if (config.holder && !result.holder.ok) {
+    add("holder: " + (result.holder.why.empty() ? "not found" : result.holder.why));
+  }
+  if (config.needle && !result.needle.ok) {
+    add("needle: " + (result.needle.why.empty() ? "not found" : result.needle.why));
+  }
+  if (!result.outer.ok) {
+    add("outer: " + (result.outer.why.empty() ? "not found" : result.outer.why));
+  }
+  if (config.inner && !result.inner.ok) {
+    add("inner: " + (result.inner.why.empty() ? "not found" : result.inner.why));
+  }
+  result.verdict = v.empty() ? "ok" : v;
+}
+
+const Result& Tracker::Impl::process(const hal::Frame& frame) {
+  Stopwatch total, watch;
+  const rt::Phase before = result.phase;
+  result = {};
+  result.phase = before;
+  result.frame = frame.sequence;
+  result.exposure_ns = frame.exposure_ns;
+  const auto refuse = [&](std::string why) -> const Result& {
+    result.verdict = std::move(why);
+    result.us.total = total.lap_us();
+    return result;
+  };
+  if (frame.pixels == nullptr || frame.width <= 0 || frame.height <= 0 || frame.stride < frame.width) {
+    return refuse("no picture");
+  }
+  if (frame.width != width || frame.height != height) {
+    return refuse("size " + std::to_string(frame.width) + "x" + std::to_string(frame.height) +
+                  " instead of " + std::to_string(width) + "x" + std::to_string(height));
+  }
+  if (width < 32 || height < 32) {
+    return refuse("picture too small: at least 32x32 is needed");
+  }
+  // A copy: the camera may take its buffer back, and OpenCV wants none of our constness.
+  cv::Mat(height, width, CV_8U, const_cast<std::uint8_t*>(frame.pixels),
+          static_cast<std::size_t>(frame.stride))
+      .copyTo(grey);
+  cv::Scalar mean, sd;
+  cv::meanStdDev(grey, mean, sd);
+  if (sd[0] < 0.5) {
+    return refuse("no contrast: every pixel is about " + std::to_string(std::lround(mean[0])));
+  }
+  result.usable = true;
+  result.noise = std::max(noise_level(grey), 0.3);
+
+  // The whole picture while it is small or something must be found; else the surroundings of the cell.
+  cv::Rect area(0, 0, width, height);
+  const bool big = static_cast<std::int64_t>(width) * height > 900000;
+  const Followed& any = outer.known ? outer : inner;
+  if (big && any.known && (!config.needle || needle.started())) {
+    const double reach = 1.7 * *std::max_element(any.r.begin(), any.r.end()) + 40;
+    cv::Rect2d box(any.centre.x - reach, any.centre.y - reach, 2 * reach, 2 * reach);
+    if (config.needle && last_tip) {
+      box |= cv::Rect2d(last_tip->x - 80, last_tip->y - 80, 160, 160);
+    }
+    area &= cv::Rect(static_cast<int>(box.x), static_cast<int>(box.y), static_cast<int>(box.width),
+                     static_cast<int>(box.height));
+  }
+  field.compute(grey, area, 1.2);
+  gn = field.noise_of_gradient(result.noise);
+  result.us.prepare = watch.lap_us();
+
+  locate_pipettes(watch);
+  erase_pipettes();
+  remove_impurities();
+  result.us.erase = watch.lap_us();
+
+  if (outer.bad >= 2 || (!outer.known && inner.bad >= 2) || (!outer.known && !inner.known)) {
+    outer = {};
+    inner = {};
+    if (!start_membranes()) {
+      result.us.start = watch.lap_us();
+      if (result.outer.why.empty()) {
+        result.outer.why = "no start";
+      }
+      puncture.update({frame.exposure_ns, false, false, 0, 0, 0, 0, 0});
+      result.punctured = puncture.punctured();
+      result.merged = false;
+      decide_phase();
+      write_verdict();
+      result.us.total = total.lap_us();
+      return result;
+    }
+    rest.reset();
+    rest_frames = 0;
+    remove_impurities();
+    result.us.start = watch.lap_us();
+  }
+  follow(outer, result.outer, nullptr, nullptr);
+  result.us.outer = watch.lap_us();
+  if (config.inner) {
+    follow(inner, result.inner, outer.known && result.outer.ok ? &outer : nullptr, nullptr);
+  }
+  result.us.inner = watch.lap_us();
+  measure();
+  result.us.measure = watch.lap_us();
+  classify_contact();
+  result.us.contact = watch.lap_us();
+  if (result.needle.ok && !result.contact && result.gap_px.value_or(99) > 12) {
+    needle.learn(grey, result.needle);
+  }
+  decide_phase();
+  write_verdict();
+  ++frames;
+  result.us.total = total.lap_us();
+  return result;
+}
+
+rt::Observation to_observation(const Result& r, const VisionConfig& config, int width, int height) {
+  rt::Observation o;
+  const double k = config.pixel_m;
+  const auto place = [&](const Point& p, double(&out)[3]) {
+    out[0] = (p.x - (width - 1) / 2.0) * k;
+    out[1] = (p.y - (height - 1) / 2.0) * k;
+    out[2] = 0;
+  };
+  o.frame = r.frame;
+  o.exposure_ns = r.exposure_ns;
+  o.flags = (r.holder.ok ? rt::Observation::holder_ok : 0U) | (r.needle.ok ? rt::Observation::tip_ok : 0U) |
+            (r.outer.ok ? rt::Observation::outer_ok : 0U) | (r.inner.ok ? rt::Observation::inner_ok : 0U) |
+            (r.contact ? rt::Observation::contact : 0U) | (r.punctured ? rt::Observation::punctured : 0U);
+  if (r.needle.ok) {
+    place(r.needle.tip, o.tip_m);
+    o.axis[0] = r.needle.axis.x;
+    o.axis[1] = r.needle.axis.y;
+    o.axis[2] = 0;
+  }
+  if (r.holder.ok) {
+    place(r.holder.mouth, o.holder_m);
+  }
+  o.holder_score = r.holder.score;
+  if (r.undeformed) {
+    place(r.undeformed->centre, o.centre_m);
+    o.R_m = r.undeformed->r * k;
+  }
+  o.R_inner_m = r.inner_radius_px.value_or(0) * k;
+  if (r.entry) {
+    place(*r.entry, o.entry_m);
+  }
+  o.gap_m = r.gap_px.value_or(0) * k;
+  o.wd_m = r.wd_px.value_or(0) * k;
+  o.a_m = r.a_px.value_or(0) * k;
+  o.membrane_velocity_m_s = r.membrane_velocity_px_s * k;
+  for (std::size_t i = 0; i < 2; ++i) {
+    if (r.points.point[i]) {
+      place(*r.points.point[i], o.contact_point_m[i]);
+    }
+  }
+  o.noise_m = r.gap_noise_px * k;
+  o.total_us = static_cast<std::uint64_t>(std::max(0.0, r.us.total));
+  return o;
+}
+
+}  // namespace punctum::vision

@@ -33,7 +33,7 @@ MembraneState membrane_law(const MembraneParams& params, double wd_m, double R_m
   s.a_m = c + dimple_reach(R_m, wd_m, scale);
   s.sigma_d_Pa = force / (2 * std::numbers::pi * params.h_m * k);
   s.pressure_Pa = s.force_N / (std::numbers::pi * a * a);
-  s.slope = k * (1 / c - c / (a * a));
+  s.slope = k * (reach / a) * (1 + c / a) / c;  // -w'(c) = k (1/c - c/a^2)
   s.small_slope = s.slope <= kMembraneSlopeMax;
   s.valid = s.small_slope && params.h_m <= c && a < R_m;
   return s;

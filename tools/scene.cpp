@@ -463,6 +463,8 @@ std::string in_quotes(std::string_view s) {
   return out + "\"";
 }
 
+}  // namespace
+
 std::string value_text(const Key& key) {
   struct Visitor {
     std::string operator()(const Real& r) const { return number_text(*r.target, r.mul, r.div); }
@@ -486,8 +488,6 @@ std::string value_text(const Key& key) {
   };
   return std::visit(Visitor{}, key.value);
 }
-
-}  // namespace
 
 tl::expected<Scene, std::string> parse_scene(std::string_view text, std::string_view source,
                                              const std::vector<std::string>& overrides,

@@ -57,8 +57,8 @@ struct Scene {
                                                            const std::vector<std::string>& overrides = {},
                                                            std::string_view folder = {});
 
-// The resolved scene, every key of every table that is there. Numbers that were read from a file read back to the
-// same bits; others to the last digit.
+// The resolved scene, every key of every table that is there. Numbers that were read from a file read back to
+// the same bits; others to the last digit.
 [[nodiscard]] std::string to_toml(const Scene& scene);
 
 [[nodiscard]] std::vector<std::string_view> builtin_names();

@@ -71,6 +71,7 @@ struct List {
 [[nodiscard]] const std::vector<Table>& scene_tables();
 [[nodiscard]] const std::vector<List>& scene_lists();
 [[nodiscard]] std::string allowed(const Key& key);
+[[nodiscard]] std::string value_text(const Key& key);  // as it would stand in a file
 
 // What one table alone cannot tell. Returns the first problem: which key it is about, and the text after it.
 struct Problem {

@@ -1,0 +1,236 @@
+#include "tools/explain.hpp"
+
+#include <fmt/format.h>
+#include <glob.h>
+#include <sys/resource.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include "tools/child.hpp"
+#include "tools/scene_keys.hpp"
+
+namespace punctum::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string cpu(int n) { return n < 0 ? "any CPU" : fmt::format("CPU {}", n); }
+
+// What each absent table would have cost. Sizes are of the order of magnitude, for orientation.
+struct Saving {
+  const char* table;
+  const char* saves;
+};
+constexpr Saving kSavings[] = {
+    {"cell", "no membrane is solved and tabled, no contact is stepped"},
+    {"cell.inner", "one membrane table and one contact less per tick"},
+    {"holder", "no suction to hold or lose the cell"},
+    {"vacuum", "no pressure is read or watched"},
+    {"injector", "no gate is driven; the inject button does nothing"},
+    {"force_sensor", "no force is read besides the estimate"},
+    {"camera", "no pictures"},
+    {"vision", "no vision process: no OpenCV in memory, the second CPU stays free"},
+    {"vision.holder", "no correlation for the holding pipette"},
+    {"phases", "no phase detection: always `free`"},
+    {"local_model", "no membrane model between frames, no pose history"},
+    {"membrane", "no membrane force"},
+    {"cone", "no cone guide"},
+    {"axis", "no withdrawal axis"},
+    {"damping", "no viscous damping"},
+};
+
+}  // namespace
+
+std::string explain(const Scene& s) {
+  std::string out;
+  const auto line = [&out](const std::string& text) { out += text + "\n"; };
+  const double rate = s.servo.rate_Hz;
+  line(fmt::format("{}: {}", s.name, s.title.empty() ? s.source : s.title));
+  line(fmt::format("  task       {}{}",
+                   !s.servo.phases     ? "none, runs until its time limit"
+                   : s.servo.cells > 0 ? fmt::format("inject {} cell(s)", s.servo.cells)
+                                       : "open-ended",
+                   s.seconds > 0 ? fmt::format(", at most {} s", s.seconds) : ", no time limit"));
+  line(fmt::format("  clock      {}",
+                   s.clock == ClockKind::real ? "real" : "virtual: as fast as everybody is ready"));
+
+  line("processes");
+  line("  punctum         ordinary, memory not locked: starts, watches, records, reports");
+  line(fmt::format(
+      "  punctum-core    one real-time thread: SCHED_FIFO {}, {}, memory locked, {} Hz (every {:g} us)",
+      s.core_priority, cpu(s.core_cpu), rate, 1e6 / rate));
+  if (s.vision)
+    line(fmt::format("  punctum-vision  nice {}, {}, one observation per frame", s.vision_nice,
+                     cpu(s.vision_cpu)));
+  std::string met = "  they meet in    the station segment";
+  if (s.sim) met += " and the bench segment of the simulated world";
+  line(met);
+
+  line("one tick of the core, in this order");
+  if (s.sim) line("  the simulated plant steps to now");
+  std::string devices = "hand, stage, e-stop contacts";
+  if (s.servo.vacuum) devices += ", holding vacuum";
+  if (s.servo.force_sensor) devices += ", force sensor";
+  line("  read devices          " + devices);
+  if (s.vision) line("  newest observation    from vision, compared with the pose at its exposure");
+  line(fmt::format("  velocity              FOAW, window {}, +-{:g} mm", s.servo.velocity.window,
+                   s.servo.velocity.d_m * 1e3));
+  if (s.servo.phases)
+    line("  phase                 free > contact > indentation > puncture > injection > withdrawal > clear");
+  std::string effects;
+  const auto effect = [&effects](const std::string& e) { effects += (effects.empty() ? "" : ", ") + e; };
+  if (const auto& m = s.servo.membrane)
+    effect(fmt::format("membrane (E {:g} kPa, h {:g} um, c {:g} um)", m->E_Pa * 1e-3, m->h_m * 1e6,
+                       m->c_m * 1e6));
+  if (const auto& c = s.servo.cone)
+    effect(fmt::format("cone guide ({}, {:g} N/m)",
+                       c->method == rt::ConeParams::Method::paper ? "paper" : "potential", c->K_N_m));
+  if (const auto& a = s.servo.axis) effect(fmt::format("withdrawal axis ({:g} N/m)", a->K_N_m));
+  if (const auto& d = s.servo.damping)
+    effect(fmt::format("damping ({:g} outside, {:g} Ns/m inside)", d->B1_Ns_m, d->B2_Ns_m));
+  line("  force effects         " + (effects.empty() ? std::string("none") : effects));
+  line(fmt::format(
+      "  limits                hand {:g} N, stage {:g} um/s, depth {:g} um, far wall {:g} um, tip {:g} uN",
+      s.servo.limits.hand_force_N, s.servo.limits.stage_velocity_m_s * 1e6,
+      s.servo.limits.penetration_depth_m * 1e6, s.servo.limits.far_wall_m * 1e6,
+      s.servo.limits.tip_force_hard_N * 1e6));
+  line(fmt::format("  stage set-point       every {} tick ({:g} Hz), hand / {:g}, tremor filter {}",
+                   s.servo.stage_divisor, rate / s.servo.stage_divisor, s.servo.mapping.position_scale,
+                   s.servo.mapping.tremor_cutoff_Hz > 0
+                       ? fmt::format("{:g} Hz", s.servo.mapping.tremor_cutoff_Hz)
+                       : "off"));
+  line(std::string("  write devices         force to the hand, stage, heartbeat") +
+       (s.servo.injector ? fmt::format(", injector gate (at most {:g} s)", s.servo.injector->max_open_s)
+                         : ""));
+  line("  telemetry             one sample, no system call");
+
+  if (s.vision) {
+    line("one frame of vision");
+    line(s.recorded
+             ? fmt::format("  recorded frames       {} at {:g} per s", s.recorded->frames, s.recorded->fps)
+             : fmt::format("  simulated microscope  {} x {} px, {:g} um/px, {:g} per s, seen {:g} ms later",
+                           s.sim->microscope->width, s.sim->microscope->height,
+                           s.sim->microscope->pixel_m * 1e6, s.sim->microscope->fps,
+                           s.sim->microscope->latency_s * 1e3));
+    if (s.vision->method == vision::Method::truth) {
+      line("  truth                 the simulated world's own; no picture is drawn or looked at");
+    } else {
+      std::string stages;
+      if (s.vision->holder) stages += "holding pipette (correlation), ";
+      if (s.vision->needle) stages += "injection pipette and tip, erase pipettes, ";
+      stages += "impurities, outer membrane";
+      if (s.vision->inner) stages += " and inner membrane";
+      stages +=
+          fmt::format(" (snake, {} nodes{}), ", s.vision->snake.nodes, s.vision->refine ? ", refined" : "");
+      if (s.vision->needle) stages += "contact, puncture, ";
+      line("  " + stages + "w_d, a, R");
+    }
+  }
+
+  std::string absent;
+  for (const auto& t : tables(s)) {
+    if (t.present) continue;
+    for (const auto& saving : kSavings)
+      if (t.name == saving.table) absent += fmt::format("  {:<15} {}\n", t.name, saving.saves);
+  }
+  if (!absent.empty()) out += "left out\n" + absent;
+  if (s.sim && s.sim->failure_count + s.sim->estop_event_count > 0)
+    line(fmt::format("staged           {} device failures, {} e-stop presses", s.sim->failure_count,
+                     s.sim->estop_event_count));
+  return out;
+}
+
+std::string explain_keys(const Scene& scene) {
+  Scene everything = scene;
+  std::string out;
+  for (const auto& t : scene_tables()) {
+    const bool there = t.there(scene);
+    if (!there) t.put(everything, true);
+    if (!t.there(everything)) continue;
+    out += fmt::format("\n[{}]{}\n", t.name,
+                       t.kind == Kind::required ? "  (must be there)"
+                       : there                  ? ""
+                                                : "  (not in this scene)");
+    for (const auto& k : t.keys(everything))
+      out += fmt::format("  {:<24} {:<16} {}\n", k.name, value_text(k), allowed(k));
+  }
+  return out;
+}
+
+int check(const Scene& s, std::string& text) {
+  bool good = true;
+  const auto row = [&text](bool ok, const std::string& what, const std::string& detail) {
+    text += fmt::format("  {} {:<18} {}\n", ok ? "ok  " : "FAIL", what, detail);
+    return ok;
+  };
+  text += fmt::format("{}: reads and fits together\n", s.name);
+  for (const char* program : {"punctum-core", "punctum-vision"}) {
+    if (!s.vision && std::string_view(program) == "punctum-vision") continue;
+    const auto path = find_program(program);
+    good = row(!path.empty(), program, path.empty() ? "not found beside this program nor in PATH" : path) &&
+           good;
+  }
+  if (s.sim) row(true, "devices", "all simulated: no actuator is there to touch");
+  if (s.recorded) {
+    std::error_code ec;
+    const auto& f = s.recorded->frames;
+    std::string detail = f;
+    bool there = false;
+    if (fs::is_directory(f, ec)) {
+      std::size_t n = 0;
+      for (auto it = fs::directory_iterator(f, ec); !ec && it != fs::directory_iterator(); it.increment(ec))
+        n += it->is_regular_file(ec) ? 1U : 0U;
+      there = n > 0 && access(f.c_str(), R_OK) == 0;
+      detail += fmt::format(": {} files", n);
+    } else {
+      glob_t found{};
+      there = glob(f.c_str(), 0, nullptr, &found) == 0 && found.gl_pathc > 0 &&
+              access(found.gl_pathv[0], R_OK) == 0;
+      detail += there ? fmt::format(": {} files", found.gl_pathc) : ": no such folder, glob or video";
+      globfree(&found);
+    }
+    good = row(there, "camera.frames", detail) && good;
+  }
+  if (s.vision && s.vision->holder && !s.vision->holder->template_path.empty()) {
+    const auto& f = s.vision->holder->template_path;
+    good = row(access(f.c_str(), R_OK) == 0, "vision.holder", f) && good;
+  }
+  struct statvfs shm {};
+  const bool shm_ok = statvfs("/dev/shm", &shm) == 0 && access("/dev/shm", W_OK | X_OK) == 0;
+  const double room_MB =
+      shm_ok ? static_cast<double>(shm.f_bavail) * static_cast<double>(shm.f_frsize) * 1e-6 : 0;
+  good = row(shm_ok && room_MB > 64, "/dev/shm",
+             shm_ok ? fmt::format("{:.0f} MB free", room_MB) : "cannot be written to") &&
+         good;
+  const int cpus = static_cast<int>(std::thread::hardware_concurrency());
+  for (const auto& [what, n] : {std::pair{"servo.cpu", s.core_cpu}, std::pair{"vision.cpu", s.vision_cpu}})
+    if (n >= 0) good = row(n < cpus, what, fmt::format("CPU {} of {}", n, cpus)) && good;
+
+  // Advice: without these the core runs degraded, and says so.
+  const auto advice = [&text](bool ok, const std::string& what, const std::string& detail) {
+    text += fmt::format("  {} {:<18} {}\n", ok ? "ok  " : "note", what, detail);
+  };
+  rlimit rt{}, memory{};
+  getrlimit(RLIMIT_RTPRIO, &rt);
+  getrlimit(RLIMIT_MEMLOCK, &memory);
+  const bool root = geteuid() == 0;
+  advice(root || rt.rlim_cur >= static_cast<rlim_t>(s.core_priority), "real-time priority",
+         root ? "as root" : fmt::format("limit rtprio is {}, wanted {}", rt.rlim_cur, s.core_priority));
+  advice(root || memory.rlim_cur == RLIM_INFINITY, "locked memory",
+         root || memory.rlim_cur == RLIM_INFINITY
+             ? "unlimited"
+             : fmt::format("limit memlock is {} kB, wanted unlimited", memory.rlim_cur / 1024));
+  advice(access("/dev/cpu_dma_latency", W_OK) == 0, "cpu_dma_latency",
+         access("/dev/cpu_dma_latency", W_OK) == 0
+             ? "can be held at 0"
+             : "/dev/cpu_dma_latency cannot be written: CPU sleep states stay on");
+  advice(cpus > 1, "CPUs", fmt::format("{}", cpus));
+  text += good ? "can run\n" : "cannot run\n";
+  return good ? 0 : 2;
+}
+
+}  // namespace punctum::tools

@@ -1,0 +1,20 @@
+// What a scene would start, and what it leaves out; and whether this machine can run it.
+#pragma once
+
+#include <string>
+
+#include "tools/scene.hpp"
+
+namespace punctum::tools {
+
+// Processes, threads, rates, priorities, CPUs, the effects in the tick, the stages of vision, what is left
+// out and what that saves.
+[[nodiscard]] std::string explain(const Scene& scene);
+
+// Every table and key with its unit, range and value in this scene.
+[[nodiscard]] std::string explain_keys(const Scene& scene);
+
+// Files, devices and permissions, without touching an actuator. 0 = can run, 2 = cannot.
+[[nodiscard]] int check(const Scene& scene, std::string& text);
+
+}  // namespace punctum::tools

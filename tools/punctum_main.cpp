@@ -1,0 +1,101 @@
+// punctum: runs, explains and checks scenes. The only program that starts others.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <string>
+#include <vector>
+
+#include "tools/explain.hpp"
+#include "tools/scene.hpp"
+#include "tools/supervisor.hpp"
+
+namespace {
+
+using namespace punctum::tools;
+
+int bad(const std::string& text) {
+  fmt::print(stderr, "{}\n", text);
+  return 2;
+}
+
+int main_or_throw(int argc, char** argv) {
+  CLI::App app{"Haptic cell injection: control core, simulated station and vision"};
+  app.require_subcommand(1);
+  app.failure_message(CLI::FailureMessage::simple);
+  std::string scene_name;
+  std::vector<std::string> overrides;
+  double seconds = -1, rate = 0;
+  std::string clock, seed;
+  RunSettings settings;
+  bool no_frames = false, no_figure = false, keys = false;
+
+  const auto common = [&](CLI::App* sub) {
+    std::string names;
+    for (const auto n : builtin_names()) names += (names.empty() ? "" : ", ") + std::string(n);
+    sub->add_option("SCENE", scene_name, "a scene file, or one of: " + names)->required();
+    sub->add_option("--set", overrides, "table.key=value, or table=on|off; may be repeated")
+        ->allow_extra_args(false)
+        ->take_all();
+    sub->add_option("--rate", rate, "servo rate in Hz: 1000, 2000, 4000 or 8000");
+    sub->add_option("--clock", clock, "real, or virtual: as fast as possible, the same every time")
+        ->check(CLI::IsMember({"real", "virtual"}));
+    sub->add_option("--seed", seed, "of the simulated world");
+    sub->add_option("--seconds", seconds, "time limit")->check(CLI::Range(1e-3, 1e6));
+  };
+  CLI::App* run = app.add_subcommand("run", "run a scene and write a report");
+  common(run);
+  run->add_option("--report", settings.report, "folder of the report (default: reports/SCENE-DATE)");
+  run->add_option("--samples-every", settings.samples_every,
+                  "write every n-th tick to samples.csv (0: choose)");
+  run->add_flag("--no-frames", no_frames, "write no annotated frames");
+  run->add_flag("--no-figure", no_figure, "draw no figure");
+  run->add_flag("--quiet", settings.quiet, "no progress, only the summary");
+  CLI::App* explaining =
+      app.add_subcommand("explain", "print what a scene would start, and what it leaves out");
+  common(explaining);
+  explaining->add_flag("--keys", keys, "every table and key, its value and what is allowed");
+  CLI::App* checking =
+      app.add_subcommand("check", "validate a scene, devices and permissions; touches no actuator");
+  common(checking);
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    const int code = app.exit(e);
+    return code == 0 ? 0 : 2;
+  }
+
+  // Options are overrides too, so that their messages are the same.
+  if (rate != 0) overrides.push_back(fmt::format("servo.rate_hz={}", rate));
+  if (!clock.empty()) overrides.push_back("scene.clock=\"" + clock + "\"");
+  if (!seed.empty()) overrides.push_back("scene.seed=" + seed);
+  if (seconds >= 0) overrides.push_back(fmt::format("scene.seconds={}", seconds));
+  const auto scene = load_scene(scene_name, overrides);
+  if (!scene) return bad(scene.error());
+
+  if (*explaining) {
+    fmt::print("{}", keys ? explain_keys(*scene) : explain(*scene));
+    return 0;
+  }
+  if (*checking) {
+    std::string text;
+    const int code = check(*scene, text);
+    fmt::print("{}", text);
+    return code;
+  }
+  settings.frames = !no_frames;
+  settings.figure = !no_figure;
+  return run_scene(*scene, settings);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return main_or_throw(argc, argv);
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "punctum: {}\n", e.what());
+    return 2;
+  }
+}

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdio>
 #include <exception>
+#include <iostream>
 #include <memory>
 #include <new>
 #include <opencv2/core.hpp>
@@ -200,7 +201,7 @@ Verdict check_tiff(Bytes file) {
   const std::size_t directory = number(file, 4, 4, big);
   if (directory < 8 || directory > file.size() || file.size() - directory < 2) return wrong(kEndsEarly);
   const std::size_t entries = number(file, directory, 2, big);
-  if (entries * 12 > file.size() - directory - 2) return wrong(kEndsEarly);
+  if (entries * 12 + 4 > file.size() - directory - 2) return wrong(kEndsEarly);
   std::int64_t width = 0;
   std::int64_t height = 0;
   struct Field {
@@ -254,6 +255,23 @@ Verdict check(Bytes file) {
   return wrong(std::string("not a picture this program reads; ") + kAllowed);
 }
 
+// The library writes what it dislikes to the standard error stream; here it is returned as a value.
+class Hush {
+ public:
+  Hush() : before_(std::cerr.rdbuf(nullptr)) {
+    cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+  }
+  ~Hush() {
+    std::cerr.rdbuf(before_);
+    std::cerr.clear();
+  }
+  Hush(const Hush&) = delete;
+  Hush& operator=(const Hush&) = delete;
+
+ private:
+  std::streambuf* before_;
+};
+
 int bits_that_hold(const cv::Mat& picture) {
   std::uint16_t brightest = 0;
   for (int y = 0; y < picture.rows; ++y) {
@@ -270,10 +288,9 @@ int bits_that_hold(const cv::Mat& picture) {
 tl::expected<Picture, std::string> decode(Bytes file, int bits) {
   const Verdict good = check(file);
   if (!good) return tl::unexpected(good.error());
-  // What the library would print is returned as a value here.
-  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   cv::Mat picture;
   try {
+    const Hush hush;
     const cv::Mat bytes(1, static_cast<int>(file.size()), CV_8UC1, const_cast<std::uint8_t*>(file.data()));
     picture = cv::imdecode(bytes, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
   } catch (const std::bad_alloc&) {

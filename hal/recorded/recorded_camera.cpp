@@ -7,6 +7,7 @@
 #include <cctype>
 #include <cmath>
 #include <cstddef>
+#include <cstdlib>
 #include <exception>
 #include <filesystem>
 #include <opencv2/core.hpp>
@@ -191,6 +192,7 @@ struct Camera::Impl {
     std::error_code error_code;
     const std::string path = fs::absolute(source, error_code).string();
     cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+    ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // quiet: what is wrong is returned as a value
     for (const int backend : {cv::CAP_FFMPEG, cv::CAP_GSTREAMER, cv::CAP_OPENCV_MJPEG}) {
       try {
         if (film.open(path, backend)) break;

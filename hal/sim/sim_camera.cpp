@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "hal/sim/virtual_clock.hpp"
+#include "hal/sim/waiting.hpp"
 
 namespace punctum::sim {
 namespace {
@@ -41,11 +41,11 @@ SimCamera::SimCamera(const SimConfig& config, Bench& bench, Picture picture)
 }
 
 hal::Status SimCamera::next(hal::Frame& out, std::int64_t timeout_ns) {
-  const std::int64_t give_up_ns = monotonic_ns() + std::max<std::int64_t>(timeout_ns, 0);
+  const std::int64_t give_up_ns = real_now_ns() + std::max<std::int64_t>(timeout_ns, 0);
   const std::size_t late_by = static_cast<std::size_t>(std::ceil(kDelay_s * std::max(params_.fps, 1.0)));
   for (;;) {
     Exposure exposure;
-    const hal::Status status = taker_.next(exposure, std::max<std::int64_t>(give_up_ns - monotonic_ns(), 0));
+    const hal::Status status = taker_.next(exposure, std::max<std::int64_t>(give_up_ns - real_now_ns(), 0));
     if (status != hal::Status::ok) return status;
 
     const Failure failure = exposure.world.failure[static_cast<std::size_t>(Device::camera)];
@@ -83,7 +83,10 @@ hal::Status SimCamera::next(hal::Frame& out, std::int64_t timeout_ns) {
       seen_any_ = true;
       if (microscope_ && !unusable) draw();
     }
-    if (!microscope_) return unusable ? hal::Status::fault : hal::Status::ok;
+    if (!microscope_) {
+      if (unusable) taker_.release();
+      return unusable ? hal::Status::fault : hal::Status::ok;
+    }
     if (failure == Failure::nan) fill_with_noise(config_.seed ^ exposure.frame, pixels_);
     if (failure == Failure::saturate) std::fill(pixels_.begin(), pixels_.end(), std::uint8_t{255});
     out.pixels = pixels_.data();

@@ -12,6 +12,7 @@
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <ctime>
 #include <fstream>
 #include <utility>
 
@@ -84,6 +85,12 @@ RightFound priority(const RightsWanted& wanted, bool apply) {
           : "/etc/security/limits.d/punctum.conf: '@punctum - rtprio 95' and join group punctum; or "
             "setcap cap_sys_nice,cap_ipc_lock=ep punctum-core; or systemd LimitRTPRIO=95";
   return right;
+}
+
+// The kernel's clock page is not part of locked memory: its first reading is a page fault.
+void prefault_clock() {
+  timespec now;
+  ::clock_gettime(CLOCK_MONOTONIC, &now);
 }
 
 RightFound memory(bool apply) {
@@ -260,7 +267,10 @@ RealTimeRights RealTimeRights::go(const RightsWanted& wanted, bool apply) {
   rights.table_.push_back(frequency(wanted, facts));
   rights.table_.push_back(siblings(facts));
   rights.table_.push_back(throttling(wanted, facts));
-  if (apply) ::prctl(PR_SET_TIMERSLACK, 1UL);  // ns; matters only without SCHED_FIFO
+  if (apply) {
+    prefault_clock();
+    ::prctl(PR_SET_TIMERSLACK, 1UL);  // ns; matters only without SCHED_FIFO
+  }
   rights.table_.push_back(priority(wanted, apply));
   return rights;
 }

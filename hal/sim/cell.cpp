@@ -283,6 +283,8 @@ CellForce Cell::step(CellState& state, const TipMotion& motion, double dt_s) con
   if (state.outer.dimple_m > 0) {
     out.wd_m = state.outer.dimple_m / std::max(0.5, vec(state.outer.axis_m).dot(p.axis));
     out.a_m = outer_table_->half_width(outer_w) * R_m_;
+    out.rim_m = outer_table_->rim_radius(outer_w) * R_m_;
+    out.rim_depth_m = outer_table_->rim_depth(outer_w) * R_m_;
   }
   if (state.inner.dimple_m > 0) {
     out.inner_wd_m = state.inner.dimple_m / std::max(0.5, vec(state.inner.axis_m).dot(p.axis));

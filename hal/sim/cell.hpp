@@ -67,9 +67,11 @@ struct CellForce {
   double inner_N = 0;
   double drag_N = 0;  // viscous drag and grip of the holes along the needle's axis; > 0 pushes it inwards
   bool contact = false;
-  double depth_m = 0;  // of the tip past the undeformed outer membrane along the axis; < 0 outside
-  double wd_m = 0;     // depth of the outer dimple along the axis
-  double a_m = 0;      // its half-width where the depth has fallen to 1 %
+  double depth_m = 0;      // of the tip past the undeformed outer membrane along the axis; < 0 outside
+  double wd_m = 0;         // depth of the outer dimple along the axis
+  double a_m = 0;          // its half-width where the depth has fallen to 1 %
+  double rim_m = 0;        // radius of the outer dimple's rim as it is seen, where the membrane is highest
+  double rim_depth_m = 0;  // of the dimple's bottom below that rim
   double inner_wd_m = 0;
   double chord_m = 0;           // from entry to the far wall along the axis
   double strain = 0;            // largest, of the intact outer membrane

@@ -367,6 +367,22 @@ double half_width_of(const MembraneSolution& x) {
   return place(x, inside)[0];
 }
 
+// The highest circle round the dimple; the rim of the tip while the membrane falls away from it.
+void find_rim(double c, MembraneSolution& x) {
+  x.rim_radius = c;
+  x.rim_depth = 0;
+  std::size_t i = 0;
+  while (i + 1 < x.theta.size() && x.sin_phi[i + 1] < 0) ++i;
+  if (x.sin_phi[0] >= 0 || i + 1 == x.theta.size()) return;
+  x.rim_radius = std::sqrt(x.force / (pi * x.pressure));  // no tension pulls it up or down
+  double below = x.theta[i], above = x.theta[i + 1];
+  for (int k = 0; k < 50; ++k) {
+    const double middle = 0.5 * (below + above);
+    (place(x, middle)[0] < x.rim_radius ? below : above) = middle;
+  }
+  x.rim_depth = std::max(0.0, place(x, below)[1] - (1 - x.w));
+}
+
 // Everything that follows from the unknowns.
 void fill(const MembraneShape& shape, const Mesh& mesh, double w, const Unknowns& x, MembraneSolution& out) {
   const int nodes = mesh.intervals() + 1;
@@ -416,6 +432,7 @@ void fill(const MembraneShape& shape, const Mesh& mesh, double w, const Unknowns
     node(i + 1, on.right, rr, z, r);
   }
   out.half_width = half_width_of(out);
+  find_rim(shape.c_over_R, out);
 }
 
 }  // namespace
@@ -519,6 +536,8 @@ MembraneTruth::MembraneTruth(const MembraneShape& wanted, int intervals) : shape
   energy_.y.push_back(0);
   tip_tension_.y.push_back(T0);
   half_width_.y.push_back(0);  // replaced by the limit below
+  rim_radius_.y.push_back(shape_.c_over_R);
+  rim_depth_.y.push_back(0);
   for (int j = 0; j < kProfile; ++j) {
     const double theta = profile_theta(shape_, j);
     rows_.push_back({std::sin(theta), std::cos(theta)});
@@ -544,12 +563,15 @@ MembraneTruth::MembraneTruth(const MembraneShape& wanted, int intervals) : shape
     energy_.y.push_back(x.energy);
     tip_tension_.y.push_back(x.tip_tension);
     half_width_.y.push_back(x.half_width);
+    rim_radius_.y.push_back(x.rim_radius);
+    rim_depth_.y.push_back(x.rim_depth);
     for (int j = 0; j < kProfile; ++j) rows_.push_back(profile_place(x, profile_theta(shape_, j)));
   }
   if (w_.size() > 2) {
     half_width_.y[0] = half_width_.y[1] - (half_width_.y[2] - half_width_.y[1]) * w_[1] / (w_[2] - w_[1]);
   }
-  for (Curve* curve : {&force_, &pressure_, &strain_, &energy_, &tip_tension_, &half_width_}) {
+  for (Curve* curve :
+       {&force_, &pressure_, &strain_, &energy_, &tip_tension_, &half_width_, &rim_radius_, &rim_depth_}) {
     curve->slope = monotone_slopes(w_, curve->y);
   }
   // Slopes of the profile over depth: parabola through three depths.
@@ -591,6 +613,9 @@ double MembraneTruth::strain(double w) const noexcept { return at(strain_, w); }
 double MembraneTruth::energy(double w) const noexcept { return at(energy_, w); }
 double MembraneTruth::tip_tension(double w) const noexcept { return at(tip_tension_, w); }
 double MembraneTruth::half_width(double w) const noexcept { return at(half_width_, std::min(w, w_.back())); }
+
+double MembraneTruth::rim_radius(double w) const noexcept { return at(rim_radius_, w); }
+double MembraneTruth::rim_depth(double w) const noexcept { return at(rim_depth_, w); }
 
 double MembraneTruth::depth_at_strain(double wanted) const noexcept {
   if (wanted <= strain_.y.front()) return 0;

@@ -34,6 +34,8 @@ struct MembraneSolution {
   double strain = 0;                     // largest principal strain anywhere, from the stress-free state
   double tip_tension = 0;                // nominal meridional tension at the rim of the tip, over E h
   double half_width = 0;                 // a: radius where the depth has fallen to 1 % of w
+  double rim_radius = 0;                 // of the dimple's rim, its highest circle; F = p pi rim^2 there
+  double rim_depth = 0;                  // of the dimple's bottom below its rim
   double residual = 0;                   // of the collocation equations, largest component
   std::vector<double> theta;             // reference polar angle of each node
   std::vector<double> r, z;              // deformed place; undeformed pole z = +1
@@ -69,6 +71,9 @@ class MembraneTruth {
   [[nodiscard]] double energy(double w) const noexcept;
   [[nodiscard]] double tip_tension(double w) const noexcept;
   [[nodiscard]] double half_width(double w) const noexcept;  // a/R: where the depth has fallen to 1 % of w
+  [[nodiscard]] double rim_radius(
+      double w) const noexcept;  // of the dimple as it is seen: where it is highest
+  [[nodiscard]] double rim_depth(double w) const noexcept;             // of its bottom below that rim
   [[nodiscard]] double depth_at_strain(double strain) const noexcept;  // inverse of strain()
 
   // Deformed meridian (r, z), r >= 0, z = +1 at the undeformed pole; rz.size() >= kProfile.
@@ -85,7 +90,7 @@ class MembraneTruth {
 
   MembraneShape shape_;
   std::vector<double> w_;
-  Curve force_, pressure_, strain_, energy_, tip_tension_, half_width_;
+  Curve force_, pressure_, strain_, energy_, tip_tension_, half_width_, rim_radius_, rim_depth_;
   std::vector<std::array<double, 2>> rows_, row_slopes_;  // [depth][node]
 };
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <numbers>
@@ -243,6 +244,17 @@ TEST(MembraneTruth, HalfWidthIsWhereTheDepthHasFallenToOnePerCent) {
       if (rest(j + 1) <= 0) a = rz[j][0] + (rz[j + 1][0] - rz[j][0]) * rest(j) / (rest(j) - rest(j + 1));
     }
     EXPECT_NEAR(table.half_width(w), a, 1e-3) << w;
+  }
+}
+
+TEST(MembraneTruth, RimIsTheHighestCircleOfTheProfile) {
+  const MembraneTruth table(kDefault);
+  std::vector<std::array<double, 2>> rz(MembraneTruth::kProfile);
+  for (const double w : {0.1, 0.333, 0.8}) {
+    table.profile(w, rz);
+    const auto top = *std::max_element(rz.begin(), rz.end(), [](auto& a, auto& b) { return a[1] < b[1]; });
+    EXPECT_NEAR(table.rim_radius(w), top[0], 0.02) << w;
+    EXPECT_NEAR(table.rim_depth(w), top[1] - rz.front()[1], 1e-3) << w;
   }
 }
 

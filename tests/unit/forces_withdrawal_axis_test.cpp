@@ -1,0 +1,102 @@
+// The withdrawal axis and the viscous damping.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "rt/forces/damping.hpp"
+#include "rt/forces/withdrawal_axis.hpp"
+
+namespace punctum::rt {
+namespace {
+
+using hal::Vec3;
+constexpr double kScale = 500;
+const FixtureFrame kLine{Vec3(15e-6, 3e-6, -1e-6), Vec3(-0.98, 0.1, 0.17).normalized()};
+
+TEST(WithdrawalAxis, force_is_the_gradient_of_its_well_and_free_along_the_axis) {
+  const AxisParams params;
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> u(-6e-6, 6e-6);
+  const double h = 1e-8;
+  for (int i = 0; i < 5000; ++i) {
+    const Vec3 tip = kLine.entry_m + Vec3(10 * u(random), u(random), u(random));
+    const auto U = [&](const Vec3& p) { return axis_pull(params, kScale, kLine, p).energy_J; };
+    Vec3 gradient;
+    for (int k = 0; k < 3; ++k) {
+      const Vec3 e = Vec3::Unit(k) * h;
+      gradient[k] = (45 * (U(tip + e) - U(tip - e)) - 9 * (U(tip + 2 * e) - U(tip - 2 * e)) +
+                     (U(tip + 3 * e) - U(tip - 3 * e))) /
+                    (60 * h);
+    }
+    const Vec3 force = axis_pull(params, kScale, kLine, tip).force_N;
+    EXPECT_LT((force + gradient / kScale).norm(), 2e-6);
+    EXPECT_NEAR(force.dot(kLine.axis), 0, 1e-15);
+    // Moved along the axis nothing changes.
+    EXPECT_LT((axis_pull(params, kScale, kLine, tip + 30e-6 * kLine.axis).force_N - force).norm(), 1e-12);
+  }
+}
+
+TEST(WithdrawalAxis, is_smooth_on_the_axis_itself) {
+  const AxisParams params;
+  EXPECT_EQ(axis_pull(params, kScale, kLine, kLine.entry_m).force_N.norm(), 0);
+  // psi(r)/r -> 0: no kink at r = 0, and K k_p beyond the ramp.
+  const Vec3 across = kLine.axis.cross(Vec3::UnitZ()).normalized();
+  EXPECT_LT(axis_pull(params, kScale, kLine, kLine.entry_m + 1e-10 * across).force_N.norm(), 1e-9);
+  const double far = axis_pull(params, kScale, kLine, kLine.entry_m + 10e-6 * across).force_N.norm();
+  EXPECT_NEAR(far, params.K_N_m * kScale * (10e-6 - params.eps_m / 2), 1e-12);
+}
+
+TEST(WithdrawalAxis, resists_only_motion_into_the_cell_and_only_in_withdrawal) {
+  const AxisParams params;
+  WithdrawalAxis axis(params, kScale);
+  const Vec3 in = 0.01 * kLine.axis;  // m/s at the hand
+  for (int k = 0; k < 1000; ++k) (void)axis.step(kLine.entry_m, in, kLine, true, false, 1e-3);
+  EXPECT_EQ(axis.step(kLine.entry_m, in, kLine, true, false, 1e-3).norm(), 0);
+  Vec3 force = Vec3::Zero();
+  for (int k = 0; k < 1000; ++k) force = axis.step(kLine.entry_m, in, kLine, true, true, 1e-3);
+  EXPECT_NEAR(force.dot(kLine.axis), -params.B_inward_Ns_m * 0.01, 1e-12);
+  EXPECT_EQ(axis.step(kLine.entry_m, -in, kLine, true, true, 1e-3).norm(), 0);
+}
+
+TEST(WithdrawalAxis, books_what_switching_injects_and_lets_go_without_a_step) {
+  const AxisParams params;
+  WithdrawalAxis axis(params, kScale);
+  const Vec3 tip = kLine.entry_m + 4e-6 * kLine.axis.cross(Vec3::UnitY()).normalized();
+  Vec3 before = Vec3::Zero();
+  double steepest = 0;
+  for (int k = 0; k < 1000; ++k) {
+    const Vec3 force = axis.step(tip, Vec3::Zero(), kLine, k < 500, false, 1e-3);
+    steepest = std::max(steepest, (force - before).norm());
+    before = force;
+    // The hand does not move: all that is stored was injected.
+    EXPECT_NEAR(axis.stored_energy_J(), axis.injected_energy_J(), 1e-18);
+  }
+  EXPECT_EQ(before.norm(), 0);
+  EXPECT_NEAR(axis.injected_energy_J(), 0, 1e-18);
+  EXPECT_LT(steepest, 3e-3);  // N per ms
+}
+
+TEST(Damping, opposes_motion_and_rises_inside_without_a_bump) {
+  const DampingParams params;
+  Damping damping(params);
+  const Vec3 v(0.03, -0.01, 0.02);
+  Vec3 before = damping.step(v, false, 1e-3);
+  EXPECT_LT((before + params.B1_Ns_m * v).norm(), 1e-15);
+  int ticks = 0;
+  double largest = 0;
+  while (damping.B_Ns_m() < params.B2_Ns_m) {
+    const Vec3 force = damping.step(v, true, 1e-3);
+    EXPECT_LE(force.dot(v), 0);
+    largest = std::max(largest, (force - before).norm());
+    before = force;
+    ASSERT_LT(++ticks, 60);
+  }
+  EXPECT_GE(ticks, 20);  // 20 .. 50 ms
+  EXPECT_LE(ticks, 50);
+  // A smooth ramp never steps by more than 15/8 of an even one.
+  EXPECT_LE(largest, 1.9 * (params.B2_Ns_m - params.B1_Ns_m) * v.norm() / ticks);
+}
+
+}  // namespace
+}  // namespace punctum::rt

@@ -103,20 +103,28 @@ struct LatchOutput {
 
 class SafetyLatch {
  public:
-  explicit SafetyLatch(const EstopParams& params) noexcept : params_(params) {}
+  // All it remembers.
+  struct State {
+    StopStage stage = StopStage::running;
+    Fault cause = Fault::none;  // the first
+    bool reset_was = true;      // a button held from the start is no edge
+    double since_s = 0;         // since the stop, up to power_off_after_s
+    double hand = 1;            // of the hand's ramp, 1 .. 0
+    friend bool operator==(const State&, const State&) = default;
+  };
+
+  explicit SafetyLatch(const EstopParams& params) noexcept : SafetyLatch(params, State{}) {}
+  SafetyLatch(const EstopParams& params, const State& state) noexcept : params_(params), state_(state) {}
 
   LatchOutput step(const LatchInput& in, double dt_s) noexcept;
 
-  [[nodiscard]] StopStage stage() const noexcept { return stage_; }
-  [[nodiscard]] Fault cause() const noexcept { return cause_; }  // the first
+  [[nodiscard]] StopStage stage() const noexcept { return state_.stage; }
+  [[nodiscard]] Fault cause() const noexcept { return state_.cause; }
+  [[nodiscard]] const State& state() const noexcept { return state_; }
 
  private:
   EstopParams params_;
-  StopStage stage_ = StopStage::running;
-  Fault cause_ = Fault::none;
-  bool reset_was_ = true;  // a button held from the start is no edge
-  double since_s_ = 0;     // since the stop
-  Ramp hand_{1.0};
+  State state_;
 };
 
 }  // namespace punctum::rt

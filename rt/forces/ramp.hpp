@@ -41,12 +41,16 @@ class Ramp {
     const double whole_s = up ? up_s : down_s;
     const double part = whole_s > 0 ? dt_s / whole_s : 1.0;
     at_ = std::clamp(at_ + (up ? part : -part), 0.0, 1.0);
+    // Rounding leaves no crumb that would cost a tick.
+    if (at_ < kCrumb) at_ = 0;
+    if (at_ > 1 - kCrumb) at_ = 1;
   }
   constexpr void set(double at) noexcept { at_ = at; }
   [[nodiscard]] constexpr double at() const noexcept { return at_; }
   [[nodiscard]] constexpr double gain() const noexcept { return smooth_step(at_); }
 
  private:
+  static constexpr double kCrumb = 1e-9;
   double at_;
 };
 

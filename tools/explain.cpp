@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <glob.h>
-#include <sys/resource.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
 
@@ -10,6 +9,7 @@
 #include <fstream>
 #include <thread>
 
+#include "rt/platform/real_time_rights.hpp"
 #include "tools/child.hpp"
 #include "tools/scene_keys.hpp"
 
@@ -210,25 +210,17 @@ int check(const Scene& s, std::string& text) {
   for (const auto& [what, n] : {std::pair{"servo.cpu", s.core_cpu}, std::pair{"vision.cpu", s.vision_cpu}})
     if (n >= 0) good = row(n < cpus, what, fmt::format("CPU {} of {}", n, cpus)) && good;
 
-  // Advice: without these the core runs degraded, and says so.
-  const auto advice = [&text](bool ok, const std::string& what, const std::string& detail) {
-    text += fmt::format("  {} {:<18} {}\n", ok ? "ok  " : "note", what, detail);
-  };
-  rlimit rt{}, memory{};
-  getrlimit(RLIMIT_RTPRIO, &rt);
-  getrlimit(RLIMIT_MEMLOCK, &memory);
-  const bool root = geteuid() == 0;
-  advice(root || rt.rlim_cur >= static_cast<rlim_t>(s.core_priority), "real-time priority",
-         root ? "as root" : fmt::format("limit rtprio is {}, wanted {}", rt.rlim_cur, s.core_priority));
-  advice(root || memory.rlim_cur == RLIM_INFINITY, "locked memory",
-         root || memory.rlim_cur == RLIM_INFINITY
-             ? "unlimited"
-             : fmt::format("limit memlock is {} kB, wanted unlimited", memory.rlim_cur / 1024));
-  advice(access("/dev/cpu_dma_latency", W_OK) == 0, "cpu_dma_latency",
-         access("/dev/cpu_dma_latency", W_OK) == 0
-             ? "can be held at 0"
-             : "/dev/cpu_dma_latency cannot be written: CPU sleep states stay on");
-  advice(cpus > 1, "CPUs", fmt::format("{}", cpus));
+  // Without the required rights the core runs degraded, and says so.
+  rt::RightsWanted wanted;
+  wanted.priority = s.core_priority;
+  wanted.cpu = s.core_cpu;
+  const auto rights = rt::RealTimeRights::examine(wanted);
+  for (const auto& r : rights.table())
+    text += fmt::format("  {} {:<18} {}{}\n",
+                        r.got        ? "ok  "
+                        : r.required ? "MISS"
+                                     : "note",
+                        r.name, r.detail, r.got || r.remedy.empty() ? "" : "; " + r.remedy);
   text += good ? "can run\n" : "cannot run\n";
   return good ? 0 : 2;
 }

@@ -75,7 +75,9 @@ class Reader {
     source_ = source;
     fixed_ = fixed;
     if (const auto deep = nested_too_deep(text); !deep.empty()) return Unexpected(deep);
-    const toml::parse_result result = toml::parse(text);
+    const auto ascii = in_ascii(text);
+    if (!ascii) return Unexpected(ascii.error());
+    const toml::parse_result result = toml::parse(*ascii);
     if (!result) {
       const auto& e = result.error();
       std::string what = printable(e.description(), 200);
@@ -145,6 +147,49 @@ class Reader {
                            fixed_ ? source_ : fmt::format("{}:{}:{}", source_, line, column), kNestingMax);
     }
     return {};
+  }
+
+  // The same text in ASCII: letters beyond it as \UXXXXXXXX, which means the same in a "string". toml++ 3.3
+  // leaves open what it does with such a letter where a key or a value could begin.
+  [[nodiscard]] tl::expected<std::string, std::string> in_ascii(std::string_view text) const {
+    std::string out;
+    out.reserve(text.size());
+    std::uint32_t line = 1, column = 0;
+    char quote = 0;  // of the string or comment we are in
+    bool escaped = false;
+    for (std::size_t i = 0; i < text.size(); ++i) {
+      const auto c = static_cast<unsigned char>(text[i]);
+      ++column;
+      if (c < 0x80) {
+        out += text[i];
+        if (c == '\n') {
+          ++line, column = 0, quote = 0;
+        } else if (quote == 0 && (c == '"' || c == '\'' || c == '#')) {
+          quote = text[i], escaped = false;
+        } else if (quote != '#' && c == static_cast<unsigned char>(quote) && !escaped) {
+          quote = 0;
+        }
+        escaped = c == '\\' && quote == '"' && !escaped;
+        continue;
+      }
+      const int more = c >= 0xf0 && c < 0xf5 ? 3 : c >= 0xe0 && c < 0xf0 ? 2 : c >= 0xc2 && c < 0xe0 ? 1 : 0;
+      std::uint32_t letter = c & (0x3fU >> more);
+      int read = 0;
+      for (; read < more && i + 1 < text.size() && (text[i + 1] & 0xc0) == 0x80; ++read)
+        letter = letter << 6 | (static_cast<unsigned char>(text[++i]) & 0x3fU);
+      const bool valid = more > 0 && read == more &&
+                         letter >= (more == 3   ? 0x10000U
+                                    : more == 2 ? 0x800U
+                                                : 0x80U) &&
+                         letter < 0x110000 && (letter < 0xd800 || letter > 0xdfff);
+      if (!valid || quote == 0 || quote == '\'')
+        return Unexpected(fmt::format("{}: syntax: {}",
+                                      fixed_ ? source_ : fmt::format("{}:{}:{}", source_, line, column),
+                                      valid ? "a letter beyond ASCII, allowed: in comments and \"strings\""
+                                            : "not a letter of UTF-8, allowed: text in UTF-8"));
+      out += fmt::format("\\U{:08X}", letter);
+    }
+    return out;
   }
 
   static const Table* table_named(std::string_view name) {
@@ -391,6 +436,7 @@ std::string override_document(std::string_view text) {
 void settle(Scene& s) {
   s.servo.vision = s.vision.has_value();
   s.sim->position_scale = s.servo.mapping.position_scale;
+  s.sim->cells = s.servo.cells;
   if (s.vision) {
     s.vision->pixel_m = s.recorded          ? s.recorded->pixel_m
                         : s.sim->microscope ? s.sim->microscope->pixel_m
@@ -434,7 +480,7 @@ tl::expected<Scene, std::string> read_all(Scene scene, std::string_view text, st
 std::string number_text(double si, double mul, double div) {
   for (int digits = 1; digits <= 17; ++digits) {
     const std::string s = fmt::format("{:.{}g}", si * div / mul, digits);
-    if (std::stod(s) * mul / div == si) return s;
+    if (const double v = std::stod(s); v * mul / div == si) return fmt::format("{}", v);
   }
   // The product was rounded the other way: a neighbour reads back.
   double v = si * div / mul;

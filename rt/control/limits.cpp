@@ -79,11 +79,14 @@ StageLimits::Checked StageLimits::check(const hal::Vec3& wanted_m, const StageCo
   const double depth = m.depth_m(out.point_m);
   if (depth <= 0) return out;
   const double depth_here = std::max(m.depth_m(here), 0.0);
-  const double room = std::min(limits_.penetration_depth_m, m.chord_m(out.point_m) - limits_.far_wall_m);
-  double deepest = std::max(std::max(room, 0.0), depth_here);
+  const auto room = [&](const hal::Vec3& p) {
+    return std::max(std::min(limits_.penetration_depth_m, m.chord_m(p) - limits_.far_wall_m), 0.0);
+  };
+  const double excess = std::max(depth_here - room(here), 0.0);
+  double deepest = room(out.point_m) + excess;
   if (depth > deepest) out.alarms |= alarm_depth_limited;
   if (c.no_deeper && depth > depth_here) {
-    deepest = depth_here;
+    deepest = std::min(deepest, depth_here);
     out.alarms |= alarm_tip_force;
   }
   if (depth > deepest) {
@@ -128,6 +131,7 @@ const hal::StageCommand& StageLimits::step(const hal::StageCommand& target, cons
 
   // Position last: what momentum would carry across a limit stops at it.
   Checked next = check(here + velocity * dt_s, c);
+  alarms_ |= next.alarms;
   if ((next.point_m - here).norm() > limits_.stage_velocity_m_s * dt_s * (1 + 1e-9)) next.point_m = here;
   set_point_.tip_m = next.point_m;
   velocity_m_s_ = (next.point_m - here) / dt_s;

@@ -8,6 +8,9 @@
 #include <numbers>
 #include <vector>
 
+#include "hal/sim/area_raster.hpp"
+#include "hal/sim/blurred_layer.hpp"
+
 namespace punctum::sim {
 namespace {
 
@@ -18,7 +21,6 @@ constexpr double kMidGrey = 128;  // MicroscopeParams::noise is the deviation he
 // Disc of an objective of NA 0.37 in water, as a Gaussian of the same variance: px of blur per px of depth.
 constexpr double kDefocusSlope = 0.15;
 constexpr double kMaxBlur_px = 12;
-constexpr double kBlurReach = 3.5;  // half-width of the blur kernel in standard deviations
 
 constexpr double kFarAway_px = 1e6;  // anything further out is taken for absent
 
@@ -118,226 +120,6 @@ class NormalTable {
  private:
   static constexpr int kSlices = 4096;
   std::array<float, kSlices> value_{};
-};
-
-struct Pixel {
-  double x = 0;  // px, pixel centres at integers
-  double y = 0;
-};
-
-// A rectangle of pixels, half open.
-struct Box {
-  int x0 = 0;
-  int y0 = 0;
-  int x1 = 0;
-  int y1 = 0;
-  [[nodiscard]] int width() const noexcept { return x1 - x0; }
-  [[nodiscard]] int height() const noexcept { return y1 - y0; }
-  [[nodiscard]] bool empty() const noexcept { return x1 <= x0 || y1 <= y0; }
-  [[nodiscard]] Box meet(const Box& b) const noexcept {
-    return {std::max(x0, b.x0), std::max(y0, b.y0), std::min(x1, b.x1), std::min(y1, b.y1)};
-  }
-  [[nodiscard]] Box grown(int by) const noexcept { return {x0 - by, y0 - by, x1 + by, y1 + by}; }
-};
-
-Box box_of(std::span<const Pixel> line, double margin) noexcept {
-  double x0 = kFarAway_px;
-  double y0 = kFarAway_px;
-  double x1 = -kFarAway_px;
-  double y1 = -kFarAway_px;
-  for (const Pixel& p : line) {
-    x0 = std::min(x0, p.x);
-    x1 = std::max(x1, p.x);
-    y0 = std::min(y0, p.y);
-    y1 = std::max(y1, p.y);
-  }
-  return {static_cast<int>(std::floor(x0 - margin)), static_cast<int>(std::floor(y0 - margin)),
-          static_cast<int>(std::ceil(x1 + margin)) + 1, static_cast<int>(std::ceil(y1 + margin)) + 1};
-}
-
-double signed_area(std::span<const Pixel> line) noexcept {
-  double twice = 0;
-  for (std::size_t i = 0, j = line.size() - 1; i < line.size(); j = i++) {
-    twice += line[j].x * line[i].y - line[i].x * line[j].y;
-  }
-  return 0.5 * twice;
-}
-
-// Adds the exact area that a polygon covers of each pixel, as differences along the row (a running sum over
-// the row gives the coverage). Only the part inside the box counts; the polygon may reach anywhere.
-class AreaRaster {
- public:
-  void start(const Box& box) {
-    box_ = box;
-    stride_ = static_cast<std::size_t>(box.width()) + 2;
-    sum_.assign(stride_ * static_cast<std::size_t>(box.height()), 0.0F);
-  }
-  void add(std::span<const Pixel> polygon, double weight) noexcept {
-    const double w = signed_area(polygon) < 0 ? weight : -weight;
-    for (std::size_t i = 0, j = polygon.size() - 1; i < polygon.size(); j = i++) {
-      edge(polygon[j].x - box_.x0 + 0.5, polygon[j].y - box_.y0 + 0.5, polygon[i].x - box_.x0 + 0.5,
-           polygon[i].y - box_.y0 + 0.5, w);
-    }
-  }
-  [[nodiscard]] const float* row(int y) const noexcept {
-    return &sum_[static_cast<std::size_t>(y) * stride_];
-  }
-
- private:
-  void edge(double xa, double ya, double xb, double yb, double weight) noexcept {
-    if (ya == yb) return;
-    if (ya > yb) {
-      std::swap(xa, xb);
-      std::swap(ya, yb);
-      weight = -weight;
-    }
-    const double w = box_.width();
-    const double h = box_.height();
-    const double slope = (xb - xa) / (yb - ya);
-    const double y0 = std::max(ya, 0.0);
-    const double y1 = std::min(yb, h);
-    if (!(y0 < y1)) return;
-    double x0 = xa + (y0 - ya) * slope;
-    double x1 = xa + (y1 - ya) * slope;
-    // Cut where the edge crosses the left and right border; left of the box it counts as lying on the border.
-    std::array<double, 4> cut{y0, y1, y1, y1};
-    int cuts = 1;
-    for (const double border : {0.0, w}) {
-      if ((x0 < border) != (x1 < border)) {
-        cut[static_cast<std::size_t>(cuts++)] = std::clamp(ya + (border - xa) / slope, y0, y1);
-      }
-    }
-    if (cuts == 3 && cut[1] > cut[2]) std::swap(cut[1], cut[2]);
-    cut[static_cast<std::size_t>(cuts)] = y1;
-    for (int k = 0; k < cuts; ++k) {
-      const double p = cut[static_cast<std::size_t>(k)];
-      const double q = cut[static_cast<std::size_t>(k) + 1];
-      if (!(p < q)) continue;
-      const double xp = std::clamp(xa + (p - ya) * slope, 0.0, w);
-      const double xq = std::clamp(xa + (q - ya) * slope, 0.0, w);
-      inside(xp, p, xq, q, weight);
-    }
-  }
-
-  // 0 <= x <= width, 0 <= y0 < y1 <= height.
-  void inside(double x0, double y0, double x1, double y1, double weight) noexcept {
-    const double slope = (x1 - x0) / (y1 - y0);
-    const double w = box_.width();
-    const int last = std::min(static_cast<int>(std::ceil(y1)), box_.height());
-    double x = x0;
-    for (int y = static_cast<int>(y0); y < last; ++y) {
-      float* const a = &sum_[static_cast<std::size_t>(y) * stride_];
-      const double dy = std::min(y + 1.0, y1) - std::max(static_cast<double>(y), y0);
-      if (dy <= 0) continue;
-      const double next = std::clamp(x + slope * dy, 0.0, w);
-      const double d = dy * weight;
-      const double left = std::min(x, next);
-      const double right = std::max(x, next);
-      const int i0 = static_cast<int>(left);
-      const int i1 = std::max(static_cast<int>(std::ceil(right)), i0 + 1);
-      if (i1 == i0 + 1) {
-        const double mean = 0.5 * (left + right) - i0;
-        a[i0] += static_cast<float>(d * (1 - mean));
-        a[i0 + 1] += static_cast<float>(d * mean);
-      } else {
-        // Area right of the slanted edge in pixel i grows as the integral of the covered fraction.
-        const double per = d / (right - left);
-        double before = 0;
-        for (int i = i0; i < i1; ++i) {
-          const double l = std::max(left, static_cast<double>(i));
-          const double r = std::min(right, i + 1.0);
-          const double covered = per * (r - l) * (i + 1 - 0.5 * (l + r)) + per * (l - left);
-          a[i] += static_cast<float>(covered - before);
-          before = covered;
-        }
-        a[i1] += static_cast<float>(d - before);
-      }
-      x = next;
-    }
-  }
-
-  Box box_;
-  std::size_t stride_ = 0;
-  std::vector<float> sum_;
-};
-
-// Moves every point outwards along its normal.
-void offset(std::span<const Pixel> line, double outwards, std::vector<Pixel>& out) {
-  out.resize(line.size());
-  const double side = signed_area(line) < 0 ? -outwards : outwards;
-  double nx = 0;
-  double ny = 0;
-  const std::size_t n = line.size();
-  for (std::size_t i = 0; i < n; ++i) {
-    const Pixel& before = line[i == 0 ? n - 1 : i - 1];
-    const Pixel& after = line[i + 1 == n ? 0 : i + 1];
-    const double tx = after.x - before.x;
-    const double ty = after.y - before.y;
-    const double length = std::hypot(tx, ty);
-    if (length > 1e-9) {
-      nx = ty / length;
-      ny = -tx / length;
-    }
-    out[i] = {line[i].x + side * nx, line[i].y + side * ny};
-  }
-}
-
-// A picture of what is taken from the light, blurred on its own before it meets the others.
-struct Layer {
-  Box box;
-  std::vector<float> value;
-  std::vector<float> line;  // scratch of blur()
-  std::vector<float> kernel;
-
-  void start(const Box& b) {
-    box = b;
-    value.resize(static_cast<std::size_t>(b.width()) * static_cast<std::size_t>(b.height()));
-  }
-  [[nodiscard]] float* row(int y) noexcept {
-    return &value[static_cast<std::size_t>(y) * static_cast<std::size_t>(box.width())];
-  }
-
-  void blur(double sigma) {
-    const int reach = std::max(1, static_cast<int>(std::ceil(kBlurReach * sigma)));
-    kernel.resize(static_cast<std::size_t>(reach) + 1);
-    double total = 0;
-    for (int i = -reach; i <= reach; ++i) total += std::exp(-0.5 * i * i / (sigma * sigma));
-    for (int i = 0; i <= reach; ++i) {
-      kernel[static_cast<std::size_t>(i)] =
-          static_cast<float>(std::exp(-0.5 * i * i / (sigma * sigma)) / total);
-    }
-    const int w = box.width();
-    const int h = box.height();
-    const std::size_t uw = static_cast<std::size_t>(w);
-    // Down the columns, into `line` as a whole picture with the rows' ends padded by their last value.
-    const std::size_t padded = uw + 2 * static_cast<std::size_t>(reach);
-    line.resize(padded * static_cast<std::size_t>(h));
-    for (int y = 0; y < h; ++y) {
-      float* const to = &line[static_cast<std::size_t>(y) * padded];
-      float* const mid = to + reach;
-      const float* const c = row(y);
-      const float k0 = kernel[0];
-      for (int x = 0; x < w; ++x) mid[x] = k0 * c[x];
-      for (int i = 1; i <= reach; ++i) {
-        const float k = kernel[static_cast<std::size_t>(i)];
-        const float* const up = row(std::max(y - i, 0));
-        const float* const down = row(std::min(y + i, h - 1));
-        for (int x = 0; x < w; ++x) mid[x] += k * (up[x] + down[x]);
-      }
-      std::fill(to, mid, mid[0]);
-      std::fill(mid + w, mid + w + reach, mid[w - 1]);
-    }
-    for (int y = 0; y < h; ++y) {
-      float* const to = row(y);
-      const float* const mid = &line[static_cast<std::size_t>(y) * padded] + reach;
-      const float k0 = kernel[0];
-      for (int x = 0; x < w; ++x) to[x] = k0 * mid[x];
-      for (int i = 1; i <= reach; ++i) {
-        const float k = kernel[static_cast<std::size_t>(i)];
-        for (int x = 0; x < w; ++x) to[x] += k * (mid[x - i] + mid[x + i]);
-      }
-    }
-  }
 };
 
 // Granules of the ooplasm: band-passed noise, lit from one side, tiled; mean 0, deviation 1.
@@ -451,7 +233,7 @@ struct Microscope::Impl {
 
   AreaRaster levels;
   AreaRaster ooplasm;
-  Layer layer;
+  BlurredLayer layer;
   std::vector<Pixel> outer;
   std::vector<Pixel> inner;
   std::vector<Pixel> moved;
@@ -460,9 +242,20 @@ struct Microscope::Impl {
   Impl(const MicroscopeParams& p, const NeedleParams& n, const std::optional<HolderParams>& h,
        std::uint64_t s)
       : params(p), needle(n), holder(h), seed(s) {
+    const MicroscopeParams usual;
+    const auto finite = [](double& value, double low, double high, double otherwise) {
+      value = std::isfinite(value) ? std::clamp(value, low, high) : otherwise;
+    };
     params.width = std::clamp(params.width, 1, 16384);
     params.height = std::clamp(params.height, 1, 16384);
-    if (!(params.pixel_m > 0)) params.pixel_m = 0.825e-6;
+    params.impurities = std::clamp(params.impurities, 0, 10000);
+    finite(params.pixel_m, 1e-9, 1e-3, usual.pixel_m);
+    finite(params.fps, 1e-3, 1e6, usual.fps);
+    finite(params.psf_px, 0.2, kMaxBlur_px, usual.psf_px);
+    finite(params.defocus_m, -1, 1, 0);
+    finite(params.contrast, -kBackground, kBackground, usual.contrast);
+    finite(params.noise, 0, 1000, usual.noise);
+    finite(params.gradient, -2, 2, usual.gradient);
     picture = {0, 0, params.width, params.height};
     grain = make_grain(seed);
     lay_illumination();
@@ -494,9 +287,8 @@ struct Microscope::Impl {
 
   [[nodiscard]] double blur_px(double z_m) const noexcept {
     const double depth_px = (z_m + params.defocus_m) / params.pixel_m;
-    const double in_focus = std::clamp(params.psf_px, 0.2, kMaxBlur_px);
     if (!std::isfinite(depth_px)) return kMaxBlur_px;
-    return std::min(kMaxBlur_px, std::hypot(in_focus, kDefocusSlope * depth_px));
+    return std::min(kMaxBlur_px, std::hypot(params.psf_px, kDefocusSlope * depth_px));
   }
 
   // World frame, metres -> px. False: nothing that can be drawn.
@@ -812,7 +604,7 @@ struct Microscope::Impl {
 
   // Shot noise: its variance is proportional to the light.
   void expose(std::uint64_t frame_number, std::span<std::uint8_t> out) noexcept {
-    const float scale = static_cast<float>(std::max(params.noise, 0.0) / std::sqrt(kMidGrey));
+    const float scale = static_cast<float>(params.noise / std::sqrt(kMidGrey));
     const std::uint64_t key = mix(mix(seed ^ 0x5b07ULL) ^ frame_number);
     const int w = params.width;
     float* const g = noise_row.data();
@@ -844,7 +636,7 @@ struct Microscope::Impl {
     std::copy(base.begin(), base.end(), light.begin());
     if (scene.cell) draw_cell(*scene.cell);
     if (scene.needle) draw_needle(*scene.needle);
-    draw_impurities(static_cast<double>(frame_number) / std::max(params.fps, 1e-3));
+    draw_impurities(static_cast<double>(frame_number) / params.fps);
     expose(frame_number, out);
   }
 };

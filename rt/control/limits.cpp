@@ -9,6 +9,7 @@ namespace punctum::rt {
 namespace {
 
 constexpr double kTiltSpeed_rad_s = 0.5;  // of the approach axis
+constexpr double kAtLimit_m = 0.05e-6;    // nearer to a limit than this, the needle is said to be held by it
 // Part of the acceleration that the approach to a target plans with; the rest is for what it did not foresee.
 constexpr double kPlanned = 0.8;
 
@@ -54,7 +55,9 @@ StageLimits::Checked StageLimits::check(const hal::Vec3& wanted_m, const StageCo
   for (Eigen::Index i = 0; i < 3; ++i) {
     const double low = std::min(low_m_[i], here[i]);
     const double high = std::max(high_m_[i], here[i]);
-    if (out.point_m[i] < low || out.point_m[i] > high) out.alarms |= alarm_travel_limited;
+    if (out.point_m[i] < low + kAtLimit_m || out.point_m[i] > high - kAtLimit_m) {
+      out.alarms |= alarm_travel_limited;
+    }
     out.point_m[i] = std::clamp(out.point_m[i], low, high);
   }
 
@@ -84,7 +87,7 @@ StageLimits::Checked StageLimits::check(const hal::Vec3& wanted_m, const StageCo
   };
   const double excess = std::max(depth_here - room(here), 0.0);
   double deepest = room(out.point_m) + excess;
-  if (depth > deepest) out.alarms |= alarm_depth_limited;
+  if (depth > deepest - kAtLimit_m) out.alarms |= alarm_depth_limited;
   if (c.no_deeper && depth > depth_here) {
     deepest = std::min(deepest, depth_here);
     out.alarms |= alarm_tip_force;

@@ -43,7 +43,8 @@ LatchOutput SafetyLatch::step(const LatchInput& in, double dt_s) noexcept {
   out.hand_gain = hand.gain();
 
   // The drive brakes for at least a tick before its standstill is believed.
-  const bool at_rest = (in.at_standstill && s.since_s > 0) || s.since_s >= params_.power_off_after_s - kRounding_s;
+  const bool at_rest =
+      (in.at_standstill && s.since_s > 0) || s.since_s >= params_.power_off_after_s - kRounding_s;
   if (at_rest && s.hand == 0) s.stage = StopStage::stopped;
   out.drive_power = s.stage != StopStage::stopped;
   out.heartbeat = out.drive_power || !asks_for(s.cause, SafetyAction::heartbeat_off);

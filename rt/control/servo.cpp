@@ -17,6 +17,7 @@ constexpr double kSensorTau_s = 0.005;
 constexpr double kSensorTimeout_s = 0.1;
 constexpr double kSoftHysteresis = 0.9;    // of the soft tip-force limit
 constexpr double kForceScaleRate_1_s = 2;  // of the command force_scale
+constexpr double kRounding_s = 1e-9;
 constexpr int kCommandsPerTick = 8;
 
 [[nodiscard]] bool is_finite(const hal::Vec3& v) noexcept {
@@ -457,6 +458,7 @@ void Servo::latch(Fault cause) noexcept {
   if (stop_.cleared) {
     presence_.set(0);
     hand_force_N_.setZero();
+    force_before_stop_N_.setZero();
     if (hand_seen_ && (stage_seen_ || !devices_.stage)) anchor(stage_.tip_m, stage_.axis);
   } else if (latch_.stage() == StopStage::running) {
     hand_force_N_ = live_force_N_;
@@ -506,7 +508,7 @@ void Servo::write_devices() noexcept {
   if (hal::Injector* injector = devices_.injector) {
     const bool wanted = running && !ending() && config_.injector && phase() == Phase::injection &&
                         button(hal::kButtonInject) && hand_fresh_;
-    gate_open_ = wanted && injected_s_ + elapsed_s_ <= config_.injector->max_open_s;
+    gate_open_ = wanted && injected_s_ + elapsed_s_ <= config_.injector->max_open_s + kRounding_s;
     if (gate_open_) injected_s_ += elapsed_s_;
     injector->gate(gate_open_ && !stop_.gate_shut);
   }

@@ -303,7 +303,7 @@ std::string summary(const Scene& scene, const RunEnd& end, const Measures& m, co
   if (end.samples_lost > 0)
     line("recording", fmt::format("{} samples were overrun before they were read", end.samples_lost));
   if (end.rows_every > 1)
-    line("samples.csv", fmt::format("every {}th tick and every change of phase: a long run", end.rows_every));
+    line("samples.csv", fmt::format("one row for {} ticks, and every change of phase", end.rows_every));
   return s;
 }
 

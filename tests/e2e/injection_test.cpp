@@ -1,0 +1,144 @@
+// Whole injections: parent, core and vision.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tests/e2e/programs.hpp"
+
+namespace punctum::e2e {
+namespace {
+
+using Strings = std::vector<std::string>;
+const Strings kOrder = {"free", "contact", "indentation", "puncture", "injection", "withdrawal", "clear"};
+
+TEST_F(Programs, AnInjectionGoesThroughItsPhasesInOrder) {
+  for (const char* method : {"truth", "paper"}) {
+    ASSERT_EQ(punctum({"run", "icsi", "--clock", "virtual", "--set", std::string("vision.method=") + method}),
+              0)
+        << said_;
+    const auto r = json();
+    EXPECT_EQ(r["outcome"], "done");
+    EXPECT_EQ(phase_names(r), kOrder) << method;
+    EXPECT_EQ(r["cells"]["done"], 1);
+    EXPECT_EQ(r["cells"]["lost"], 0);
+    EXPECT_EQ(r["stale_observations"], 0);
+    EXPECT_LT(r["max_depth_um"], 90);
+    EXPECT_LT(r["peak_force_N"], 60e-6);
+    EXPECT_LT(std::abs(r["contact_delay_ms"].get<double>()), 500);
+    EXPECT_LT(std::abs(r["puncture_delay_ms"].get<double>()), 500);
+    EXPECT_GT(r["withdrawal_s"], 0);
+    EXPECT_LT(r["tremor_ratio"], 0.3);
+  }
+}
+
+TEST_F(Programs, TheSameSeedGivesTheSameBytesWithVisionInTheLoop) {
+  for (const char* method : {"truth", "paper"}) {
+    const Strings args{"run",     "icsi",
+                       "--clock", "virtual",
+                       "--seed",  "3",
+                       "--set",   std::string("vision.method=") + method,
+                       "--set",   "scene.seconds=12"};
+    (void)punctum(args, "a");
+    (void)punctum(args, "b");
+    const std::string a = read_all(fs::path(report("a")) / "samples.csv");
+    EXPECT_GT(a.size(), 1'000'000U);
+    EXPECT_TRUE(a == read_all(fs::path(report("b")) / "samples.csv")) << method;
+  }
+}
+
+TEST_F(Programs, EveryBuiltInCellSceneIsDoneWithTheTruthAsObserver) {
+  for (const char* scene : {"icsi", "zebrafish", "outer-only", "no-holder"}) {
+    EXPECT_EQ(punctum({"run", scene, "--clock", "virtual", "--set", "vision.method=truth"}), 0)
+        << scene << "\n"
+        << said_;
+    EXPECT_EQ(phase_names(json()), kOrder) << scene;
+  }
+}
+
+TEST_F(Programs, SeveralCellsAreInjectedOneAfterTheOther) {
+  ASSERT_EQ(punctum({"run", "icsi", "--clock", "virtual", "--set", "vision.method=truth", "--set",
+                     "scene.cells=3"}),
+            0)
+      << said_;
+  const auto r = json();
+  EXPECT_EQ(r["cells"]["done"], 3);
+  EXPECT_EQ(r["cell_list"].size(), 3U);
+}
+
+TEST_F(Programs, ATimeLimitBeforeTheTaskIsDoneIsNotAnEndThatIsWell) {
+  EXPECT_EQ(punctum({"run", "icsi", "--clock", "virtual", "--seconds", "3", "--set", "vision.method=truth"}),
+            1)
+      << said_;
+  EXPECT_EQ(json()["outcome"], "time limit");
+}
+
+// A vision process that hangs and is then killed, while the needle dents the cell.
+TEST_F(Programs, WhenVisionDiesTheForceFadesOnlyWithdrawalIsAcceptedAndTheTaskIsFinished) {
+  Running run(
+      {"run", "icsi", "--set", "vision.method=truth", "--report", report(), "--no-figure", "--no-frames"},
+      words());
+  Look look("icsi", run);
+  ASSERT_TRUE(look.until(rt::Phase::indentation)) << run.output();
+  std::this_thread::sleep_for(700ms);
+  const pid_t vision = look.vision();
+  ASSERT_GT(vision, 1);
+  kill(vision, SIGSTOP);
+  std::this_thread::sleep_for(1500ms);
+  kill(vision, SIGKILL);
+  EXPECT_EQ(run.wait(), 0) << run.output();
+  EXPECT_NE(run.output().find("vision was killed by signal 9"), std::string::npos) << run.output();
+  EXPECT_NE(run.output().find("vision restarted"), std::string::npos) << run.output();
+  const auto r = json();
+  EXPECT_EQ(r["outcome"], "done");
+  EXPECT_EQ(r["vision_restarts"].size(), 1U);
+  EXPECT_GE(r["stale_observations"], 1);
+  EXPECT_GT(r["alarms_s"]["vision_stale"], 0.5);
+
+  const Table t(fs::path(report()) / "samples.csv");
+  std::size_t seen = 0;
+  double deepest = -1, before = 0;
+  for (std::size_t i = 0; i < t.rows.size(); ++i) {
+    const bool stale = (static_cast<unsigned>(t.number(i, "alarms")) & rt::alarm_vision_stale) != 0 &&
+                       t.number(i, "t_s") > 1;
+    if (!stale) {
+      if (seen == 0) before = t.number(i, "membrane_N");
+      continue;
+    }
+    ++seen;
+    if (seen > 400) {  // the fade is over
+      EXPECT_EQ(t.number(i, "membrane_N"), 0) << t.text(i, "t_s");
+    }
+    const double inward = -t.number(i, "cmd_x_m");
+    if (seen > 1) {
+      EXPECT_LE(inward, deepest + 0.2e-6) << t.text(i, "t_s");
+    }
+    deepest = std::max(deepest, inward);
+    if (seen == 1) deepest = inward;
+  }
+  EXPECT_GT(seen, 500U);
+  EXPECT_GT(before, 0);
+}
+
+TEST_F(Programs, WhenTheCoreDiesInsideTheCellTheNeedleStopsAndTheSuctionHolds) {
+  Running run(
+      {"run", "icsi", "--set", "vision.method=truth", "--report", report(), "--no-figure", "--no-frames"},
+      words());
+  Look look("icsi", run);
+  ASSERT_TRUE(look.until(rt::Phase::indentation)) << run.output();
+  kill(look.core(), SIGKILL);
+  EXPECT_EQ(run.wait(), 3) << run.output();
+  const auto u = json()["unattended"];
+  EXPECT_TRUE(u["safe"]);
+  EXPECT_TRUE(u["vacuum_kept"]);
+  EXPECT_TRUE(u["cell_held"]);
+  EXPECT_LT(u["stage_moved_um"], 5);
+}
+
+TEST_F(Programs, VisionThatCannotStartEndsTheRunInOneLine) {
+  EXPECT_EQ(punctum({"run", "recorded", "--seconds", "2", "--set", "camera.frames=/nowhere"}), 2) << said_;
+  EXPECT_NE(said_.find("/nowhere"), std::string::npos) << said_;
+}
+
+}  // namespace
+}  // namespace punctum::e2e

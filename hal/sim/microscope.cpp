@@ -332,13 +332,14 @@ struct Microscope::Impl {
     Pixel mouth;
     const double outer_px = holder->outer_radius_m / params.pixel_m;
     const double bore_px = std::min(holder->inner_radius_m, 0.9 * holder->outer_radius_m) / params.pixel_m;
-    if (!to_px(mouth_m.x(), mouth_m.y(), mouth) || !(outer_px > 1) || !(bore_px >= 0)) return;
+    if (!to_px(mouth_m.x(), mouth_m.y(), mouth) || !(outer_px > 1 && outer_px < kFarAway_px) ||
+        !(bore_px >= 0))
+      return;
     const double sigma = blur_px(mouth_m.z());
     const int margin = static_cast<int>(std::ceil(kBlurReach * sigma)) + 4;
-    const Box reach{-margin - 1,
-                    static_cast<int>(std::floor(mouth.y - std::min(outer_px, kFarAway_px))) - margin,
+    const Box reach{-margin - 1, static_cast<int>(std::floor(mouth.y - outer_px)) - margin,
                     static_cast<int>(std::ceil(mouth.x)) + margin,
-                    static_cast<int>(std::ceil(mouth.y + std::min(outer_px, kFarAway_px))) + margin};
+                    static_cast<int>(std::ceil(mouth.y + outer_px)) + margin};
     const Box box = reach.meet(picture.grown(margin));
     if (box.empty()) return;
     layer.start(box);
@@ -614,9 +615,9 @@ struct Microscope::Impl {
       const float* const from = &light[index(0, y)];
       std::uint8_t* const to = &out[index(0, y)];
       for (int x = 0; x < w; ++x) {
-        const float clean = std::max(from[x], 0.0F);
+        const float clean = std::max(0.0F, from[x]);  // in this order, what is no number becomes 0
         const float value = clean + scale * std::sqrt(clean) * g[x] + 0.5F;
-        to[x] = static_cast<std::uint8_t>(static_cast<std::int32_t>(std::min(std::max(value, 0.0F), 255.0F)));
+        to[x] = static_cast<std::uint8_t>(static_cast<std::int32_t>(std::min(255.0F, std::max(0.0F, value))));
       }
     }
   }

@@ -76,7 +76,7 @@ void World::step(std::int64_t to_ns) noexcept {
 void World::step_piece(std::int64_t to_ns) noexcept {
   const double from_s = seconds(t_ns_);
   const double to_s = seconds(to_ns);
-  const double dt_s = to_s - from_s;
+  const double dt_s = static_cast<double>(to_ns - t_ns_) * 1e-9;
   const auto failure = failures_at(config_, bench_ != nullptr ? &bench_->failures : nullptr, to_s);
   const auto of = [&failure](Device d) { return failure[static_cast<std::size_t>(d)]; };
   std::copy(failure.begin(), failure.end(), snapshot_.failure.begin());

@@ -1,29 +1,13 @@
 #include <gtest/gtest.h>
 
-#include <atomic>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <memory>
-#include <new>
 #include <vector>
 
 #include "hal/sim/truth.hpp"
-#include "hal/sim/virtual_clock.hpp"
 #include "hal/sim/world.hpp"
-
-namespace {
-std::atomic<std::uint64_t> g_allocations{0};
-}  // namespace
-
-[[gnu::noinline]] void* operator new(std::size_t size) {
-  g_allocations.fetch_add(1, std::memory_order_relaxed);
-  void* p = std::malloc(size);  // NOLINT
-  if (p == nullptr) throw std::bad_alloc();
-  return p;
-}
-[[gnu::noinline]] void operator delete(void* p) noexcept { std::free(p); }               // NOLINT
-[[gnu::noinline]] void operator delete(void* p, std::size_t) noexcept { std::free(p); }  // NOLINT
+#include "rt/platform/allocation_trap.hpp"
 
 namespace punctum::sim {
 namespace {
@@ -181,12 +165,12 @@ TEST(World, NeitherAllocatesNorGrowsInATick) {
   LeastCore core(config, *world);
   world->step(kTick_ns);
   core.tick();
-  const std::uint64_t before = g_allocations.load();
+  rt::allocation_trap::arm(rt::allocation_trap::On::allocation_count);
   for (std::int64_t k = 2; k <= 40'000; ++k) {
     world->step(k * kTick_ns);
     core.tick();
   }
-  EXPECT_EQ(g_allocations.load(), before);
+  EXPECT_EQ(rt::allocation_trap::disarm(), 0U);
   EXPECT_EQ(bench->snapshots.head(), 40'000U);
 }
 

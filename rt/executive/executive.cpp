@@ -76,7 +76,7 @@ After Executive::run_slots(Tick& tick) noexcept {
 
 Executive::Ended Executive::run(const std::atomic<bool>& stop) noexcept {
   if (!valid()) return Ended::invalid;
-  start_ns_ = clock_.now_ns() + config_.period_ns;
+  start_ns_ = config_.start_ns ? *config_.start_ns : clock_.now_ns() + config_.period_ns;
   announce();
 
   std::uint64_t planned = 0;

@@ -6,6 +6,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "hal/devices.hpp"
@@ -49,6 +50,7 @@ template <auto Method, class Self>
 
 struct ExecutiveConfig {
   std::int64_t period_ns = 1'000'000;         // of the base tick
+  std::optional<std::int64_t> start_ns = {};  // release of tick 0; none: one period after run() begins
   std::uint32_t overrun_window_ticks = 1000;  // 1 .. MissedWindow::kMaxTicks
 };
 
@@ -64,7 +66,7 @@ class Executive {
   // Whole divisors and offsets, no empty slot, not too many, a period above zero.
   [[nodiscard]] bool valid() const noexcept;
 
-  // The loop. Tick 0 is released one period from now. A stop flag ends it before the slots of the next tick.
+  // The loop. A stop flag ends it before the slots of the next tick.
   Ended run(const std::atomic<bool>& stop) noexcept;
 
  private:

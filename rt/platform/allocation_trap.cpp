@@ -20,7 +20,7 @@
 #include <cstring>
 #include <initializer_list>
 
-// glibc's allocator under its second name.
+// glibc's allocator under its second name. NOLINTBEGIN(bugprone-reserved-identifier)
 extern "C" {
 void* __libc_malloc(std::size_t size) noexcept;
 void* __libc_calloc(std::size_t count, std::size_t size) noexcept;
@@ -28,6 +28,7 @@ void* __libc_realloc(void* block, std::size_t size) noexcept;
 void* __libc_memalign(std::size_t alignment, std::size_t size) noexcept;
 void __libc_free(void* block) noexcept;
 }
+// NOLINTEND(bugprone-reserved-identifier)
 
 namespace punctum::rt::allocation_trap {
 namespace {

@@ -118,7 +118,7 @@ std::string first_failure(const Mutation& mutation) {
   return "";
 }
 
-Mutation weaken(std::function<bool(const Access&)> which) {
+Mutation weaken(const std::function<bool(const Access&)>& which) {
   return {.before = [which](Access& a) {
     if (which(a)) a.order = std::memory_order_relaxed;
   }};

@@ -18,6 +18,7 @@
 #include "rt/executive/monotonic_clock.hpp"
 #include "rt/platform/real_time_rights.hpp"
 
+// Calling the heap by hand is the subject here. NOLINTBEGIN(cppcoreguidelines-no-malloc)
 namespace punctum::rt {
 namespace {
 
@@ -165,3 +166,4 @@ TEST_F(AllocationTrapTest, TheExecutiveMakesNoHeapCallAndTakesNoPageFault) {
 
 }  // namespace
 }  // namespace punctum::rt
+// NOLINTEND(cppcoreguidelines-no-malloc)

@@ -73,6 +73,15 @@ TEST_F(ExecutiveTest, TicksAreReleasedOnTheGridFromOnePeriodAfterTheStart) {
   EXPECT_EQ(status->start_ns.load(), static_cast<std::uint64_t>(6 * kMs));
 }
 
+TEST_F(ExecutiveTest, TheGridBeginsWhereItIsToldToEvenIfThatHasPassed) {
+  Work work{.clock = &clock, .end_at = 3};
+  run({slot<&Work::run>("servo", work)}, {.start_ns = 100 * kMs});
+  EXPECT_EQ(work.ticks[0].release_ns, 100 * kMs);
+  work = {.clock = &clock, .end_at = 5};
+  run({slot<&Work::run>("servo", work)}, {.start_ns = clock.now - 3 * kMs - 1});
+  EXPECT_EQ(work.indices(), (Indices{3, 4, 5})) << "what passed before the loop is missed, too";
+}
+
 TEST_F(ExecutiveTest, OnAVirtualClockTheWakeUpLatencyIsZero) {
   Work work{.clock = &clock, .end_at = 99};
   run({slot<&Work::run>("servo", work)});

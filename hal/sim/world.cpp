@@ -31,7 +31,7 @@ World::World(const SimConfig& config, Bench* bench, std::int64_t start_ns)
   HandPlantState hand = hand_.state();
   hand.position_m = person_.state().shaken_m;
   hand_.restore(hand);
-  touch(stage_.state(), 0);
+  step_piece(start_ns);  // of no length: every device has a first reading
   take_snapshot();
 }
 
@@ -59,7 +59,8 @@ PersonView World::view() const noexcept {
 }
 
 void World::step(std::int64_t to_ns) noexcept {
-  if (to_ns <= t_ns_) return;
+  const bool first = snapshot_.tick == 0;  // it may fall on the start itself
+  if (to_ns < t_ns_ || (to_ns == t_ns_ && !first)) return;
   // Pieces no longer than a millisecond; after a long halt of the process fewer, longer ones.
   const std::int64_t piece_ns = std::max(kPiece_ns, (to_ns - t_ns_) / kMostPieces);
   while (t_ns_ < to_ns) step_piece(std::min(to_ns, t_ns_ + piece_ns));

@@ -110,16 +110,21 @@ std::optional<ContourError> read_contour_error(const std::string& obs_csv) {
 }
 
 std::string missing_rights(const rt::CoreStatus& core) {
-  std::string text;
+  std::string missing, advice;
   for (const auto* r : rights(core)) {
     if (r->got != 0) continue;
-    text += fmt::format("\n  {} {:<18} {}{}", r->required != 0 ? "missing" : "advice ", r->name.text,
-                        r->detail.text,
-                        r->remedy.text[0] != '\0' ? fmt::format("\n{:30}{}", "", r->remedy.text) : "");
+    if (r->required == 0) {
+      advice += fmt::format("{}{}", advice.empty() ? "" : ", ", r->name.text);
+      continue;
+    }
+    missing += fmt::format("\n  {:<18} {}", r->name.text, r->detail.text);
+    if (r->remedy.text[0] != '\0') missing += fmt::format("\n{:21}get it: {}", "", r->remedy.text);
   }
-  return text.empty()
-             ? text
-             : "DEGRADED: the core runs without these real-time rights; its timing proves nothing" + text;
+  if (missing.empty()) return missing;
+  std::string text =
+      "DEGRADED: these real-time rights are missing, so the timing of this run proves nothing" + missing;
+  if (!advice.empty()) text += "\n  also advisable: " + advice + " (punctum check tells how)";
+  return text;
 }
 
 tl::expected<void, std::string> write_report(const std::string& path, const Scene& scene, const RunEnd& end,
@@ -294,7 +299,7 @@ std::string summary(const Scene& scene, const RunEnd& end, const Measures& m, co
              core.minor_faults.load(), core.major_faults.load()));
   std::string alarms;
   for (std::size_t i = 0; i < std::size(kAlarms); ++i)
-    if (m.alarm_ticks[i] > 0 && (1U << i) != rt::alarm_degraded)
+    if (part_of_limit(m, m.alarm_ticks[i]) >= 0.005 && (1U << i) != rt::alarm_degraded)
       alarms += fmt::format("{}{} {:.2f} s", alarms.empty() ? "" : ", ", kAlarms[i],
                             part_of_limit(m, m.alarm_ticks[i]));
   if (!alarms.empty()) line("alarms", alarms);

@@ -161,6 +161,43 @@ std::string explain_keys(const Scene& scene) {
   return out;
 }
 
+tl::expected<std::string, std::string> files_of(const Scene& s) {
+  std::string found;
+  if (s.recorded) {
+    std::error_code ec;
+    const std::string& f = s.recorded->frames;
+    std::size_t n = 0;
+    bool readable = false;
+    if (fs::is_directory(f, ec)) {
+      for (auto it = fs::directory_iterator(f, ec); !ec && it != fs::directory_iterator(); it.increment(ec))
+        n += it->is_regular_file(ec) ? 1U : 0U;
+      readable = access(f.c_str(), R_OK | X_OK) == 0;
+    } else {
+      glob_t matches{};
+      if (glob(f.c_str(), 0, nullptr, &matches) == 0) {
+        n = matches.gl_pathc;
+        readable = n > 0 && access(matches.gl_pathv[0], R_OK) == 0;
+      }
+      globfree(&matches);
+    }
+    if (n == 0)
+      return tl::unexpected(fmt::format(
+          "camera.frames: {}: nothing there, allowed: a folder of pictures, a glob or a video file", f));
+    if (!readable)
+      return tl::unexpected(fmt::format("camera.frames: {}: cannot be read, check its permissions", f));
+    found = fmt::format("{}: {} file(s)", f, n);
+  }
+  if (s.vision && s.vision->holder && !s.vision->holder->template_path.empty()) {
+    const std::string& f = s.vision->holder->template_path;
+    std::error_code ec;
+    if (!fs::is_regular_file(f, ec) || access(f.c_str(), R_OK) != 0)
+      return tl::unexpected(
+          fmt::format("vision.holder.template: {}: cannot be read, allowed: a picture of the pipette", f));
+    found += (found.empty() ? "" : ", ") + f;
+  }
+  return found;
+}
+
 int check(const Scene& s, std::string& text) {
   bool good = true;
   const auto row = [&text](bool ok, const std::string& what, const std::string& detail) {
@@ -175,29 +212,9 @@ int check(const Scene& s, std::string& text) {
            good;
   }
   if (s.sim) row(true, "devices", "all simulated: no actuator is there to touch");
-  if (s.recorded) {
-    std::error_code ec;
-    const auto& f = s.recorded->frames;
-    std::string detail = f;
-    bool there = false;
-    if (fs::is_directory(f, ec)) {
-      std::size_t n = 0;
-      for (auto it = fs::directory_iterator(f, ec); !ec && it != fs::directory_iterator(); it.increment(ec))
-        n += it->is_regular_file(ec) ? 1U : 0U;
-      there = n > 0 && access(f.c_str(), R_OK) == 0;
-      detail += fmt::format(": {} files", n);
-    } else {
-      glob_t found{};
-      there = glob(f.c_str(), 0, nullptr, &found) == 0 && found.gl_pathc > 0 &&
-              access(found.gl_pathv[0], R_OK) == 0;
-      detail += there ? fmt::format(": {} files", found.gl_pathc) : ": no such folder, glob or video";
-      globfree(&found);
-    }
-    good = row(there, "camera.frames", detail) && good;
-  }
-  if (s.vision && s.vision->holder && !s.vision->holder->template_path.empty()) {
-    const auto& f = s.vision->holder->template_path;
-    good = row(access(f.c_str(), R_OK) == 0, "vision.holder", f) && good;
+  if (s.recorded || (s.vision && s.vision->holder && !s.vision->holder->template_path.empty())) {
+    const auto files = files_of(s);
+    good = row(files.has_value(), "files", files ? *files : files.error()) && good;
   }
   struct statvfs shm {};
   const bool shm_ok = statvfs("/dev/shm", &shm) == 0 && access("/dev/shm", W_OK | X_OK) == 0;

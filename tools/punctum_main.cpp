@@ -84,6 +84,7 @@ int main_or_throw(int argc, char** argv) {
     fmt::print("{}", text);
     return code;
   }
+  if (const auto files = files_of(*scene); !files) return bad(files.error());
   settings.frames = !no_frames;
   settings.figure = !no_figure;
   return run_scene(*scene, settings);

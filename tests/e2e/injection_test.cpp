@@ -135,9 +135,14 @@ TEST_F(Programs, WhenTheCoreDiesInsideTheCellTheNeedleStopsAndTheSuctionHolds) {
   EXPECT_LT(u["stage_moved_um"], 5);
 }
 
-TEST_F(Programs, VisionThatCannotStartEndsTheRunInOneLine) {
-  EXPECT_EQ(punctum({"run", "recorded", "--seconds", "2", "--set", "camera.frames=/nowhere"}), 2) << said_;
-  EXPECT_NE(said_.find("/nowhere"), std::string::npos) << said_;
+TEST_F(Programs, VisionThatCannotReadItsFramesEndsTheRunAsBadInput) {
+  fs::create_directory(folder_ / "frames");
+  std::ofstream(folder_ / "frames" / "1.png") << "no picture";
+  EXPECT_EQ(punctum({"run", "recorded", "--seconds", "5", "--set",
+                     "camera.frames=" + (folder_ / "frames").string()}),
+            2)
+      << said_;
+  EXPECT_NE(said_.find("1.png"), std::string::npos) << said_;
 }
 
 }  // namespace

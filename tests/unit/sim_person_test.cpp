@@ -20,7 +20,8 @@ TEST(Person, MovesByTheMinimumJerkProfile) {
   EXPECT_EQ(minimum_jerk_rate(0.5), 1.875);
   EXPECT_EQ(minimum_jerk_rate(0), 0);
   EXPECT_EQ(minimum_jerk_rate(1), 0);
-  for (double x = 0.01; x < 1; x += 0.01) {  // against a difference quotient of the profile
+  for (int i = 1; i < 100; ++i) {  // against a difference quotient of the profile
+    const double x = 0.01 * i;
     EXPECT_NEAR((minimum_jerk(x + 1e-6) - minimum_jerk(x - 1e-6)) / 2e-6, minimum_jerk_rate(x), 1e-8);
   }
 }
@@ -30,7 +31,8 @@ double part_in_band(const std::vector<double>& y, double rate_Hz, double low_Hz,
   const double n = static_cast<double>(y.size());
   double inside = 0;
   double all = 0;
-  for (double f = rate_Hz / n; f < 40; f += rate_Hz / n) {
+  for (int k = 1; k * rate_Hz / n < 40; ++k) {
+    const double f = k * rate_Hz / n;
     std::complex<double> sum = 0;
     const std::complex<double> turn = std::polar(1.0, -2 * std::numbers::pi * f / rate_Hz);
     std::complex<double> phase = 1;

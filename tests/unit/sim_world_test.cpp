@@ -174,6 +174,24 @@ TEST(World, NeitherAllocatesNorGrowsInATick) {
   EXPECT_EQ(bench->snapshots.head(), 40'000U);
 }
 
+TEST(World, MayHaveItsFirstTickAtTheStartItself) {
+  const SimConfig config = whole_station();
+  const auto bench = std::make_unique<Bench>();
+  World world(config, bench.get(), 7 * kTick_ns);
+  world.step(7 * kTick_ns);
+  EXPECT_EQ(world.snapshot().tick, 1U);
+  EXPECT_EQ(bench->exposed.load(), 1U);
+  hal::HandState hand;
+  hal::StageState stage;
+  hal::EstopState chain;
+  EXPECT_EQ(world.hand().read(hand), hal::Status::ok);
+  EXPECT_EQ(world.stage().read(stage), hal::Status::ok);
+  EXPECT_EQ(world.estop().read(chain), hal::Status::ok);
+  world.step(7 * kTick_ns);  // no time has passed
+  world.step(6 * kTick_ns);
+  EXPECT_EQ(bench->snapshots.head(), 1U);
+}
+
 TEST(World, ExposesAtTheFirstTickOfEachFramesTime) {
   SimConfig config = whole_station();
   config.microscope->fps = 30;

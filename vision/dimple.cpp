@@ -1,6 +1,7 @@
 #include "vision/dimple.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <opencv2/core.hpp>
@@ -98,39 +99,41 @@ std::optional<double> half_width(const std::vector<ProfilePoint>& profile, doubl
   if (!(wd > 0) || !(c > 0) || !(R > 2 * c)) {
     return std::nullopt;
   }
-  const auto shape = [c](double r, double a0) {
-    const auto f = [a0](double x) { return std::log(a0 / x) - (a0 * a0 - x * x) / (2 * a0 * a0); };
-    return r >= a0 ? 0 : r <= c ? 1 : f(r) / f(c);
-  };
-  double best = 0, best_cost = 0;
-  int used = 0;
-  for (double a0 = 1.3 * c; a0 < 1.2 * R; a0 *= 1.02) {
-    double cost = 0;
-    int n = 0;
+  // Each side by itself, outwards from the needle: medians in bins of lateral distance.
+  double sum = 0;
+  int sides = 0;
+  for (const double side : {-1.0, 1.0}) {
+    constexpr int kBins = 40;
+    std::array<std::vector<double>, kBins> bin;
+    const double reach = 0.995 * R;
     for (const ProfilePoint& p : profile) {
-      const double r = std::abs(p.u);
-      if (r < 1.2 * c || r > 0.85 * R) {
-        continue;
+      const double u = side * p.u;
+      if (u > 1.2 * c && u < reach) {
+        bin[static_cast<std::size_t>(u / reach * kBins)].push_back(p.depth);
       }
-      const double e = (p.depth - wd * shape(r, a0)) / (0.05 * wd + 0.3);
-      cost += e * e / (1 + e * e);
-      ++n;
     }
-    used = n;
-    if (best <= 0 || cost < best_cost) {
-      best = a0;
-      best_cost = cost;
+    std::vector<double> us, depths;
+    for (int i = 0; i < kBins; ++i) {
+      auto& b = bin[static_cast<std::size_t>(i)];
+      if (!b.empty()) {
+        std::nth_element(b.begin(), b.begin() + static_cast<std::ptrdiff_t>(b.size() / 2), b.end());
+        us.push_back((i + 0.5) * reach / kBins);
+        depths.push_back(b[b.size() / 2]);
+      }
+    }
+    const double level = 0.01 * wd;
+    for (std::size_t i = 1; i < us.size(); ++i) {
+      if (depths[i] < level && depths[i - 1] >= level) {
+        sum += us[i - 1] + (us[i] - us[i - 1]) * (depths[i - 1] - level) / (depths[i - 1] - depths[i]);
+        ++sides;
+        break;
+      }
     }
   }
-  if (used < 8 || best <= 1.3 * c) {
+  if (sides == 0) {
     return std::nullopt;
   }
-  double lo = c, hi = best;  // where the fitted profile has fallen to 1 %
-  for (int i = 0; i < 50; ++i) {
-    const double mid = 0.5 * (lo + hi);
-    (shape(mid, best) > 0.01 ? lo : hi) = mid;
-  }
-  return 0.5 * (lo + hi);
+  return sum / sides;
 }
 
 }  // namespace punctum::vision

@@ -31,9 +31,8 @@ struct ProfilePoint {
 [[nodiscard]] std::vector<ProfilePoint> depth_profile(const Contour& contour, const Contour& shape,
                                                       const Point& entry, const Point& axis, double reach);
 
-// a: half-width at which the depth has fallen to 1 % of wd. The profile of eq. 5's membrane,
-// w(r) = k [ln(a0/r) - (a0^2 - r^2) / (2 a0^2)], is fitted with w(c) = wd; where it has fallen to 1 % is
-// returned.
+// a: half-width at which the depth has fallen to 1 % of wd, mean of both sides; c: the needle's radius, R:
+// the cell's.
 [[nodiscard]] std::optional<double> half_width(const std::vector<ProfilePoint>& profile, double wd, double c,
                                                double R);
 

@@ -17,7 +17,8 @@ std::string HoldingPipette::cut_template(const cv::Mat& grey, const TubeTrace& t
   GradientField field;
   field.compute(grey, cv::Rect(0, 0, grey.cols, grey.rows), 1.2);
   Point mouth = tube.end();
-  if (const auto s = end_face(field, mouth, tube.axis, 0.8 * tube.end_half_width, 10, noise)) {
+  if (const auto s = end_face(field, mouth, tube.axis, 0.6 * tube.end_half_width,
+                              std::clamp(0.4 * tube.end_half_width, 8.0, 25.0), noise)) {
     mouth += *s * tube.axis;
   }
   // Mostly tube and little of the cell, which is dented and moves on its own.

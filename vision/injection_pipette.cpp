@@ -1,6 +1,7 @@
 #include "vision/injection_pipette.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
@@ -33,7 +34,7 @@ bool InjectionPipette::start(const GradientField& field, const cv::Mat& grey, do
     if (side_ != Side::automatic && s != side_) {
       continue;
     }
-    const auto t = trace_tube(field, s, 3, width_max, noise);
+    const auto t = trace_narrow_tube(field, s, 3, width_max, noise);
     if (t && t->clarity > 0.5 && t->likeness > 0.5 && t->length > 12 &&
         (!best || t->clarity * t->likeness > best->clarity * best->likeness)) {
       best = t;
@@ -48,13 +49,17 @@ bool InjectionPipette::start(const GradientField& field, const cv::Mat& grey, do
   last_.half_width = best->end_half_width;
   last_.taper = std::clamp((best->half_width - best->end_half_width) / std::max(best->length, 1.0), 0.0, 0.2);
   last_.tip = best->end();
-  if (const auto s = end_face(field, last_.tip, last_.axis, 0.9 * last_.half_width, 9, noise)) {
-    last_.tip += *s * last_.axis;
+  for (int round = 0; round < 3; ++round) {
+    fit_edges(field, noise, last_);
+    if (const auto s = walls_end(field, last_, std::min(30.0, 0.5 * best->length), round == 0 ? 25 : 10)) {
+      last_.tip += *s * last_.axis;
+    }
   }
-  fit_edges(field, noise, last_);
-  if (const auto s = end_face(field, last_.tip, last_.axis, 0.9 * last_.half_width, 4, noise)) {
-    last_.tip += *s * last_.axis;
-  }
+  step_sign_ = 0;
+  end_offset_ = 0.15 * last_.half_width;
+  offset_frames_ = 0;
+  calibrate_end(field, last_, noise);
+  last_.tip += end_offset_ * last_.axis;
   if (!cut(grey, last_.tip)) {
     why_ = "tip too close to the border";
     return false;
@@ -91,9 +96,16 @@ void InjectionPipette::fit_edges(const GradientField& field, double noise, Needl
     }
     int best = -1;
     for (int k = 1; k < 12; ++k) {
-      if (g[k] > top && g[k] >= g[k - 1] && g[k] >= g[k + 1]) {
-        top = g[k];
+      if (g[k] >= g[k - 1] && g[k] >= g[k + 1]) {
+        top = std::max(top, g[k]);
+      }
+    }
+    // The outermost of the strong ones: a wall has two faces.
+    for (int q = 1; q < 12; ++q) {
+      const int k = u0 > 0 ? 12 - q : q;
+      if (g[k] >= g[k - 1] && g[k] >= g[k + 1] && g[k] >= 0.5 * top) {
         best = k;
+        break;
       }
     }
     if (best < 0 || top < floor) {
@@ -155,6 +167,123 @@ void InjectionPipette::fit_edges(const GradientField& field, double noise, Needl
   }
 }
 
+std::optional<double> InjectionPipette::wall_step(const GradientField& field, const NeedleFix& fix,
+                                                  double reach, double floor) const {
+  constexpr double kStep = 0.25;
+  const int n = 2 * static_cast<int>(reach / kStep) + 1;
+  std::vector<double> g(static_cast<std::size_t>(n), 0.0);
+  for (int i = 0; i < n; ++i) {
+    const double ahead = (i - n / 2) * kStep;
+    double e = 0;
+    for (const double u : {-0.95, -0.8, -0.65, 0.65, 0.8, 0.95}) {
+      e += field.gradient(fix.at(-ahead, u * fix.half_width)).dot(fix.axis) / 6;
+    }
+    g[static_cast<std::size_t>(i)] = step_sign_ == 0 ? std::abs(e) : step_sign_ * e;
+  }
+  int best = -1;
+  for (int i = 1; i + 1 < n; ++i) {
+    const std::size_t k = static_cast<std::size_t>(i);
+    if (g[k] > floor && g[k] >= g[k - 1] && g[k] >= g[k + 1] &&
+        (best < 0 || g[k] > g[static_cast<std::size_t>(best)])) {
+      best = i;
+    }
+  }
+  if (best < 0) {
+    return std::nullopt;
+  }
+  const std::size_t k = static_cast<std::size_t>(best);
+  const double den = g[k - 1] - 2 * g[k] + g[k + 1];
+  return (best - n / 2 + (den < -1e-12 ? std::clamp(0.5 * (g[k - 1] - g[k + 1]) / den, -0.5, 0.5) : 0.0)) *
+         kStep;
+}
+
+std::optional<double> InjectionPipette::walls_end(const GradientField& field, const NeedleFix& fix,
+                                                  double back, double ahead) const {
+  // Cross profiles in units of the half-width, without mean and slope: a membrane that the needle meets
+  // head-on is even across it and drops out. How much of the shaft's own profile each station holds:
+  constexpr int kLanes = 21;
+  constexpr double kReach = 1.5;  // half-widths
+  const auto profile = [&](double s, std::array<double, kLanes>& v) {
+    const double w = fix.half_width_at(s);
+    double mean = 0, tilt = 0;
+    for (int i = 0; i < kLanes; ++i) {
+      const double x = (2.0 * i / (kLanes - 1) - 1) * kReach;
+      const Point p = fix.at(s, x * w);
+      if (p.x < field.area.x + 1 || p.y < field.area.y + 1 || p.x > field.area.x + field.area.width - 2 ||
+          p.y > field.area.y + field.area.height - 2) {
+        return false;
+      }
+      v[static_cast<std::size_t>(i)] = field.grey(p);
+      mean += v[static_cast<std::size_t>(i)] / kLanes;
+    }
+    double xx = 0;
+    for (int i = 0; i < kLanes; ++i) {
+      const double x = 2.0 * i / (kLanes - 1) - 1;
+      tilt += x * v[static_cast<std::size_t>(i)];
+      xx += x * x;
+    }
+    for (int i = 0; i < kLanes; ++i) {
+      const double x = 2.0 * i / (kLanes - 1) - 1;
+      v[static_cast<std::size_t>(i)] -= mean + tilt / xx * x;
+    }
+    return true;
+  };
+  std::array<double, kLanes> shaft{}, v{};
+  int stations = 0;
+  for (double s = back + 2; s < back + 60; s += 1) {
+    if (profile(s, v)) {
+      ++stations;
+      for (std::size_t i = 0; i < kLanes; ++i) {
+        shaft[i] += v[i];
+      }
+    }
+  }
+  double norm2 = 0;
+  for (double x : shaft) {
+    norm2 += x * x;
+  }
+  if (stations < 5 || norm2 < 1e-6) {
+    return std::nullopt;
+  }
+  constexpr double kStep = 0.5;
+  std::vector<double> held, place;  // place: distance ahead of fix.tip
+  for (double s = back; s >= -ahead; s -= kStep) {
+    if (!profile(s, v)) {
+      break;
+    }
+    double dot = 0;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      dot += v[i] * shaft[i];
+    }
+    held.push_back(dot * stations / norm2);
+    place.push_back(-s);
+  }
+  // Change point of (held - 0.22): beyond it the pattern is not there.
+  double sum = 0, top = -1;
+  std::size_t last = 0;
+  for (std::size_t i = 0; i < held.size(); ++i) {
+    sum += std::clamp(held[i], -0.3, 0.6) - 0.22;
+    if (sum > top) {
+      top = sum;
+      last = i;
+    }
+  }
+  if (last < 8 || last + 4 >= held.size()) {
+    return std::nullopt;
+  }
+  // Half of what it was just before: blur moves neither side of a step.
+  std::vector<double> near(held.begin() + static_cast<std::ptrdiff_t>(last >= 24 ? last - 24 : 0),
+                           held.begin() + static_cast<std::ptrdiff_t>(last - 6));
+  std::nth_element(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(near.size() / 2), near.end());
+  const double half = 0.5 * near[near.size() / 2];
+  for (std::size_t i = last >= 6 ? last - 6 : 0; i + 1 < std::min(held.size(), last + 8); ++i) {
+    if (held[i] >= half && held[i + 1] < half) {
+      return place[i] + kStep * (held[i] - half) / (held[i] - held[i + 1]);
+    }
+  }
+  return place[last];
+}
+
 NeedleFix InjectionPipette::find(const GradientField& field, const cv::Mat& grey, double noise) {
   NeedleFix fix = last_;
   fix.ok = false;
@@ -172,7 +301,7 @@ NeedleFix InjectionPipette::find(const GradientField& field, const cv::Mat& grey
       all;
   const auto p = peak(centred_correlation_map(grey(window), template_));
   fix.score = p ? p->score : 0;
-  if (!p || p->score < 0.55) {
+  if (!p || p->score < 0.3) {
     fix.why = "tip not recognised";
     velocity_ = {};
     if (++lost_ > 3) {
@@ -186,8 +315,28 @@ NeedleFix InjectionPipette::find(const GradientField& field, const cv::Mat& grey
     }
     return fix;
   }
-  fix.tip = p->at + Point(window.x, window.y) + tip_in_template_;
+  // Correlation tells across the needle; along it the shaft looks everywhere the same, so the end of its
+  // walls does.
+  const Point correlated = p->at + Point(window.x, window.y) + tip_in_template_;
+  const Point across(-last_.axis.y, last_.axis.x);
+  fix.tip = last_.tip + velocity_ - end_offset_ * last_.axis;
+  fix.tip += (correlated - fix.tip).dot(across) * across;
   fit_edges(field, noise, fix);
+  auto end = walls_end(field, fix, 36, 44);
+  if (end) {
+    fix.tip += *end * fix.axis;
+    fit_edges(field, noise, fix);
+    if (const auto again = walls_end(field, fix, 16, 16)) {
+      fix.tip += *again * fix.axis;
+    }
+  }
+  if (!end) {
+    fix.why = "end of the needle not seen";
+    velocity_ = {};
+    ++lost_;
+    return fix;
+  }
+  fix.tip += end_offset_ * fix.axis;
   fix.ok = true;
   velocity_ = lost_ == 0 ? fix.tip - last_.tip : Point();
   lost_ = 0;
@@ -195,10 +344,27 @@ NeedleFix InjectionPipette::find(const GradientField& field, const cv::Mat& grey
   return fix;
 }
 
-void InjectionPipette::learn(const cv::Mat& grey, const NeedleFix& fix) {
+void InjectionPipette::calibrate_end(const GradientField& field, const NeedleFix& fix, double noise) {
+  const auto step = wall_step(field, fix, 3.5, 3 * field.noise_of_gradient(noise));
+  if (!step) {
+    return;
+  }
+  if (step_sign_ == 0) {
+    const double e = field.gradient(fix.at(-*step, 0.8 * fix.half_width)).dot(fix.axis) +
+                     field.gradient(fix.at(-*step, -0.8 * fix.half_width)).dot(fix.axis);
+    step_sign_ = e > 0 ? 1 : -1;
+  }
+  end_offset_ += (*step - end_offset_) / std::min(++offset_frames_, 30);
+}
+
+void InjectionPipette::learn(const GradientField& field, const cv::Mat& grey, const NeedleFix& fix,
+                             double noise) {
   if (!fix.ok || template_.empty()) {
     return;
   }
+  NeedleFix walls = fix;
+  walls.tip -= end_offset_ * walls.axis;
+  calibrate_end(field, walls, noise);
   cv::Mat here;
   cv::getRectSubPix(
       grey, template_.size(),

@@ -35,7 +35,7 @@ class InjectionPipette {
   [[nodiscard]] bool start(const GradientField& field, const cv::Mat& grey, double noise);
   [[nodiscard]] NeedleFix find(const GradientField& field, const cv::Mat& grey, double noise);
   // While nothing touches the tip its template may follow slow changes of focus and light.
-  void learn(const cv::Mat& grey, const NeedleFix& fix);
+  void learn(const GradientField& field, const cv::Mat& grey, const NeedleFix& fix, double noise);
 
   [[nodiscard]] bool started() const noexcept { return started_; }
   [[nodiscard]] Side side() const noexcept { return found_side_; }
@@ -44,6 +44,13 @@ class InjectionPipette {
  private:
   bool cut(const cv::Mat& grey, const Point& tip);
   void fit_edges(const GradientField& field, double noise, NeedleFix& fix) const;
+  // Distance ahead of fix.tip at which both walls end, within +-reach: the steepest change of grey along
+  // them.
+  [[nodiscard]] std::optional<double> wall_step(const GradientField& field, const NeedleFix& fix,
+                                                double reach, double floor) const;
+  // Distance ahead of fix.tip (< 0: behind) at which the pattern of walls and lumen ends; sub-pixel.
+  [[nodiscard]] std::optional<double> walls_end(const GradientField& field, const NeedleFix& fix, double back,
+                                                double ahead) const;
 
   Side side_;
   double c_px_;
@@ -55,6 +62,11 @@ class InjectionPipette {
   NeedleFix last_;
   Point velocity_;
   int lost_ = 0;
+  void calibrate_end(const GradientField& field, const NeedleFix& fix, double noise);
+
+  double end_offset_ = 0;  // from where the walls' pattern ends to the end face, px
+  int offset_frames_ = 0;
+  double step_sign_ = 0;  // +1: brighter ahead of the walls
 };
 
 }  // namespace punctum::vision

@@ -1,6 +1,7 @@
 #include "vision/membrane_edge.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -9,72 +10,79 @@ namespace punctum::vision {
 
 std::vector<double> smooth_closed(const std::vector<double>& r, const std::vector<double>& weight,
                                   const std::vector<double>& stiffness) {
-  // Symmetric positive definite: conjugate gradients from the weighted data, which is close already.
+  // Cyclic and pentadiagonal, symmetric positive definite: the last two unknowns are a border; the rest is a
+  // band of width 2, factorised as L D L^T for three right-hand sides.
   const std::size_t n = r.size();
-  if (n < 5) {
+  if (n < 8) {
     return r;
   }
-  const auto apply = [&](const std::vector<double>& x) {
-    std::vector<double> y(n), d(n);
-    for (std::size_t i = 0; i < n; ++i) {
-      d[i] = stiffness[i] * (x[(i + n - 1) % n] - 2 * x[i] + x[(i + 1) % n]);
-    }
-    for (std::size_t i = 0; i < n; ++i) {
-      y[i] = weight[i] * x[i] + d[(i + n - 1) % n] - 2 * d[i] + d[(i + 1) % n];
-    }
-    return y;
-  };
-  // Holes are bridged linearly first, so that only short distances are left to the iteration.
-  std::vector<double> x = r;
-  std::vector<std::size_t> known;
-  for (std::size_t i = 0; i < n; ++i) {
-    if (weight[i] > 1e-3) {
-      known.push_back(i);
-    }
+  double total = 0;
+  for (double w : weight) {
+    total += w;
   }
-  if (known.empty()) {
+  if (!(total > 0)) {
     return r;
   }
-  for (std::size_t k = 0; k < known.size(); ++k) {
-    const std::size_t a = known[k], b = known[(k + 1) % known.size()];
-    const std::size_t gap = (b + n - a - 1) % n + 1;
-    for (std::size_t j = 1; j < gap; ++j) {
-      const double t = static_cast<double>(j) / static_cast<double>(gap);
-      x[(a + j) % n] = (1 - t) * r[a] + t * r[b];
-    }
-  }
-  std::vector<double> ax = apply(x), res(n), p(n), z(n), diagonal(n);
-  double rz = 0, start = 0;
+  const double tiny = 1e-9 * total / static_cast<double>(n);
+  std::vector<double> d0(n), d1(n), d2(n);  // A(i,i), A(i,i+1), A(i,i+2), cyclic
   for (std::size_t i = 0; i < n; ++i) {
-    diagonal[i] = weight[i] + stiffness[(i + n - 1) % n] + 4 * stiffness[i] + stiffness[(i + 1) % n] + 1e-12;
-    res[i] = weight[i] * r[i] - ax[i];
-    z[i] = res[i] / diagonal[i];
-    p[i] = z[i];
-    rz += res[i] * z[i];
+    const double k0 = stiffness[(i + n - 1) % n], k1 = stiffness[i], k2 = stiffness[(i + 1) % n];
+    d0[i] = weight[i] + tiny + k0 + 4 * k1 + k2;
+    d1[i] = -2 * (k1 + k2);
+    d2[i] = k2;
   }
-  start = rz;
-  for (int it = 0; it < 200 && rz > 1e-12 * start && rz > 1e-20; ++it) {
-    const std::vector<double> ap = apply(p);
-    double pap = 0;
-    for (std::size_t i = 0; i < n; ++i) {
-      pap += p[i] * ap[i];
+  const std::size_t m = n - 2;
+  // Columns of the border: unknowns m and m + 1 against 0 .. m - 1.
+  std::array<std::vector<double>, 3> rhs;  // data, border column 0, border column 1
+  for (auto& v : rhs) {
+    v.assign(m, 0.0);
+  }
+  for (std::size_t i = 0; i < m; ++i) {
+    rhs[0][i] = weight[i] * r[i];
+  }
+  rhs[1][m - 2] += d2[m - 2];
+  rhs[1][m - 1] += d1[m - 1];
+  rhs[1][0] += d2[m];
+  rhs[2][m - 1] += d2[m - 1];
+  rhs[2][0] += d1[m + 1];
+  rhs[2][1] += d2[m + 1];
+  const std::vector<double> c0 = rhs[1], c1 = rhs[2];
+  std::vector<double> d(m), l1(m), l2(m);  // L(i,i-1), L(i,i-2)
+  for (std::size_t i = 0; i < m; ++i) {
+    const double a2 = i >= 2 ? d2[i - 2] : 0, a1 = i >= 1 ? d1[i - 1] : 0;
+    l2[i] = i >= 2 ? a2 / d[i - 2] : 0;
+    l1[i] = i >= 1 ? (a1 - (i >= 2 ? l2[i] * d[i - 2] * l1[i - 1] : 0)) / d[i - 1] : 0;
+    d[i] = d0[i] - (i >= 1 ? l1[i] * l1[i] * d[i - 1] : 0) - (i >= 2 ? l2[i] * l2[i] * d[i - 2] : 0);
+  }
+  for (auto& v : rhs) {
+    for (std::size_t i = 0; i < m; ++i) {
+      v[i] -= (i >= 1 ? l1[i] * v[i - 1] : 0) + (i >= 2 ? l2[i] * v[i - 2] : 0);
     }
-    if (!(pap > 0)) {
-      break;
+    for (std::size_t i = 0; i < m; ++i) {
+      v[i] /= d[i];
     }
-    const double alpha = rz / pap;
-    double next = 0;
-    for (std::size_t i = 0; i < n; ++i) {
-      x[i] += alpha * p[i];
-      res[i] -= alpha * ap[i];
-      z[i] = res[i] / diagonal[i];
-      next += res[i] * z[i];
+    for (std::size_t i = m; i-- > 0;) {
+      v[i] -= (i + 1 < m ? l1[i + 1] * v[i + 1] : 0) + (i + 2 < m ? l2[i + 2] * v[i + 2] : 0);
     }
-    const double beta = next / rz;
-    rz = next;
-    for (std::size_t i = 0; i < n; ++i) {
-      p[i] = z[i] + beta * p[i];
-    }
+  }
+  double s00 = d0[m], s01 = d1[m], s11 = d0[m + 1];
+  double b0 = weight[m] * r[m], b1 = weight[m + 1] * r[m + 1];
+  for (std::size_t i = 0; i < m; ++i) {
+    s00 -= c0[i] * rhs[1][i];
+    s01 -= c0[i] * rhs[2][i];
+    s11 -= c1[i] * rhs[2][i];
+    b0 -= c0[i] * rhs[0][i];
+    b1 -= c1[i] * rhs[0][i];
+  }
+  const double det = s00 * s11 - s01 * s01;
+  if (!(std::abs(det) > 0)) {
+    return r;
+  }
+  std::vector<double> x(n);
+  x[m] = (b0 * s11 - b1 * s01) / det;
+  x[m + 1] = (s00 * b1 - s01 * b0) / det;
+  for (std::size_t i = 0; i < m; ++i) {
+    x[i] = rhs[0][i] - rhs[1][i] * x[m] - rhs[2][i] * x[m + 1];
   }
   return x;
 }
@@ -117,7 +125,7 @@ EdgePath closed_path(const GradientField& field, const EdgeBand& band, Polarity 
     for (int j = 0; j < m; ++j) {
       const double r = band.middle[a] + (j - half) * band.step;
       const Point p = band.centre + r * ray[a];
-      double v = r > 2 ? 1 : 0;
+      double v = r > 2 && (band.hidden.empty() || !band.hidden[a]) ? 1 : 0;
       // One pixel from the border of the field nothing can be told.
       if (p.x < field.area.x + 1 || p.y < field.area.y + 1 || p.x > field.area.x + field.area.width - 2 ||
           p.y > field.area.y + field.area.height - 2) {
@@ -242,14 +250,35 @@ EdgePath closed_path(const GradientField& field, const EdgeBand& band, Polarity 
   std::vector<float> levels;
   for (int i = 0; i < n; ++i) {
     const std::size_t a = static_cast<std::size_t>(i);
-    const int j = path[a];
+    // The cost saturates: from the path to the top of the edge beside it, at most 2 px.
+    int j = path[a];
+    for (int climbed = 0; climbed * band.step < 2.0; ++climbed) {
+      const int up = j + 1 < m && s[id(i, j + 1)] > s[id(i, j)] ? 1 : 0;
+      const int down = j > 0 && s[id(i, j - 1)] > s[id(i, std::min(j + up, m - 1))] ? 1 : 0;
+      if (up + down == 0) {
+        break;
+      }
+      j += down ? -1 : 1;
+    }
     const double e = static_cast<double>(s[id(i, j)]);
+    // Parabola by least squares over about +-1.5 px: a narrow one is drawn to the pixel grid.
     double offset = 0;
-    if (j > 0 && j + 1 < m) {
-      const double l = static_cast<double>(s[id(i, j - 1)]), u = static_cast<double>(s[id(i, j + 1)]);
-      const double den = l - 2 * e + u;
-      if (den < -1e-9 && e >= l && e >= u) {
-        offset = std::clamp(0.5 * (l - u) / den, -0.5, 0.5);
+    const int wide = std::clamp(static_cast<int>(std::lround(1.5 / band.step)), 1, 4);
+    const int from = std::min({wide, j, m - 1 - j});
+    if (from >= 1) {
+      double s2 = 0, s4 = 0, y0 = 0, y1 = 0, y2 = 0;
+      const double count = 2.0 * from + 1;
+      for (int q = -from; q <= from; ++q) {
+        const double y = static_cast<double>(s[id(i, j + q)]);
+        s2 += q * q;
+        s4 += static_cast<double>(q) * q * q * q;
+        y0 += y;
+        y1 += q * y;
+        y2 += q * q * y;
+      }
+      const double curve = (count * y2 - s2 * y0) / (count * s4 - s2 * s2);
+      if (curve < -1e-9) {
+        offset = std::clamp(-y1 / s2 / (2 * curve), -2.0, 2.0);
       }
     }
     out.raw[a] = band.middle[a] + (j - half + offset) * band.step;
@@ -315,6 +344,10 @@ EdgePath closed_path(const GradientField& field, const EdgeBand& band, Polarity 
     if (band.anchor) {
       w[static_cast<std::size_t>(band.anchor->first)] = 4;
     }
+  }
+  for (int i = 0; i < n && !band.upper.empty(); ++i) {
+    const std::size_t a = static_cast<std::size_t>(i);
+    out.r[a] = std::min(out.r[a], std::max(band.upper[a], 2.0));
   }
   return out;
 }

@@ -28,6 +28,7 @@ struct EdgeBand {
   double slope = 1.0;                // largest change of offset from middle, px per px of arc
   double stiffness = 0.25;           // cost of that change, per (px/px)^2 and angle
   std::vector<double> lower, upper;  // hard limits per angle, or empty
+  std::vector<std::uint8_t> hidden;  // 1 = this whole ray tells nothing; or empty
   // 0 = a pixel that belongs to something else (pipette, impurity, outside): neutral, no edge and no cost.
   std::function<double(const Point&)> visible;
   // A place the contour is known to pass (the needle's tip while it pushes): angle index and radius.

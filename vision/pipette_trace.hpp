@@ -25,9 +25,14 @@ struct TubeTrace {
   }
 };
 
-// Looks for one tube of total width width_min .. width_max px at that border. noise: grey levels.
-[[nodiscard]] std::optional<TubeTrace> trace_tube(const GradientField& field, Side side, double width_min,
-                                                  double width_max, double noise);
+// A narrow tube (injection pipette) of total width width_min .. width_max px at that border, followed by its
+// cross profile. noise: grey levels. Empty when nothing there is straight, alike along its length, and ends.
+[[nodiscard]] std::optional<TubeTrace> trace_narrow_tube(const GradientField& field, Side side,
+                                                         double width_min, double width_max, double noise);
+
+// A wide one (holding pipette), followed by its two outer edges.
+[[nodiscard]] std::optional<TubeTrace> trace_wide_tube(const GradientField& field, Side side,
+                                                       double width_min, double width_max, double noise);
 
 // Shift along `axis` (px) at which the tube's lumen and walls end, by the strongest change of the mean grey
 // across +-half_width within +-reach of `guess`; sub-pixel. Empty where nothing stands out.

@@ -53,7 +53,10 @@ struct Tracker::Impl {
   struct Followed {
     bool known = false;
     Point centre;
-    std::vector<double> r;  // per angle
+    std::vector<double> r;     // per angle
+    std::vector<double> rest;  // the same without needle, about rest_centre; empty = not known
+    Point rest_centre;
+    int rest_frames = 0;
     Polarity polarity = Polarity::any;
     double level = 0;  // usual edge along it
     Contour nodes;     // of the snake
@@ -70,6 +73,7 @@ struct Tracker::Impl {
   InjectionPipette needle;
   std::optional<TubeTrace> holder_tube;
   bool holder_given = false;
+  int holder_tries = 0;
   std::optional<Circle> seed;
   Puncture puncture;
   Followed outer, inner;
@@ -79,6 +83,7 @@ struct Tracker::Impl {
   std::array<std::optional<double>, 2> last_contact_s;
   bool was_contact = false;
   std::optional<Point> last_tip;
+  Point last_axis{-1, 0};
   double tip_speed = 0;  // px/frame along the axis, smoothed
   int frames = 0;
   int starts = 0;
@@ -97,20 +102,45 @@ struct Tracker::Impl {
 
   [[nodiscard]] double px(double m) const { return m / config.pixel_m; }
 
+  [[nodiscard]] Point from_angle(const Point& centre, int i, double r) const {
+    const double t = 2 * std::numbers::pi * i / angles;
+    return centre + r * Point(std::cos(t), std::sin(t));
+  }
   [[nodiscard]] bool hidden(const Point& p) const {
     const int x = static_cast<int>(p.x + 0.5), y = static_cast<int>(p.y + 0.5);
     return x < 0 || y < 0 || x >= mask.cols || y >= mask.rows || mask.at<std::uint8_t>(y, x) > 0;
   }
 
   void locate_pipettes(Stopwatch& watch);
+  void tip_on_membrane();
   void erase_pipettes();
   bool start_membranes();
-  bool start_pair(const Circle& seed_circle);
+  struct Found {
+    EdgePath path;
+    Point centre;
+    Polarity polarity = Polarity::any;
+  };
+  [[nodiscard]] std::optional<Found> strongest_closed_edge(const Circle& circle, double saturation);
+  struct Second {
+    EdgePath path;
+    Polarity polarity = Polarity::any;
+    double quality = 0;
+  };
+  [[nodiscard]] Second find_second(const std::vector<double>& r1, const Point& centre, Polarity known_sign,
+                                   bool outside);
+  [[nodiscard]] bool clear_enough(const Second& s, double other_level) const;
+  bool start_pair(const Found& main);
+  void start_inner();
   void start_by_snake(const Circle& circle);
   EdgePath search(const Point& centre, double lo, double hi, Polarity polarity, double saturation);
   void follow(Followed& m, Membrane& out, const Followed* inside_of, const Followed* outside_of);
+  void behind_holder(EdgeBand& band, const std::vector<double>& expected) const;
   void remove_impurities();
   void measure();
+  [[nodiscard]] bool strays(const std::vector<double>& rested, const EdgePath& path,
+                            double needle_angle) const;
+  void keep_rest(const Followed& outer_before, const Followed& inner_before);
+  void learn_rest(Followed& m, const Membrane& seen, bool touched);
   void classify_contact();
   void decide_phase();
   void write_verdict();
@@ -138,11 +168,12 @@ void Tracker::Impl::locate_pipettes(Stopwatch& watch) {
       (void)needle.start(field, grey, result.noise);
     }
     result.needle = needle.find(field, grey, result.noise);
+    tip_on_membrane();
   }
   result.us.needle = watch.lap_us();
   if (config.holder) {
     // It comes from the border opposite to the needle.
-    if (!holder_tube) {
+    if (!holder_tube && field.area.width == width && holder_tries++ % 8 == 0) {
       std::vector<Side> sides;
       if (config.needle && needle.started()) {
         sides = {needle.side() == Side::right ? Side::left : Side::right};
@@ -153,8 +184,12 @@ void Tracker::Impl::locate_pipettes(Stopwatch& watch) {
       }
       for (const Side s : sides) {
         const auto t =
-            trace_tube(field, s, 20, std::min(0.7 * height, 2.2 * px(config.R_max_m)), result.noise);
-        if (t && t->likeness > 0.5 && t->length > 8 && (!holder_tube || t->clarity > holder_tube->clarity)) {
+            trace_wide_tube(field, s, 20, std::min(0.7 * height, 2.2 * px(config.R_max_m)), result.noise);
+        const auto worth = [](const TubeTrace& x) {
+          return x.likeness * x.clarity * std::min(x.length, 60.0);
+        };
+        if (t && t->likeness > 0.5 && t->length > 10 && std::abs(t->axis.y) < 0.25 &&
+            (!holder_tube || worth(*t) > worth(*holder_tube))) {
           holder_tube = t;
         }
       }
@@ -168,6 +203,35 @@ void Tracker::Impl::locate_pipettes(Stopwatch& watch) {
     }
   }
   result.us.holder = watch.lap_us();
+}
+
+// While the needle pushes, the membrane's outer face lies on its end face and blurs into the walls' ends;
+// across the lumen's mouth it is seen by itself.
+void Tracker::Impl::tip_on_membrane() {
+  NeedleFix& n = result.needle;
+  if (!n.ok || !was_contact || puncture.punctured() || !outer.known) {
+    return;
+  }
+  constexpr double kStep = 0.25, kBehind = 2.0, kAhead = 3.5;
+  std::vector<double> e;
+  for (double s = -kBehind; s <= kAhead; s += kStep) {
+    double sum = 0;
+    for (const double u : {-0.4, -0.2, 0.0, 0.2, 0.4}) {
+      const double g = field.gradient(n.at(-s, u * n.half_width)).dot(n.axis) / 5;
+      sum += outer.polarity == Polarity::any            ? std::abs(g)
+             : outer.polarity == Polarity::brighter_out ? -g
+                                                        : g;
+    }
+    e.push_back(sum);
+  }
+  const auto top = std::max_element(e.begin() + 1, e.end() - 1);
+  const std::size_t i = static_cast<std::size_t>(top - e.begin());
+  if (*top < 0.35 * outer.level || *top < e[i - 1] || *top < e[i + 1]) {
+    return;
+  }
+  const double curve = e[i - 1] - 2 * *top + e[i + 1];
+  const double offset = curve < -1e-12 ? std::clamp(0.5 * (e[i - 1] - e[i + 1]) / curve, -0.5, 0.5) : 0;
+  n.tip += (-kBehind + (static_cast<double>(i) + offset) * kStep) * n.axis;
 }
 
 void Tracker::Impl::erase_pipettes() {
@@ -217,6 +281,42 @@ void Tracker::Impl::remove_impurities() {
   erase(edge, mask, field.area.tl());
 }
 
+// A membrane pressed against the holding pipette: behind its mouth's face nothing of it can be, and along the
+// face, whose own dark line hides it, nothing is seen of it.
+void Tracker::Impl::behind_holder(EdgeBand& band, const std::vector<double>& expected) const {
+  if (!holder_tube || !config.holder) {
+    return;
+  }
+  const Point mouth = result.holder.ok && !holder_given ? result.holder.mouth : holder_tube->end();
+  const Point& a = holder_tube->axis;
+  const double face =
+      (mouth - band.centre).dot(a);  // < 0: the face is behind the centre, seen along the tube
+  if (face >= -2) {
+    return;
+  }
+  const std::size_t n = band.middle.size();
+  band.hidden.resize(n, 0);
+  if (band.upper.empty()) {
+    band.upper.assign(n, 1e9);
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    const double t = 2 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(n);
+    const Point d(std::cos(t), std::sin(t));
+    if (d.dot(a) > -0.2) {
+      continue;
+    }
+    const double r = face / d.dot(a);
+    const double u = a.cross(band.centre + r * d - mouth);
+    if (std::abs(u) > holder_tube->end_half_width + 2) {
+      continue;
+    }
+    band.upper[i] = std::min(band.upper[i], r);
+    if (expected[i] > r - 5) {
+      band.hidden[i] = 1;
+    }
+  }
+}
+
 // ---- membranes ----
 
 EdgePath Tracker::Impl::search(const Point& centre, double lo, double hi, Polarity polarity,
@@ -232,54 +332,147 @@ EdgePath Tracker::Impl::search(const Point& centre, double lo, double hi, Polari
   return closed_path(field, band, polarity, 3 * gn, saturation);
 }
 
-bool Tracker::Impl::start_pair(const Circle& circle) {
-  const double r_min = px(config.R_min_m), r_max = px(config.R_max_m);
-  // The strongest closed edge round here, whatever it is; its centroid is the next centre.
-  const auto settle = [&](Point centre, double lo, double hi, Polarity polarity, double saturation,
-                          int rounds, Point& centre_out) {
-    EdgePath p;
+// The strongest closed edge round a circle's centre, whatever it is; its centroid becomes the next centre.
+std::optional<Tracker::Impl::Found> Tracker::Impl::strongest_closed_edge(const Circle& circle,
+                                                                         double saturation) {
+  // Cells are not round: the radius seen from the centre varies more than the radius of the circle.
+  const double lo = seed ? 0.75 * circle.r : 0.6 * px(config.R_min_m);
+  const double hi = seed ? 1.25 * circle.r : 1.3 * px(config.R_max_m);
+  const auto settle = [&](Point centre, Polarity polarity, double level, int rounds) {
+    Found f;
+    f.polarity = polarity;
     for (int i = 0; i < rounds; ++i) {
-      p = search(centre, lo, hi, polarity, saturation);
-      if (p.r.empty()) {
-        return p;
+      f.path = search(centre, lo, hi, polarity, level);
+      f.centre = centre;
+      if (f.path.r.empty()) {
+        break;
       }
-      centre_out = centre;
-      centre = centroid(from_polar(centre, p.r));
-    }
-    return p;
-  };
-  const double lo = seed ? 0.75 * circle.r : 0.6 * r_min, hi = seed ? 1.25 * circle.r : 1.08 * r_max;
-  struct Found {
-    EdgePath path;
-    Point centre;
-    Polarity polarity = Polarity::any;
-  };
-  const auto best_polarity = [&](Point centre, double from, double to, int rounds) {
-    Found best;
-    Point c;
-    best.path = settle(centre, from, to, Polarity::any, 0, rounds, c);
-    best.centre = c;
-    if (best.path.r.empty()) {
-      return best;
-    }
-    // A signed edge is worth more than one whose sign changes from place to place, if it is nearly as strong.
-    double top = 0;
-    Found alternative;
-    for (const Polarity q : {Polarity::brighter_out, Polarity::darker_out}) {
-      const EdgePath p = settle(best.centre, from, to, q, best.path.saturation, 2, c);
-      if (!p.r.empty() && p.mean_strength > top) {
-        top = p.mean_strength;
-        alternative = {p, c, q};
+      centre = centroid(from_polar(centre, f.path.r));
+      if (cv::norm(centre - f.centre) < 0.5) {
+        break;
       }
     }
-    return top > 0.86 * best.path.mean_strength ? alternative : best;
+    return f;
   };
-  Found main = best_polarity(circle.centre, lo, hi, 4);
-  if (main.path.r.empty() || main.path.visible < 0.45 || main.path.support < 0.6 ||
-      main.path.level < 1.8 * main.path.background || main.path.level < 4 * gn) {
-    result.outer.why = "no closed edge stands out";
+  Found best = settle(circle.centre, Polarity::any, saturation, 6);
+  if (best.path.r.empty()) {
+    return std::nullopt;
+  }
+  // A picture in which the edge has one sign all round (bright field) is followed by that sign: it tells the
+  // two faces of a membrane apart. Where the sign changes round the cell, some arcs of a signed path are
+  // weak.
+  const auto weak = [](const EdgePath& p) {
+    int n = 0;
+    for (float e : p.strength) {
+      n += static_cast<double>(e) < 0.5 * p.saturation;
+    }
+    return (n - (1 - p.visible) * static_cast<double>(p.strength.size())) /
+           static_cast<double>(p.strength.size());
+  };
+  Found one_sign;
+  for (const Polarity q : {Polarity::brighter_out, Polarity::darker_out}) {
+    Found f = settle(best.centre, q, best.path.saturation, 2);
+    if (!f.path.r.empty() && f.path.mean_strength > 0.93 * best.path.mean_strength &&
+        weak(f.path) < weak(best.path) + 0.015 &&
+        (one_sign.path.r.empty() || f.path.mean_strength > one_sign.path.mean_strength)) {
+      one_sign = std::move(f);
+    }
+  }
+  if (!one_sign.path.r.empty()) {
+    best = std::move(one_sign);
+  }
+  if (best.path.visible < 0.45 || best.path.support < 0.6 || best.path.level < 1.8 * best.path.background ||
+      best.path.level < 4 * gn) {
+    return std::nullopt;
+  }
+  return best;
+}
+
+// A second closed edge inside or outside one that is known (r1 round centre), ordered, with a gap.
+Tracker::Impl::Second Tracker::Impl::find_second(const std::vector<double>& r1, const Point& centre,
+                                                 Polarity known_sign, bool outside) {
+  const double r_max = px(config.R_max_m), mean = median_of(r1);
+
+  Second best;
+  for (const Polarity q : {Polarity::brighter_out, Polarity::darker_out, Polarity::any}) {
+    // Two edges of known sign may lie close together; a line whose sign is not known has two flanks.
+    const bool known = q != Polarity::any && known_sign != Polarity::any;
+    const double gap =
+        known ? std::max(2.5, 0.02 * mean) : std::max({3.5, 0.035 * mean, 1.2 * px(config.h_m)});
+    const double from = outside ? gap : -0.62 * mean,
+                 to = outside ? std::min(0.6 * mean, 1.3 * r_max - mean) : -gap;
+    if (to - from < 4) {
+      continue;
+    }
+    EdgeBand band;
+    band.centre = centre;
+    band.half_width = (to - from) / 2;
+    band.step = std::max(0.5, (to - from) / 120);
+    band.middle = r1;
+    behind_holder(band, outside ? std::vector<double>(r1.size(), mean + gap) : r1);
+    for (double& r : band.middle) {
+      r += (from + to) / 2;
+    }
+    band.slope = 1.0;
+    band.stiffness = 0.8;
+    band.visible = [this](const Point& p) { return hidden(p) ? 0.0 : 1.0; };
+    EdgePath p = closed_path(field, band, q, 3 * gn, 0);
+    if (p.r.empty() || p.visible < 0.4) {
+      continue;
+    }
+    // Hugging the limit: the flank of the first edge, no second one.
+    std::vector<double> offsets;
+    for (std::size_t i = 0; i < p.r.size(); ++i) {
+      offsets.push_back(std::abs(p.r[i] - r1[i]));
+    }
+    if (median_of(offsets) < gap + 1.0) {
+      continue;
+    }
+    const double handicap = q == known_sign && q != Polarity::any ? 1.15 : q == Polarity::any ? 0.8 : 1.0;
+    const double quality =
+        handicap * p.level * p.support * std::min(1.0, p.visible / 0.8) / std::max({p.background, gn, 0.02});
+    if (quality > best.quality) {
+      best = {std::move(p), q, quality};
+    }
+  }
+  return best;
+}
+
+bool Tracker::Impl::clear_enough(const Second& s, double other_level) const {
+  constexpr double kNeeded = 4;  // times the median edge of its band
+  if (s.quality < kNeeded || s.path.level < 4 * gn || s.path.level < 0.12 * other_level) {
     return false;
   }
+  // A cell is nearly an oval: what strays further from one has followed something else.
+  const std::vector<double>& r = s.path.r;
+  double c[5] = {};
+  const double n = static_cast<double>(r.size());
+  const auto f = [n](std::size_t i, int k) {
+    const double t = 2 * std::numbers::pi * static_cast<double>(i) / n;
+    return k == 0   ? 1.0
+           : k == 1 ? std::cos(t)
+           : k == 2 ? std::sin(t)
+           : k == 3 ? std::cos(2 * t)
+                    : std::sin(2 * t);
+  };
+  for (std::size_t i = 0; i < r.size(); ++i) {
+    for (int k = 0; k < 5; ++k) {
+      c[k] += r[i] * f(i, k) * (k == 0 ? 1 : 2) / n;
+    }
+  }
+  double ss = 0;
+  for (std::size_t i = 0; i < r.size(); ++i) {
+    double e = r[i];
+    for (int k = 0; k < 5; ++k) {
+      e -= c[k] * f(i, k);
+    }
+    ss += e * e / n;
+  }
+  return std::sqrt(ss) < 0.055 * c[0];
+}
+
+bool Tracker::Impl::start_pair(const Found& main) {
+  const double r_min = px(config.R_min_m);
   const Contour contour = from_polar(main.centre, main.path.r);
   const Point centre = centroid(contour);
   const std::vector<double> r1 = polar_radii(contour, centre, angles);
@@ -287,53 +480,17 @@ bool Tracker::Impl::start_pair(const Circle& circle) {
     result.outer.why = "closed edge not star-shaped";
     return false;
   }
-  // A second one inside or outside it, ordered, with a gap.
-  const double mean = median_of(r1), gap = std::max(3.0, 0.035 * mean);
-  struct Second {
-    EdgePath path;
-    Polarity polarity = Polarity::any;
-    double quality = 0;
-  };
-  const auto second = [&](bool outside) {
-    Second best;
-    EdgeBand band;
-    band.centre = centre;
-    band.step = 0.5;
-    const double from = outside ? gap : -0.62 * mean,
-                 to = outside ? std::min(0.6 * mean, 1.08 * r_max - mean) : -gap;
-    if (to - from < 4) {
-      return best;
-    }
-    band.half_width = (to - from) / 2;
-    band.step = std::max(0.5, (to - from) / 120);
-    band.middle = r1;
-    for (double& r : band.middle) {
-      r += (from + to) / 2;
-    }
-    band.slope = 1.0;
-    band.stiffness = 0.8;
-    band.visible = [this](const Point& p) { return hidden(p) ? 0.0 : 1.0; };
-    for (const Polarity q : {main.polarity, Polarity::brighter_out, Polarity::darker_out, Polarity::any}) {
-      EdgePath p = closed_path(field, band, q, 3 * gn, 0);
-      if (p.r.empty() || p.visible < 0.4) {
-        continue;
-      }
-      const double handicap = q == main.polarity && q != Polarity::any ? 1.15
-                              : q == Polarity::any                     ? 0.8
-                                                                       : 1.0;
-      const double quality = handicap * p.level * p.support * std::min(1.0, p.visible / 0.8) /
-                             std::max({p.background, gn, 0.02});
-      if (quality > best.quality) {
-        best = {std::move(p), q, quality};
-      }
-    }
-    return best;
-  };
-  Second in = second(false), out = second(true);
-  const double needed = 2.2;  // times the median edge of its band
-  const auto good = [&](const Second& s) {
-    return s.quality > needed && s.path.level > 4 * gn && s.path.level > 0.12 * main.path.level;
-  };
+  const double mean = median_of(r1);
+  Second in = find_second(r1, centre, main.polarity, false),
+         out = find_second(r1, centre, main.polarity, true);
+    printf(
+        "main pol %d mean %.1f level %.2f bg %.2f sup %.2f vis %.2f | in pol %d q %.2f level %.2f bg %.2f r "
+        "%.1f| out pol %d q %.2f level %.2f bg %.2f r %.1f\n",
+        (int)main.polarity, mean, main.path.level, main.path.background, main.path.support, main.path.visible,
+        (int)in.polarity, in.quality, in.path.level, in.path.background,
+        in.path.r.empty() ? 0 : median_of(in.path.r), (int)out.polarity, out.quality, out.path.level,
+        out.path.background, out.path.r.empty() ? 0 : median_of(out.path.r));
+  const auto good = [&](const Second& x) { return clear_enough(x, main.path.level); };
   const auto set = [&](Followed& m, const std::vector<double>& r, Polarity q, double level) {
     m = {};
     m.known = true;
@@ -354,6 +511,16 @@ bool Tracker::Impl::start_pair(const Circle& circle) {
     }
     return true;
   }
+  // A dark wall seen by its inner face: the outer face belongs to it, and the inner membrane lies further in.
+  const bool wall = good(out) && main.polarity == Polarity::darker_out &&
+                    out.polarity == Polarity::brighter_out && median_of(out.path.r) - mean < 0.25 * mean;
+  if (wall) {
+    set(outer, out.path.r, out.polarity, out.path.level);
+    if (good(in)) {
+      set(inner, in.path.r, in.polarity, in.path.level);
+    }
+    return true;
+  }
   const bool main_is_inner = only_inner_possible || out.quality > in.quality || !good(in);
   if (main_is_inner && (good(out) || out.quality > in.quality)) {
     set(inner, r1, main.polarity, main.path.level);
@@ -367,6 +534,24 @@ bool Tracker::Impl::start_pair(const Circle& circle) {
     }
   }
   return true;
+}
+
+// The inner membrane alone, inside an outer one that is followed.
+void Tracker::Impl::start_inner() {
+  const Second in = find_second(outer.r, outer.centre, outer.polarity, false);
+  if (!clear_enough(in, outer.level)) {
+    return;
+  }
+  const Followed before = std::move(inner);
+  inner = {};
+  inner.known = true;
+  inner.centre = outer.centre;
+  inner.r = in.path.r;
+  inner.polarity = in.polarity;
+  inner.level = in.path.level;
+  inner.rest = before.rest;
+  inner.rest_centre = before.rest_centre;
+  inner.rest_frames = before.rest_frames;
 }
 
 void Tracker::Impl::start_by_snake(const Circle& circle) {
@@ -416,12 +601,28 @@ bool Tracker::Impl::start_membranes() {
     start_by_snake(circles.front());
     return true;
   }
+  // A long cell gives a circle at either end: the middle of them is worth a try as well.
+  if (circles.size() > 2) {
+    Circle mean = circles[0];
+    mean.centre = (circles[0].centre + circles[1].centre + circles[2].centre) / 3;
+    circles.push_back(mean);
+  }
+  std::optional<Found> best;
+  double saturation = 0;
   for (const Circle& c : circles) {
-    if (start_pair(c)) {
-      return true;
+    auto f = strongest_closed_edge(c, saturation);
+    if (f && saturation <= 0) {
+      saturation = f->path.saturation;  // one measure for all
+    }
+    if (f && (!best || f->path.mean_strength > best->path.mean_strength)) {
+      best = std::move(f);
     }
   }
-  return false;
+  if (!best) {
+    result.outer.why = "no closed edge stands out";
+    return false;
+  }
+  return start_pair(*best);
 }
 
 void Tracker::Impl::follow(Followed& m, Membrane& out, const Followed* inside_of,
@@ -471,12 +672,23 @@ void Tracker::Impl::follow(Followed& m, Membrane& out, const Followed* inside_of
     dx.push_back(snake.nodes[i].x - nodes[i].x);
     dy.push_back(snake.nodes[i].y - nodes[i].y);
   }
-  const Point shift(std::clamp(median_of(dx), -2.0, 2.0), std::clamp(median_of(dy), -2.0, 2.0));
+  Point shift(std::clamp(median_of(dx), -2.0, 2.0), std::clamp(median_of(dy), -2.0, 2.0));
+  if (cv::norm(shift) < 1.2) {  // the snake stands on whole pixels: less is no motion
+    shift = {};
+  }
 
   // 2. The sub-pixel edge in a band round it; two hypotheses where the needle is: pushed in, or free.
   const double R = median_of(m.r);
+  double usual_gap = 0;  // between the two membranes
+  if (outer.known && inner.known) {
+    usual_gap = std::max(
+        0.0, std::sqrt(std::abs(signed_area(from_polar(outer.centre, outer.r))) / std::numbers::pi) -
+                 std::sqrt(std::abs(signed_area(from_polar(inner.centre, inner.r))) / std::numbers::pi));
+  }
   EdgeBand band;
   band.centre = m.centre + shift;
+  const std::vector<double> rested =
+      m.rest.empty() ? m.rest : polar_radii(from_polar(m.rest_centre, m.rest), band.centre, angles);
   band.middle = m.r;
   band.half_width = std::clamp(0.11 * R, 6.0, 14.0);
   band.slope = 1.0;
@@ -484,18 +696,47 @@ void Tracker::Impl::follow(Followed& m, Membrane& out, const Followed* inside_of
   if (inside_of && inside_of->known) {
     band.upper = polar_radii(from_polar(inside_of->centre, inside_of->r), band.centre, angles);
     for (double& r : band.upper) {
-      r -= 2.0;
+      r -= std::max(2.0, 0.5 * usual_gap);
     }
   }
   if (outside_of && outside_of->known) {
     band.lower = polar_radii(from_polar(outside_of->centre, outside_of->r), band.centre, angles);
-    for (double& r : band.lower) {
-      r += 2.0;
+    for (int i = 0; i < angles && !band.lower.empty(); ++i) {
+      // It was there one frame ago; near the needle it may have moved on.
+      const double t = 2 * std::numbers::pi * i / angles;
+      const bool near = last_tip && angle_between(t, std::atan2(last_tip->y - band.centre.y,
+                                                                last_tip->x - band.centre.x)) < 0.5;
+      band.lower[static_cast<std::size_t>(i)] += near ? -4.0 : std::max(2.5, 0.35 * usual_gap);
     }
   }
   EdgePath path;
+  bool is_free = false;
   const double saturation = 0.7 * m.level;
   const bool is_outer = &m == &outer;
+  std::vector<double> expected = m.r;
+  if (is_outer && rest && rest->round) {  // what once slipped inwards along the holder comes back
+    const std::vector<double> free = polar_radii(rest->shape, band.centre, angles);
+    for (std::size_t i = 0; i < free.size(); ++i) {
+      expected[i] = std::max(expected[i], free[i]);
+    }
+  }
+  behind_holder(band, expected);
+  // Nothing presses it in further than the tip has come.
+  double tip_depth = 0;
+  if (result.needle.ok && rested.size() == m.r.size()) {
+    const Point d = result.needle.tip - band.centre;
+    const int i =
+        static_cast<int>(std::lround((std::atan2(d.y, d.x) / (2 * std::numbers::pi) + 1) * angles)) % angles;
+    if (d.dot(result.needle.axis) < 0) {
+      tip_depth = std::max(0.0, rested[static_cast<std::size_t>(i)] - cv::norm(d));
+    }
+    if (band.lower.empty()) {
+      band.lower.assign(static_cast<std::size_t>(angles), 0.0);
+    }
+    for (std::size_t k = 0; k < band.lower.size(); ++k) {
+      band.lower[k] = std::max(band.lower[k], rested[k] - tip_depth - 6);
+    }
+  }
   std::optional<std::pair<int, double>> anchor;
   double needle_angle = 0;
   bool tip_inside = false;
@@ -510,27 +751,43 @@ void Tracker::Impl::follow(Followed& m, Membrane& out, const Followed* inside_of
     const double ta = std::atan2(d.y, d.x);
     const int index = static_cast<int>(std::lround(ta / (2 * std::numbers::pi) * angles) + angles) % angles;
     anchor = std::make_pair(index, cv::norm(d));
-    const std::vector<double> free = rest ? polar_radii(rest->shape, band.centre, angles) : m.r;
-    tip_inside = !free.empty() && cv::norm(d) < free[static_cast<std::size_t>(index)] - 1.0;
+    const std::vector<double>& free = rested.empty() ? m.r : m.rest;
+    tip_inside = cv::norm(d) < free[static_cast<std::size_t>(index)] - 1.0;
   }
   path = closed_path(field, band, m.polarity, 3 * gn, saturation);
-  if (is_outer && result.needle.ok && anchor && tip_inside) {
-    // Score of the arcs beside the needle.
-    const auto beside = [&](const EdgePath& p) {
-      double s = 0;
+  if (result.needle.ok && anchor && tip_inside && !rested.empty()) {
+    // Beside the needle: how well an edge is seen there, and how far two contours are apart.
+    const auto beside = [&](const auto& f) {
+      double sum = 0;
+      int n = 0;
       for (int i = 0; i < angles; ++i) {
-        const double a = 2 * std::numbers::pi * i / angles;
-        if (angle_between(a, needle_angle) < 0.6) {
-          s +=
-              std::clamp(static_cast<double>(p.strength[static_cast<std::size_t>(i)]) / saturation, 0.0, 1.0);
+        const double a = angle_between(2 * std::numbers::pi * i / angles, needle_angle);
+        if (a < 0.24 && !hidden(from_angle(band.centre, i, rested[static_cast<std::size_t>(i)]))) {
+          sum += f(static_cast<std::size_t>(i));
+          ++n;
         }
       }
-      return s;
+      return n > 0 ? sum / n : 0.0;
     };
+    const auto seen = [&](const EdgePath& p) {
+      return beside([&](std::size_t i) {
+        return std::clamp(static_cast<double>(p.strength[i]) / saturation, 0.0, 1.0);
+      });
+    };
+    // Free: the membrane is back where it was without needle.
+    EdgeBand released = band;
+    for (int i = 0; i < angles; ++i) {
+      const std::size_t k = static_cast<std::size_t>(i);
+      const double a = angle_between(2 * std::numbers::pi * i / angles, needle_angle);
+      const double w = std::clamp((1.1 - a) / 0.3, 0.0, 1.0);
+      released.middle[k] += w * (rested[k] - released.middle[k]);
+    }
+    released.half_width = std::min(band.half_width, 7.0);
+    EdgePath p_free = closed_path(field, released, m.polarity, 3 * gn, saturation);
+    // Pushed in: it lies on the tip, and the dimple goes on with the needle.
     EdgeBand pushed = band;
-    if (!puncture.punctured()) {
-      // The dimple goes on with the needle: the middle near the axis is moved to the tip.
-      const std::size_t k = static_cast<std::size_t>(anchor->first);
+    const std::size_t k = static_cast<std::size_t>(anchor->first);
+    if (is_outer) {
       const double move = anchor->second - pushed.middle[k];
       for (int i = 0; i < angles; ++i) {
         const double a =
@@ -542,24 +799,13 @@ void Tracker::Impl::follow(Followed& m, Membrane& out, const Followed* inside_of
       pushed.slope = 3;
       pushed.stiffness = 0.1;
     }
-    EdgePath p1 = closed_path(field, pushed, m.polarity, 3 * gn, saturation);
-    EdgeBand released = band;
-    if (rest) {
-      const std::vector<double> free = polar_radii(rest->shape, band.centre, angles);
-      if (!free.empty()) {
-        for (int i = 0; i < angles; ++i) {
-          const double a = angle_between(2 * std::numbers::pi * i / angles, needle_angle);
-          const double w = std::clamp((1.0 - a) / 0.3, 0.0, 1.0);
-          double& mid = released.middle[static_cast<std::size_t>(i)];
-          mid += w * (free[static_cast<std::size_t>(i)] - mid);
-        }
-      }
-      EdgePath p2 = closed_path(field, released, m.polarity, 3 * gn, saturation);
-      const double s0 = beside(path), s1 = beside(p1), s2 = beside(p2);
-      path = s1 >= s0 - 1 && s1 >= s2 - 1 ? p1 : s2 > s0 ? p2 : path;
-    } else {
-      path = beside(p1) >= beside(path) - 1 ? p1 : path;
-    }
+    EdgePath p_pushed = is_outer ? closed_path(field, pushed, m.polarity, 3 * gn, saturation) : path;
+    // Where an edge lies further out than the dimple and is as well seen, the dimple is another membrane's.
+    const double apart = beside([&](std::size_t i) { return std::max(0.0, p_free.r[i] - p_pushed.r[i]); });
+    is_free = puncture.punctured() && is_outer ? seen(p_free) > 0.4 : apart > 1.5 && seen(p_free) > 0.7;
+      printf("%s apart %.2f seen free %.2f pushed %.2f\n", is_outer ? "outer" : "inner", apart, seen(p_free),
+             seen(p_pushed));
+    path = is_free ? std::move(p_free) : std::move(p_pushed);
   }
   if (path.r.empty()) {
     out.why = "no band to search";
@@ -573,6 +819,9 @@ void Tracker::Impl::follow(Followed& m, Membrane& out, const Followed* inside_of
   // 3. Is it still the same edge?
   std::vector<double> jump;
   for (int i = 0; i < angles; ++i) {
+    if (is_free && angle_between(2 * std::numbers::pi * i / angles, needle_angle) < 1.2) {
+      continue;
+    }
     jump.push_back(std::abs(path.r[static_cast<std::size_t>(i)] - m.r[static_cast<std::size_t>(i)]));
   }
   const double moved = median_of(jump) + cv::norm(shift);
@@ -584,6 +833,8 @@ void Tracker::Impl::follow(Followed& m, Membrane& out, const Followed* inside_of
     out.why = "edge has faded";
   } else if (moved > 0.6 * band.half_width) {
     out.why = "contour jumped";
+  } else if (strays(rested, path, needle_angle)) {
+    out.why = "contour left the cell's outline";
   } else {
     out.ok = true;
   }
@@ -602,13 +853,86 @@ void Tracker::Impl::follow(Followed& m, Membrane& out, const Followed* inside_of
     return;
   }
   // The centre stays where it is as long as it is inside by far: resampling costs accuracy.
-  if (cv::norm(centre - band.centre) > 0.06 * R) {
+  const Point old = band.centre;
+  if (cv::norm(centre - old) > 0.06 * R) {
     m.centre = centre;
     m.r = r;
   } else {
-    m.centre = band.centre;
+    m.centre = old;
     m.r = path.r;
   }
+}
+
+// After a new start: what was learnt of the cell without needle still holds if it is the same cell in its
+// place.
+void Tracker::Impl::keep_rest(const Followed& outer_before, const Followed& inner_before) {
+  bool same = false;
+  if (rest && outer.known) {
+    const Contour now = from_polar(outer.centre, outer.r);
+    std::vector<double> weight(now.size(), 1.0);
+    if (result.needle.ok) {
+      for (std::size_t i = 0; i < now.size(); ++i) {
+        const Point d = now[i] - outer.centre;
+        weight[i] = d.dot(result.needle.axis) < 0.3 * cv::norm(d) * -1 ? 0 : 1;
+      }
+    }
+    const auto fitted = fit_circle(now, weight);
+    same = fitted && cv::norm(fitted->centre - rest->circle.centre) < 0.08 * rest->circle.r &&
+           std::abs(fitted->r - rest->circle.r) < 0.06 * rest->circle.r;
+  }
+  if (!same) {
+    rest.reset();
+    rest_frames = 0;
+    return;
+  }
+  outer.rest = outer_before.rest;
+  outer.rest_centre = outer_before.rest_centre;
+  outer.rest_frames = outer_before.rest_frames;
+  inner.rest = inner_before.rest;
+  inner.rest_centre = inner_before.rest_centre;
+  inner.rest_frames = inner_before.rest_frames;
+}
+
+// While the needle is away the contours are learnt as what they are without it.
+void Tracker::Impl::learn_rest(Followed& m, const Membrane& seen, bool touched) {
+  if (!m.known || !seen.ok) {
+    return;
+  }
+  if (touched) {
+    if (m.rest.empty() && &m == &outer && rest) {  // never seen without: what its undeformed part tells
+      m.rest = polar_radii(rest->shape, m.centre, angles);
+      m.rest_centre = m.centre;
+    }
+    return;
+  }
+  if (m.rest.empty() || cv::norm(m.rest_centre - m.centre) > 0.1 * median_of(m.r)) {
+    m.rest = m.r;
+    m.rest_centre = m.centre;
+    m.rest_frames = 1;
+    return;
+  }
+  const std::vector<double> now = polar_radii(from_polar(m.centre, m.r), m.rest_centre, angles);
+  const double g = 1.0 / std::min(++m.rest_frames, 12);
+  for (std::size_t i = 0; i < now.size(); ++i) {
+    m.rest[i] += g * (now[i] - m.rest[i]);
+  }
+}
+
+// Away from the needle a membrane keeps its outline: an arc that has left it follows something else.
+bool Tracker::Impl::strays(const std::vector<double>& rested, const EdgePath& path,
+                           double needle_angle) const {
+  if (rested.size() != path.r.size() || !config.needle) {
+    return false;
+  }
+  const double limit = std::max(6.0, 0.1 * median_of(rested));
+  int off = 0, n = 0;
+  for (int i = 0; i < angles; ++i) {
+    if (angle_between(2 * std::numbers::pi * i / angles, needle_angle) > 1.2) {
+      ++n;
+      off += std::abs(path.r[static_cast<std::size_t>(i)] - rested[static_cast<std::size_t>(i)]) > limit;
+    }
+  }
+  return off > n / 12;
 }
 
 // ---- geometry, contact, puncture ----
@@ -654,6 +978,7 @@ void Tracker::Impl::measure() {
   // While nothing touches it the undeformed membrane is learnt; then it is remembered and goes with the
   // holder.
   const bool touched = near || was_contact || puncture.punctured();
+
   if (!rest || (!touched && now->round)) {
     if (rest && rest->round && now->round &&
         cv::norm(now->circle.centre - rest->circle.centre) < 0.05 * rest->circle.r) {
@@ -676,12 +1001,16 @@ void Tracker::Impl::measure() {
     const Point d = result.holder.mouth - *rest_holder;
     if (cv::norm(d) > 1.0) {
       rest->circle.centre += d;
+      outer.rest_centre += d;
+      inner.rest_centre += d;
       for (Point& p : rest->shape) {
         p += d;
       }
       rest_holder = result.holder.mouth;
     }
   }
+  learn_rest(outer, result.outer, touched);
+  learn_rest(inner, result.inner, touched);
   result.undeformed = rest->circle;
   if (!n.ok) {
     return;
@@ -789,9 +1118,12 @@ void Tracker::Impl::classify_contact() {
   result.wd_px =
       result.punctured ? std::max(0.0, in.points ? in.depth_px : 0.0) : std::max(0.0, -*result.gap_px);
   if (*result.wd_px > 0.7 && rest) {
-    const auto profile = depth_profile(result.outer.contour, rest->shape, *result.entry, n.axis, 0.9 * R);
+    // About the membrane's own normal: a needle off the middle is not the axis of its dimple.
+    Point normal = rest->circle.centre - *result.entry;
+    normal *= 1 / std::max(cv::norm(normal), 1e-9);
     std::vector<ProfilePoint> seen;
-    for (const ProfilePoint& p : profile) {
+    for (const ProfilePoint& p :
+         depth_profile(result.outer.contour, rest->shape, *result.entry, normal, 0.995 * R)) {
       if (std::abs(p.u) > n.half_width + 2.5) {
         seen.push_back(p);
       }
@@ -806,6 +1138,7 @@ void Tracker::Impl::decide_phase() {
     tip_speed += 0.4 * ((result.needle.tip - *last_tip).dot(result.needle.axis) - tip_speed);
   }
   last_tip = result.needle.ok ? std::optional<Point>(result.needle.tip) : std::nullopt;
+  last_axis = result.needle.axis;
   rt::Phase& p = result.phase;  // still the last frame's
   const double gap = result.gap_px.value_or(std::numeric_limits<double>::infinity());
   if (p == rt::Phase::puncture || p == rt::Phase::withdrawal) {
@@ -877,15 +1210,18 @@ const Result& Tracker::Impl::process(const hal::Frame& frame) {
   result.usable = true;
   result.noise = std::max(noise_level(grey), 0.3);
 
-  // The whole picture while it is small or something must be found; else the surroundings of the cell.
+  // The whole picture while something must be found; else the surroundings of cell and needle.
   cv::Rect area(0, 0, width, height);
-  const bool big = static_cast<std::int64_t>(width) * height > 900000;
   const Followed& any = outer.known ? outer : inner;
-  if (big && any.known && (!config.needle || needle.started())) {
-    const double reach = 1.7 * *std::max_element(any.r.begin(), any.r.end()) + 40;
+  const bool restart = outer.bad >= 2 || (!outer.known && inner.bad >= 2) || !any.known;
+  const bool needle_lost = config.needle && (!needle.started() || !last_tip);
+  if (!restart && !needle_lost) {
+    const double reach = 1.15 * *std::max_element(any.r.begin(), any.r.end()) + 30;
     cv::Rect2d box(any.centre.x - reach, any.centre.y - reach, 2 * reach, 2 * reach);
-    if (config.needle && last_tip) {
-      box |= cv::Rect2d(last_tip->x - 80, last_tip->y - 80, 160, 160);
+    if (config.needle) {
+      const Point behind = *last_tip - 180 * last_axis;
+      box |= cv::Rect2d(last_tip->x - 40, last_tip->y - 40, 80, 80);
+      box |= cv::Rect2d(behind.x - 24, behind.y - 24, 48, 48) & cv::Rect2d(0, 0, width, height);
     }
     area &= cv::Rect(static_cast<int>(box.x), static_cast<int>(box.y), static_cast<int>(box.width),
                      static_cast<int>(box.height));
@@ -899,7 +1235,8 @@ const Result& Tracker::Impl::process(const hal::Frame& frame) {
   remove_impurities();
   result.us.erase = watch.lap_us();
 
-  if (outer.bad >= 2 || (!outer.known && inner.bad >= 2) || (!outer.known && !inner.known)) {
+  if (restart) {
+    const Followed outer_before = std::move(outer), inner_before = std::move(inner);
     outer = {};
     inner = {};
     if (!start_membranes()) {
@@ -915,13 +1252,15 @@ const Result& Tracker::Impl::process(const hal::Frame& frame) {
       result.us.total = total.lap_us();
       return result;
     }
-    rest.reset();
-    rest_frames = 0;
+    keep_rest(outer_before, inner_before);
     remove_impurities();
     result.us.start = watch.lap_us();
   }
-  follow(outer, result.outer, nullptr, nullptr);
+  follow(outer, result.outer, nullptr, &inner);
   result.us.outer = watch.lap_us();
+  if (config.inner && config.refine && outer.known && result.outer.ok && (!inner.known || inner.bad >= 2)) {
+    start_inner();
+  }
   if (config.inner) {
     follow(inner, result.inner, outer.known && result.outer.ok ? &outer : nullptr, nullptr);
   }
@@ -931,7 +1270,7 @@ const Result& Tracker::Impl::process(const hal::Frame& frame) {
   classify_contact();
   result.us.contact = watch.lap_us();
   if (result.needle.ok && !result.contact && result.gap_px.value_or(99) > 12) {
-    needle.learn(grey, result.needle);
+    needle.learn(field, grey, result.needle, result.noise);
   }
   decide_phase();
   write_verdict();

@@ -22,7 +22,7 @@ struct MembraneParams {
 struct ConeParams {
   enum class Method : std::uint8_t { potential, paper };
   Method method = Method::potential;
-  double K_N_m = 120;      // at the hand, on the membrane
+  double K_N_m = 200;      // at the hand, on the membrane: 2 b/T of the default device at 1 kHz
   double d0_m = 40e-6;     // distance from the membrane at which the pull has halved (needle scale)
   double r0_m = 1e-6;      // free radius at the membrane (needle scale)
   double alpha_rad = 0.2;  // half-angle of the free core

@@ -356,6 +356,30 @@ TEST(Servo, pushes_a_handle_that_is_let_go_out_of_contact_and_no_further) {
   EXPECT_LT(fastest, 0.3);
 }
 
+TEST(Servo, lets_a_handle_that_is_let_go_come_to_rest_in_the_guide) {
+  for (const double rate : {1000.0, 8000.0}) {
+    ServoConfig config = icsi();
+    config.rate_Hz = rate;
+    Bench b(config);
+    b.tip_start = b.stage.tip = b.stage.target = Vec3(30e-6, 12e-6, 0);
+    b.wanted_x = 30e-6;
+    b.run(1);
+    EXPECT_GT(b.sample().cone_N, 0.2);
+    b.hand.arm_k = b.hand.arm_c = 0;
+    b.run(5);
+    double low = 1, high = -1;
+    b.every_tick = [&] {
+      low = std::min(low, b.hand.x.y());
+      high = std::max(high, b.hand.x.y());
+    };
+    b.run(1);
+    EXPECT_LT(high - low, 0.1e-3);
+    EXPECT_LT(std::abs(b.stage.tip.y()), 4e-6);  // inside the free core
+    std::printf("%.0f Hz: handle moves %.3f mm, tip %.1f um beside the axis\n", rate, 1e3 * (high - low),
+                1e6 * b.stage.tip.y());
+  }
+}
+
 TEST(Servo, drops_the_force_at_the_puncture_without_a_bounce) {
   Bench b(icsi());
   b.to_indentation();

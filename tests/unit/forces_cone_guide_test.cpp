@@ -199,7 +199,7 @@ TEST(ConeGuide, force_is_bounded_however_far_away) {
       largest = std::max(largest, cone_pull(params, kScale, frame, at(frame, d, r, 2)).force_N.norm());
     }
   }
-  EXPECT_LT(largest, 1.2);  // N
+  EXPECT_LT(largest, 2.0);  // N, under the hand's limit of 3
   std::printf("largest pull: %.2f N\n", largest);
 }
 

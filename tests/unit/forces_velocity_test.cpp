@@ -19,19 +19,19 @@ double textbook(const std::vector<double>& t, const std::vector<double>& y, int 
   const int k = static_cast<int>(y.size()) - 1;
   double slope = 0;
   for (int n = 1; n <= std::min(window, k); ++n) {
-    long double mt = 0, my = 0;
+    double mt = 0, my = 0;
     for (int i = 0; i <= n; ++i) {
       mt += t[k - i];
       my += y[k - i];
     }
     mt /= n + 1;
     my /= n + 1;
-    long double top = 0, bottom = 0;
+    double top = 0, bottom = 0;
     for (int i = 0; i <= n; ++i) {
       top += (t[k - i] - mt) * (y[k - i] - my);
       bottom += (t[k - i] - mt) * (t[k - i] - mt);
     }
-    const double b = static_cast<double>(top / bottom);
+    const double b = top / bottom;
     bool fits = true;
     for (int i = 1; i <= n; ++i)
       fits = fits && std::abs(y[k - i] - (y[k] + b * (t[k - i] - t[k]))) <= d * (1 + 1e-9);

@@ -232,12 +232,12 @@ int run(int argc, char** argv) {
                             rt::slot<&Core::tick_servo>("servo", core)};
   rt::ExecutiveConfig config;
   config.period_ns = period_ns;
+  config.start_ns = start_ns;
   config.overrun_window_ticks =
       static_cast<std::uint32_t>(std::clamp(scene->servo.overrun_window_s * scene->servo.rate_Hz, 1.0,
                                             static_cast<double>(rt::MissedWindow::kMaxTicks)));
   rt::Executive executive(clock, monotonic, config, slots, status);
 
-  if (real) monotonic.sleep_until_ns(start_ns - period_ns);
   const rt::ThreadCounters before = rt::read_thread_counters();
   rt::allocation_trap::arm(rt::allocation_trap::On::allocation_count);
   const bool watched = rt::allocation_trap::armed();

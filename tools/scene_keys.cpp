@@ -8,7 +8,6 @@
 namespace punctum::tools {
 namespace {
 
-using sim::Device;
 using sim::Failure;
 
 Key real(std::string name, double& target, double min, double max) {

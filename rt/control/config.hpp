@@ -11,11 +11,11 @@ using hal::Vec3;
 
 // Eq. 5 and 4 (Sun & Nelson 2003) with the paper's values.
 struct MembraneParams {
-  double E_Pa = 35.3e3;    // elastic modulus
-  double nu = 0.5;         // Poisson ratio
-  double h_m = 4.6e-6;     // thickness
-  double c_m = 3.8e-6;     // pipette radius
-  double R_m = 60e-6;      // undeformed cell, until vision knows better
+  double E_Pa = 35.3e3;  // elastic modulus
+  double nu = 0.5;       // Poisson ratio
+  double h_m = 4.6e-6;   // thickness
+  double c_m = 3.8e-6;   // pipette radius
+  double R_m = 60e-6;    // undeformed cell, until vision knows better
 };
 
 // Cone-shaped attractive guide, eq. 6 and fig. 13.
@@ -33,30 +33,30 @@ struct ConeParams {
 
 // Withdrawal along the insertion axis only.
 struct AxisParams {
-  double K_N_m = 150;      // lateral, at the hand
-  double eps_m = 1e-6;     // width of the C1 ramp (needle scale)
+  double K_N_m = 150;   // lateral, at the hand
+  double eps_m = 1e-6;  // width of the C1 ramp (needle scale)
   double ramp_s = 0.2;
   double B_inward_Ns_m = 5;  // in withdrawal, against motion back into the cell; 0 = off
 };
 
 struct DampingParams {
-  double B1_Ns_m = 1.0;    // outside
-  double B2_Ns_m = 4.0;    // inside, > B1
-  double ramp_s = 0.035;   // 20 .. 50 ms
+  double B1_Ns_m = 1.0;   // outside
+  double B2_Ns_m = 4.0;   // inside, > B1
+  double ramp_s = 0.035;  // 20 .. 50 ms
 };
 
 // FOAW (Janabi-Sharifi 2000): longest window whose best-fit line stays within +-d of all samples.
 struct VelocityParams {
-  int window = 16;         // intervals between samples at most, <= 64
-  double d_m = 0.03e-3;    // encoder step
+  int window = 16;       // intervals between samples at most, <= 64
+  double d_m = 0.03e-3;  // encoder step
 };
 
 struct MappingParams {
-  double position_scale = 500;      // k_p: hand metres per needle metre
-  double force_scale = 1e5;         // k_f: hand newtons per needle newton
-  double tremor_cutoff_Hz = 3.0;    // second-order low-pass on the set-point; 0 = off
-  double coupling_s = 0.3;          // forces return over this after a start, a clutch, a reset
-  double max_tilt_rad = 0.1;        // the handle's orientation tilts the approach axis up to this; 0 = off
+  double position_scale = 500;    // k_p: hand metres per needle metre
+  double force_scale = 1e5;       // k_f: hand newtons per needle newton
+  double tremor_cutoff_Hz = 3.0;  // second-order low-pass on the set-point; 0 = off
+  double coupling_s = 0.3;        // forces return over this after a start, a clutch, a reset
+  double max_tilt_rad = 0.1;      // the handle's orientation tilts the approach axis up to this; 0 = off
   Vec3 workspace_min_m{-280e-6, -180e-6, -60e-6};  // of the needle tip, world frame
   Vec3 workspace_max_m{280e-6, 180e-6, 60e-6};
 };
@@ -65,37 +65,37 @@ struct LimitParams {
   double hand_force_N = 3.0;
   double stage_velocity_m_s = 400e-6;
   double stage_acceleration_m_s2 = 20e-3;
-  double penetration_depth_m = 90e-6;   // past the undeformed outer membrane
-  double far_wall_m = 20e-6;            // smallest distance to the far wall
-  double tip_force_soft_N = 30e-6;      // the needle is not pushed further
-  double tip_force_hard_N = 60e-6;      // latched fault
+  double penetration_depth_m = 90e-6;  // past the undeformed outer membrane
+  double far_wall_m = 20e-6;           // smallest distance to the far wall
+  double tip_force_soft_N = 30e-6;     // the needle is not pushed further
+  double tip_force_hard_N = 60e-6;     // latched fault
   double following_error_m = 10e-6;
 };
 
 struct PhaseParams {
-  double contact_on_m = 0.3e-6;      // w_d that begins contact
-  double contact_off_m = 0.5e-6;     // gap that ends it
-  double indentation_on_m = 3e-6;    // w_d
-  double withdrawal_speed_m_s = 5e-6;// outward speed that begins withdrawal once inside
-  double withdrawal_back_m = 2e-6;   // and the way back from the deepest point that it takes
-  double clear_m = 10e-6;            // gap that ends withdrawal
+  double contact_on_m = 0.3e-6;        // w_d that begins contact
+  double contact_off_m = 0.5e-6;       // gap that ends it
+  double indentation_on_m = 3e-6;      // w_d
+  double withdrawal_speed_m_s = 5e-6;  // outward speed that begins withdrawal once inside
+  double withdrawal_back_m = 2e-6;     // and the way back from the deepest point that it takes
+  double clear_m = 10e-6;              // gap that ends withdrawal
   double timeout_s[7] = {120, 20, 30, 15, 20, 20, 60};  // per phase, alarm
 };
 
 // The membrane between two frames, and what happens when vision falls silent.
 struct LocalModelParams {
-  double gain = 0.3;                 // of one observation
-  double max_rate_m_s = 100e-6;      // bounded correction of the membrane's position
-  double stale_after_s = 0.30;       // age from which the rendered force fades
+  double gain = 0.3;             // of one observation
+  double max_rate_m_s = 100e-6;  // bounded correction of the membrane's position
+  double stale_after_s = 0.30;   // age from which the rendered force fades
   double fade_s = 0.15;
-  double return_s = 0.4;             // the force returns over this once vision is back
-  double dimple_scale = 0.6;         // a = c + dimple_scale sqrt(2 R w_d), until vision has seen a dimple
+  double return_s = 0.4;               // the force returns over this once vision is back
+  double dimple_scale = 0.6;           // a = c + dimple_scale sqrt(2 R w_d), until vision has seen a dimple
   double dimple_scale_rate_1_s = 0.5;  // bounded correction of it
-  double dimple_min_m = 2e-6;        // w_d from which a dimple's width is believed
+  double dimple_min_m = 2e-6;          // w_d from which a dimple's width is believed
 };
 
 struct InjectorParams {
-  double max_open_s = 2.0;           // clamped by the tick
+  double max_open_s = 2.0;  // clamped by the tick
 };
 
 struct VacuumParams {
@@ -104,22 +104,22 @@ struct VacuumParams {
 };
 
 struct EstopParams {
-  double discrepancy_s = 0.05;       // contacts may differ this long
-  double hand_ramp_s = 0.02;         // hand force to zero
-  double power_off_after_s = 0.5;    // drive power off at standstill or after this
+  double discrepancy_s = 0.05;     // contacts may differ this long
+  double hand_ramp_s = 0.02;       // hand force to zero
+  double power_off_after_s = 0.5;  // drive power off at standstill or after this
 };
 
 struct ServoConfig {
-  double rate_Hz = 1000;             // 1, 2, 4 or 8 kHz
-  int stage_divisor = 1;             // stage set-points every n-th tick
-  int overrun_limit = 20;            // missed ticks in the window
+  double rate_Hz = 1000;   // 1, 2, 4 or 8 kHz
+  int stage_divisor = 1;   // stage set-points every n-th tick
+  int overrun_limit = 20;  // missed ticks in the window
   double overrun_window_s = 1.0;
-  bool real_actuators = false;       // an overrun is then a fault, not an alarm
+  bool real_actuators = false;  // an overrun is then a fault, not an alarm
   double hand_timeout_s = 0.02;
-  double hand_jump_m = 0.02;         // between two ticks at 1 kHz
-  double stage_timeout_s = 0.02;     // silent for longer: stage_lost
-  int cells = 1;                     // to inject; 0 = until the time limit
-  bool vision = true;                // observations are expected
+  double hand_jump_m = 0.02;      // between two ticks at 1 kHz
+  double stage_timeout_s = 0.02;  // silent for longer: stage_lost
+  int cells = 1;                  // to inject; 0 = until the time limit
+  bool vision = true;             // observations are expected
 
   VelocityParams velocity;
   MappingParams mapping;

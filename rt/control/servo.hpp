@@ -1,7 +1,7 @@
 // The servo: everything one tick of the control core does.
 //
 // Built once at start from a scene's ServoConfig and the devices that exist; statically allocated (about
-// 0.7 MB, mostly the pose history). tick() is real-time safe: no heap, lock, system call, exception.
+// 0.5 MB, mostly the pose history). tick() is real-time safe: no heap, lock, system call, exception.
 // One thread calls it.
 #pragma once
 

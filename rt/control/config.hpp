@@ -47,8 +47,9 @@ struct DampingParams {
 
 // FOAW (Janabi-Sharifi 2000): longest window whose best-fit line stays within +-d of all samples.
 struct VelocityParams {
-  int window = 16;       // intervals between samples at most, <= 64
-  double d_m = 0.03e-3;  // encoder step
+  int window = 16;          // intervals between samples at most, at 1 kHz; grows with the rate, up to 64
+  double d_m = 0.03e-3;     // encoder step
+  double smooth_s = 0.003;  // first-order low-pass behind it: one encoder count is no click; 0 = off
 };
 
 struct MappingParams {

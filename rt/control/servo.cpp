@@ -25,6 +25,13 @@ constexpr int kCommandsPerTick = 8;
 }
 [[nodiscard]] bool is_unit(const hal::Vec3& v) noexcept { return std::abs(v.squaredNorm() - 1) < 1e-3; }
 
+// The window is meant in time: as many intervals more as the rate is higher.
+[[nodiscard]] VelocityParams at_rate(VelocityParams params, double rate_Hz) noexcept {
+  const double intervals = params.window * std::max(rate_Hz / 1000, 1.0);
+  params.window = static_cast<int>(std::min(intervals, static_cast<double>(Foaw::kMaxWindow)));
+  return params;
+}
+
 [[nodiscard]] Fault first_of(Fault a, Fault b) noexcept { return a != Fault::none ? a : b; }
 
 void copy(double (&to)[3], const hal::Vec3& from) noexcept {
@@ -38,7 +45,7 @@ Servo::Servo(const ServoConfig& config, const Devices& devices, Station& station
       devices_(devices),
       station_(station),
       degraded_(degraded),
-      foaw_(config.velocity),
+      foaw_(at_rate(config.velocity, config.rate_Hz)),
       mapping_(config.mapping),
       stage_limits_(config.limits, config.mapping),
       latch_(config.estop) {
@@ -308,7 +315,8 @@ void Servo::take_newest_observation() noexcept {
     if (station_.observation.newest(seen, index) == hal::Read::ok) {
       observation_head_ = index + 1;
       ++observations_;
-      if (!model_->observe(seen, inside())) alarms_ |= alarm_sensor;
+      const bool used = model_->observe(seen, inside());
+      if (!used && model_->membrane().known) alarms_ |= alarm_sensor;
     }
   }
 
@@ -331,6 +339,9 @@ void Servo::take_newest_observation() noexcept {
 
 void Servo::estimate_velocity() noexcept {
   if (hand_fresh_) foaw_.step(hand_.position_m, between_hand_s_);
+  const double tau_s = config_.velocity.smooth_s;
+  const double part = tau_s > 0 ? 1 - std::exp(-dt_s_ / tau_s) : 1.0;
+  hand_velocity_m_s_ += part * (foaw_.velocity() - hand_velocity_m_s_);
 }
 
 void Servo::advance_phase() noexcept {
@@ -372,7 +383,7 @@ hal::Vec3 Servo::sum_force_effects() noexcept {
   coupling_.step(holding && !button(hal::kButtonClutch), return_s, kDecouple_s, dt_s_);
 
   const hal::Vec3& tip = mapping_.hand_point();
-  const hal::Vec3 velocity = world_from_hand(foaw_.velocity());
+  const hal::Vec3 velocity = world_from_hand(hand_velocity_m_s_);
   const bool known = model_ && model_->membrane().known;
   const bool punctured = inside() || phase() == Phase::clear;
   const double gain_before = fixture_gain_;
@@ -538,7 +549,7 @@ void Servo::publish(const TickInfo& now) noexcept {
   s.cell = phases_ ? phases_->cell() : 0;
 
   copy(s.x_m, hand_.position_m);
-  copy(s.v_m_s, foaw_.velocity());
+  copy(s.v_m_s, hand_velocity_m_s_);
   copy(s.tip_m, stage_.tip_m);
   copy(s.cmd_m, stage_limits_.set_point().tip_m);
   copy(s.force_N, hand_force_N_);

@@ -177,6 +177,7 @@ class Servo {
   Ramp presence_;  // of every force: from the start, after a reset, to the end
   Ramp coupling_;  // of the forces that belong to the needle: off while the clutch is pressed
   double fixture_gain_ = 0;
+  hal::Vec3 hand_velocity_m_s_ = hal::Vec3::Zero();  // FOAW and its low-pass, device frame
   double depth_m_ = 0;
   double outward_m_s_ = 0;  // of the tip, low-passed
   hal::Vec3 tip_before_m_ = hal::Vec3::Zero();

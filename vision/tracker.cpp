@@ -483,13 +483,6 @@ bool Tracker::Impl::start_pair(const Found& main) {
   const double mean = median_of(r1);
   Second in = find_second(r1, centre, main.polarity, false),
          out = find_second(r1, centre, main.polarity, true);
-    printf(
-        "main pol %d mean %.1f level %.2f bg %.2f sup %.2f vis %.2f | in pol %d q %.2f level %.2f bg %.2f r "
-        "%.1f| out pol %d q %.2f level %.2f bg %.2f r %.1f\n",
-        (int)main.polarity, mean, main.path.level, main.path.background, main.path.support, main.path.visible,
-        (int)in.polarity, in.quality, in.path.level, in.path.background,
-        in.path.r.empty() ? 0 : median_of(in.path.r), (int)out.polarity, out.quality, out.path.level,
-        out.path.background, out.path.r.empty() ? 0 : median_of(out.path.r));
   const auto good = [&](const Second& x) { return clear_enough(x, main.path.level); };
   const auto set = [&](Followed& m, const std::vector<double>& r, Polarity q, double level) {
     m = {};
@@ -803,8 +796,6 @@ void Tracker::Impl::follow(Followed& m, Membrane& out, const Followed* inside_of
     // Where an edge lies further out than the dimple and is as well seen, the dimple is another membrane's.
     const double apart = beside([&](std::size_t i) { return std::max(0.0, p_free.r[i] - p_pushed.r[i]); });
     is_free = puncture.punctured() && is_outer ? seen(p_free) > 0.4 : apart > 1.5 && seen(p_free) > 0.7;
-      printf("%s apart %.2f seen free %.2f pushed %.2f\n", is_outer ? "outer" : "inner", apart, seen(p_free),
-             seen(p_pushed));
     path = is_free ? std::move(p_free) : std::move(p_pushed);
   }
   if (path.r.empty()) {

@@ -67,6 +67,7 @@ void Measures::close_cell() {
   };
   keep(now_.contact_delay_s, contact_delay_s);
   keep(now_.puncture_delay_s, puncture_delay_s);
+  keep(now_.inner_delay_s, inner_delay_s);
   keep(now_.lateral_error_m, lateral_error_m);
   keep(now_.lateral_contact_m, lateral_contact_m);
   keep(now_.beyond_puncture_m, beyond_puncture_m);
@@ -159,12 +160,14 @@ void Measures::tick(const rt::TelemetrySample& s, const sim::Snapshot* world) {
         if (phase_contact_s_ >= 0 && true_contact_s_ >= 0)
           now_.contact_delay_s = phase_contact_s_ - true_contact_s_;
       }
+      if (truth.zona_punctured && phase_puncture_s_ >= 0 && !now_.puncture_delay_s)
+        now_.puncture_delay_s = phase_puncture_s_ - truth.zona_puncture_s;
       const double depth = -truth.gap_m;
       if (truth.punctured) {
         if (!puncture_seen_) puncture_seen_ = true, puncture_depth_m_ = depth;
         now_.beyond_puncture_m = std::max(now_.beyond_puncture_m.value_or(0), depth - puncture_depth_m_);
-        if (phase_puncture_s_ >= 0 && !now_.puncture_delay_s)
-          now_.puncture_delay_s = phase_puncture_s_ - truth.puncture_s;
+        if (phase_puncture_s_ >= 0 && !now_.inner_delay_s)
+          now_.inner_delay_s = phase_puncture_s_ - truth.puncture_s;
       }
       if (truth.contact) {
         now_.max_depth_m = std::max(now_.max_depth_m, depth);

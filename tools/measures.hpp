@@ -56,7 +56,8 @@ struct PhaseSpan {
 struct CellMeasures {
   std::uint32_t cell = 0;
   std::optional<double> contact_delay_s;   // phase contact after true contact; < 0 = too early
-  std::optional<double> puncture_delay_s;  // phase puncture after the innermost membrane gave way
+  std::optional<double> puncture_delay_s;  // phase puncture after the outer membrane gave way
+  std::optional<double> inner_delay_s;     // ... after the innermost one did
   std::optional<double>
       lateral_error_m;  // needle axis beside the cell's centre when the outer membrane gave way
   std::optional<double> lateral_contact_m;  // the same at first contact
@@ -81,8 +82,8 @@ class Measures {
   std::vector<PhaseSpan> phases;
   std::vector<CellMeasures> cells;
   std::uint64_t phase_count = 0, cell_count = 0, cells_done = 0, cells_lost = 0;
-  Spread contact_delay_s, puncture_delay_s, lateral_error_m, lateral_contact_m, beyond_puncture_m,
-      withdrawal_s;
+  Spread contact_delay_s, puncture_delay_s, inner_delay_s, lateral_error_m, lateral_contact_m,
+      beyond_puncture_m, withdrawal_s;
   double peak_force_N = 0, max_depth_m = 0, peak_hand_N = 0;
 
   // Estimated less true needle force, from contact until the outer membrane gives way.

@@ -169,6 +169,7 @@ tl::expected<void, std::string> write_report(const std::string& path, const Scen
   // Against the truth. One number per run: the mean over its cells; peaks are the largest.
   j["contact_delay_ms"] = mean(m.contact_delay_s, 1e3);
   j["puncture_delay_ms"] = mean(m.puncture_delay_s, 1e3);
+  j["puncture_inner_delay_ms"] = mean(m.inner_delay_s, 1e3);
   j["force_error_rms_N"] = number(m.force_error_rms_N());
   j["force_error_mean_N"] =
       m.force_ticks > 0 ? Json(m.force_error_sum / static_cast<double>(m.force_ticks)) : Json(nullptr);

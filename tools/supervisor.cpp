@@ -99,6 +99,7 @@ class Run {
     if (line_drawn_) fmt::print("\r\033[K");
     line_drawn_ = false;
   }
+  [[nodiscard]] bool long_run() const { return scene_.seconds > kLongRun_s || scene_.seconds <= 0; }
   tl::expected<void, std::string> start_vision();
   void watch_vision();
   void watch_interrupts();
@@ -133,7 +134,7 @@ tl::expected<void, std::string> Run::start_vision() {
   std::vector<std::string> args{"live",        "--scene", folder_ + "/scene.toml", "--station",
                                 station_name_, "--out",   folder_ + "/obs.csv"};
   if (bench_) args.insert(args.end(), {"--bench", bench_name_});
-  if (settings_.frames) args.insert(args.end(), {"--overlay", folder_ + "/frames"});
+  if (settings_.frames && !long_run()) args.insert(args.end(), {"--overlay", folder_ + "/frames"});
   auto child = Child::start("punctum-vision", args, folder_ + "/vision.log");
   if (!child) return tl::unexpected(child.error());
   vision_ = std::move(*child);
@@ -329,7 +330,7 @@ int Run::run() {
   std::uint64_t every = settings_.samples_every;
   if (every == 0) {
     every = 1;
-    if (scene_.seconds > kLongRun_s || scene_.seconds <= 0) {
+    if (long_run()) {
       const double limit = scene_.seconds > 0 ? scene_.seconds : 8 * 3600.0;
       every = std::max<std::uint64_t>(
           1, static_cast<std::uint64_t>(limit * scene_.servo.rate_Hz) / kRowsOfLongRun);

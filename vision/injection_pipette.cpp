@@ -9,7 +9,7 @@
 
 namespace punctum::vision {
 
-bool InjectionPipette::cut(const cv::Mat& grey, const Point& tip) {
+bool InjectionPipette::cut(const GradientField& field, const Point& tip) {
   // Shaft and end face, and next to nothing of what lies ahead of the tip.
   const double back = std::clamp(6 * last_.half_width, 14.0, 40.0), ahead = 2.5;
   const double wide = last_.half_width_at(back) + 4;
@@ -18,16 +18,16 @@ bool InjectionPipette::cut(const cv::Mat& grey, const Point& tip) {
                                 static_cast<int>(std::lround(std::min(a.y, b.y) - wide)),
                                 static_cast<int>(std::lround(std::abs(a.x - b.x))) + 1,
                                 static_cast<int>(std::lround(std::abs(a.y - b.y) + 2 * wide)) + 1) &
-                       cv::Rect(0, 0, grey.cols, grey.rows);
+                       field.area;
   if (box.width < 8 || box.height < 6) {
     return false;
   }
-  template_ = grey(box).clone();
+  template_ = field.smooth(box - field.area.tl()).clone();
   tip_in_template_ = tip - Point(box.x, box.y);
   return true;
 }
 
-bool InjectionPipette::start(const GradientField& field, const cv::Mat& grey, double noise) {
+bool InjectionPipette::start(const GradientField& field, double noise) {
   std::optional<TubeTrace> best;
   const double width_max = std::max(22.0, 8 * c_px_);
   for (const Side s : {Side::right, Side::left}) {
@@ -49,8 +49,9 @@ bool InjectionPipette::start(const GradientField& field, const cv::Mat& grey, do
   last_.half_width = best->end_half_width;
   last_.taper = std::clamp((best->half_width - best->end_half_width) / std::max(best->length, 1.0), 0.0, 0.2);
   last_.tip = best->end();
+  double straight = 0;
   for (int round = 0; round < 3; ++round) {
-    fit_edges(field, noise, last_);
+    straight = fit_edges(field, noise, last_);
     if (const auto s = walls_end(field, last_, std::min(30.0, 0.5 * best->length), round == 0 ? 25 : 10)) {
       last_.tip += *s * last_.axis;
     }
@@ -60,7 +61,11 @@ bool InjectionPipette::start(const GradientField& field, const cv::Mat& grey, do
   offset_frames_ = 0;
   calibrate_end(field, last_, noise);
   last_.tip += end_offset_ * last_.axis;
-  if (!cut(grey, last_.tip)) {
+  if (straight < 0.65 || last_.half_width > 2 * c_px_ + 1) {
+    why_ = "what enters through the border is not a straight needle";
+    return false;
+  }
+  if (!cut(field, last_.tip)) {
     why_ = "tip too close to the border";
     return false;
   }
@@ -74,7 +79,7 @@ bool InjectionPipette::start(const GradientField& field, const cv::Mat& grey, do
   return true;
 }
 
-void InjectionPipette::fit_edges(const GradientField& field, double noise, NeedleFix& fix) const {
+double InjectionPipette::fit_edges(const GradientField& field, double noise, NeedleFix& fix) const {
   // Both edges at stations along the shaft; straight lines through middle and half-width.
   struct Station {
     double s, mid, half, weight;
@@ -116,12 +121,14 @@ void InjectionPipette::fit_edges(const GradientField& field, double noise, Needl
     found = u0 + at * kStep;
     return true;
   };
+  int tried = 0;
   for (double s = 8; s < 170; s += 5) {
     const Point p = fix.at(s, 0);
     if (p.x < field.area.x + 3 || p.x > field.area.x + field.area.width - 4 || p.y < field.area.y + 3 ||
         p.y > field.area.y + field.area.height - 4) {
       break;
     }
+    ++tried;
     double lo = 0, hi = 0;
     const double w = fix.half_width_at(s);
     if (edge(s, -w, lo) && edge(s, w, hi) && hi - lo > 0.5 * w) {
@@ -129,7 +136,7 @@ void InjectionPipette::fit_edges(const GradientField& field, double noise, Needl
     }
   }
   if (stations.size() < 4) {
-    return;
+    return 0;
   }
   double m0 = 0, m1 = 0, h0 = 0, h1 = 0;
   for (int round = 0; round < 5; ++round) {
@@ -145,7 +152,7 @@ void InjectionPipette::fit_edges(const GradientField& field, double noise, Needl
     }
     const double det = s0 * s2 - s1 * s1;
     if (std::abs(det) < 1e-9) {
-      return;
+      return 0;
     }
     m0 = (a0 * s2 - a1 * s1) / det;
     m1 = (s0 * a1 - s1 * a0) / det;
@@ -165,6 +172,11 @@ void InjectionPipette::fit_edges(const GradientField& field, double noise, Needl
     fix.half_width = h0;
     fix.taper = std::clamp(h1, 0.0, 0.2);
   }
+  int straight = 0;
+  for (const Station& t : stations) {
+    straight += std::abs(t.mid - m0 - m1 * t.s) < 1 && std::abs(t.half - h0 - h1 * t.s) < 1;
+  }
+  return static_cast<double>(straight) / tried;
 }
 
 std::optional<double> InjectionPipette::wall_step(const GradientField& field, const NeedleFix& fix,
@@ -284,7 +296,7 @@ std::optional<double> InjectionPipette::walls_end(const GradientField& field, co
   return place[last];
 }
 
-NeedleFix InjectionPipette::find(const GradientField& field, const cv::Mat& grey, double noise) {
+NeedleFix InjectionPipette::find(const GradientField& field, double noise) {
   NeedleFix fix = last_;
   fix.ok = false;
   fix.why.clear();
@@ -292,14 +304,14 @@ NeedleFix InjectionPipette::find(const GradientField& field, const cv::Mat& grey
     fix.why = why_.empty() ? "not started" : why_;
     return fix;
   }
-  const cv::Rect all(0, 0, grey.cols, grey.rows);
+  const cv::Rect all = field.area;
   const Point expected = last_.tip + velocity_ - tip_in_template_;
   const int rx = 24 + 8 * lost_, ry = 10 + 6 * lost_;
   const cv::Rect window =
       cv::Rect(static_cast<int>(std::lround(expected.x)) - rx, static_cast<int>(std::lround(expected.y)) - ry,
                template_.cols + 2 * rx, template_.rows + 2 * ry) &
       all;
-  const auto p = peak(centred_correlation_map(grey(window), template_));
+  const auto p = peak(centred_correlation_map(field.smooth(window - all.tl()), template_));
   fix.score = p ? p->score : 0;
   if (!p || p->score < 0.3) {
     fix.why = "tip not recognised";
@@ -307,7 +319,7 @@ NeedleFix InjectionPipette::find(const GradientField& field, const cv::Mat& grey
     if (++lost_ > 3) {
       // From the border again; what is found takes its place.
       const NeedleFix before = last_;
-      if (start(field, grey, noise)) {
+      if (start(field, noise)) {
         return last_;
       }
       last_ = before;
@@ -321,11 +333,11 @@ NeedleFix InjectionPipette::find(const GradientField& field, const cv::Mat& grey
   const Point across(-last_.axis.y, last_.axis.x);
   fix.tip = last_.tip + velocity_ - end_offset_ * last_.axis;
   fix.tip += (correlated - fix.tip).dot(across) * across;
-  fit_edges(field, noise, fix);
+  (void)fit_edges(field, noise, fix);
   auto end = walls_end(field, fix, 36, 44);
   if (end) {
     fix.tip += *end * fix.axis;
-    fit_edges(field, noise, fix);
+    (void)fit_edges(field, noise, fix);
     if (const auto again = walls_end(field, fix, 16, 16)) {
       fix.tip += *again * fix.axis;
     }
@@ -357,8 +369,7 @@ void InjectionPipette::calibrate_end(const GradientField& field, const NeedleFix
   end_offset_ += (*step - end_offset_) / std::min(++offset_frames_, 30);
 }
 
-void InjectionPipette::learn(const GradientField& field, const cv::Mat& grey, const NeedleFix& fix,
-                             double noise) {
+void InjectionPipette::learn(const GradientField& field, const NeedleFix& fix, double noise) {
   if (!fix.ok || template_.empty()) {
     return;
   }
@@ -367,9 +378,10 @@ void InjectionPipette::learn(const GradientField& field, const cv::Mat& grey, co
   calibrate_end(field, walls, noise);
   cv::Mat here;
   cv::getRectSubPix(
-      grey, template_.size(),
-      cv::Point2f(static_cast<float>(fix.tip.x - tip_in_template_.x + (template_.cols - 1) / 2.0),
-                  static_cast<float>(fix.tip.y - tip_in_template_.y + (template_.rows - 1) / 2.0)),
+      field.smooth, template_.size(),
+      cv::Point2f(
+          static_cast<float>(fix.tip.x - field.area.x - tip_in_template_.x + (template_.cols - 1) / 2.0),
+          static_cast<float>(fix.tip.y - field.area.y - tip_in_template_.y + (template_.rows - 1) / 2.0)),
       here);
   cv::addWeighted(template_, 0.9, here, 0.1, 0, template_);
 }

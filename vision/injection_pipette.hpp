@@ -32,18 +32,19 @@ class InjectionPipette {
   InjectionPipette(Side side, double c_px) : side_(side), c_px_(c_px) {}
 
   // Looks for it from the border; true when a tip template was cut.
-  [[nodiscard]] bool start(const GradientField& field, const cv::Mat& grey, double noise);
-  [[nodiscard]] NeedleFix find(const GradientField& field, const cv::Mat& grey, double noise);
+  [[nodiscard]] bool start(const GradientField& field, double noise);
+  [[nodiscard]] NeedleFix find(const GradientField& field, double noise);
   // While nothing touches the tip its template may follow slow changes of focus and light.
-  void learn(const GradientField& field, const cv::Mat& grey, const NeedleFix& fix, double noise);
+  void learn(const GradientField& field, const NeedleFix& fix, double noise);
 
   [[nodiscard]] bool started() const noexcept { return started_; }
   [[nodiscard]] Side side() const noexcept { return found_side_; }
   [[nodiscard]] const std::string& why() const noexcept { return why_; }
 
  private:
-  bool cut(const cv::Mat& grey, const Point& tip);
-  void fit_edges(const GradientField& field, double noise, NeedleFix& fix) const;
+  bool cut(const GradientField& field, const Point& tip);
+  // Returns the share of the stations along the shaft whose edges lie on the two straight lines.
+  double fit_edges(const GradientField& field, double noise, NeedleFix& fix) const;
   // Distance ahead of fix.tip at which both walls end, within +-reach: the steepest change of grey along
   // them.
   [[nodiscard]] std::optional<double> wall_step(const GradientField& field, const NeedleFix& fix,

@@ -16,6 +16,7 @@ bool Puncture::update(const PunctureInput& in) {
   if (!in.contact || !in.points) {
     have_last_ = false;
     inside_frames_ = 0;
+    recoil_frames_ = 0;
     if (!in.contact) {
       pushing_ = false;
     }
@@ -40,7 +41,10 @@ bool Puncture::update(const PunctureInput& in) {
   // more than the needle itself was withdrawn.
   const double back = deepest_ - in.membrane_px;
   const double needle_back = std::max(0.0, tip_at_deepest_ - in.tip_px);
-  if (!punctured_ && back - needle_back > recoil_px_) {
+  // A large step back is enough; a small one must last, or it is noise of the contact points.
+  const double recoil = back - needle_back;
+  recoil_frames_ = recoil > recoil_px_ ? recoil_frames_ + 1 : 0;
+  if (!punctured_ && (recoil > 3 * recoil_px_ || recoil_frames_ >= 2)) {
     punctured_ = true;
   }
   // A tip far inside a membrane that is hardly dented is through it, whether or not the recoil was seen.

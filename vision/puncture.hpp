@@ -42,6 +42,7 @@ class Puncture {
   bool pushing_ = false;  // it has moved with the needle
   double first_ = 0;      // place at the beginning of the contact
   int inside_frames_ = 0;
+  int recoil_frames_ = 0;
   std::int64_t frames_ = 0;  // since the start
 };
 

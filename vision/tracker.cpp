@@ -23,6 +23,8 @@ namespace {
 
 using Seconds = std::chrono::steady_clock;
 
+constexpr double kNeedleMargin_px = 2.5;  // what blur spreads beyond the needle's edges
+
 class Stopwatch {
  public:
   double lap_us() {
@@ -113,7 +115,7 @@ struct Tracker::Impl {
 
   void locate_pipettes(Stopwatch& watch);
   void tip_on_membrane();
-  void erase_pipettes();
+  void erase_pipettes(double needle_margin);
   bool start_membranes();
   struct Found {
     EdgePath path;
@@ -165,9 +167,9 @@ const Result& Tracker::process(const hal::Frame& frame) { return impl_->process(
 void Tracker::Impl::locate_pipettes(Stopwatch& watch) {
   if (config.needle) {
     if (!needle.started()) {
-      (void)needle.start(field, grey, result.noise);
+      (void)needle.start(field, result.noise);
     }
-    result.needle = needle.find(field, grey, result.noise);
+    result.needle = needle.find(field, result.noise);
     tip_on_membrane();
   }
   result.us.needle = watch.lap_us();
@@ -234,12 +236,12 @@ void Tracker::Impl::tip_on_membrane() {
   n.tip += (-kBehind + (static_cast<double>(i) + offset) * kStep) * n.axis;
 }
 
-void Tracker::Impl::erase_pipettes() {
+void Tracker::Impl::erase_pipettes(double needle_margin) {
   mask.create(grey.size(), CV_8U);
   mask.setTo(0);
   std::vector<Polygon> polygons;
   if (result.needle.ok) {
-    polygons.push_back(needle_polygon(result.needle, grey.size(), 2.5, 1.5));
+    polygons.push_back(needle_polygon(result.needle, grey.size(), needle_margin, 1.5));
   }
   if (holder_tube && config.holder) {
     TubeTrace t = *holder_tube;
@@ -579,7 +581,7 @@ bool Tracker::Impl::start_membranes() {
       std::nth_element(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(7 * v.size() / 10), v.end());
       texture = static_cast<double>(v[7 * v.size() / 10]);
     }
-    for (const CircleCandidate& c : find_circles(field, mask, std::max(4 * gn, texture), r_min, r_max, 4)) {
+    for (const CircleCandidate& c : find_circles(field, mask, std::max(4 * gn, texture), r_min, r_max, 6)) {
       if (c.score >= 0.35) {
         circles.push_back(c.circle);
       }
@@ -912,7 +914,7 @@ void Tracker::Impl::learn_rest(Followed& m, const Membrane& seen, bool touched) 
 // Away from the needle a membrane keeps its outline: an arc that has left it follows something else.
 bool Tracker::Impl::strays(const std::vector<double>& rested, const EdgePath& path,
                            double needle_angle) const {
-  if (rested.size() != path.r.size() || !config.needle) {
+  if (rested.size() != path.r.size() || !result.needle.ok) {
     return false;
   }
   const double limit = std::max(6.0, 0.1 * median_of(rested));
@@ -1222,7 +1224,8 @@ const Result& Tracker::Impl::process(const hal::Frame& frame) {
   result.us.prepare = watch.lap_us();
 
   locate_pipettes(watch);
-  erase_pipettes();
+  // At the start a needle inside the cell must not split it: what shines beside its walls is covered as well.
+  erase_pipettes(restart ? 2.5 + 0.7 * result.needle.half_width : kNeedleMargin_px);
   remove_impurities();
   result.us.erase = watch.lap_us();
 
@@ -1244,6 +1247,7 @@ const Result& Tracker::Impl::process(const hal::Frame& frame) {
       return result;
     }
     keep_rest(outer_before, inner_before);
+    erase_pipettes(kNeedleMargin_px);
     remove_impurities();
     result.us.start = watch.lap_us();
   }
@@ -1261,7 +1265,7 @@ const Result& Tracker::Impl::process(const hal::Frame& frame) {
   classify_contact();
   result.us.contact = watch.lap_us();
   if (result.needle.ok && !result.contact && result.gap_px.value_or(99) > 12) {
-    needle.learn(field, grey, result.needle, result.noise);
+    needle.learn(field, result.needle, result.noise);
   }
   decide_phase();
   write_verdict();

@@ -33,18 +33,25 @@ bool Puncture::update(const PunctureInput& in) {
     deepest_ = in.membrane_px;
     tip_at_deepest_ = in.tip_px;
   }
-  if (in.membrane_px >= deepest_) {
-    deepest_ = in.membrane_px;
+  // Pushed, the membrane goes no faster than the needle: what jumps ahead of it is a mistaken point.
+  double membrane = in.membrane_px;
+  if (have_last_) {
+    membrane = std::min(membrane, last_membrane_ + std::max(0.0, in.tip_px - last_tip_) + 0.7);
+  }
+  if (membrane >= deepest_) {
+    deepest_ = membrane;
     tip_at_deepest_ = in.tip_px;
   }
   // Both signs of fig. 9: against the picture the membrane moves back, against the needle it moves back by
-  // more than the needle itself was withdrawn.
-  const double back = deepest_ - in.membrane_px;
+  // more than the needle itself was withdrawn. A punctured membrane gives up most of its dimple at once; a
+  // quarter of it in two frames, or three quarters in one, is no scatter of the contact points.
+  const double back = deepest_ - membrane;
   const double needle_back = std::max(0.0, tip_at_deepest_ - in.tip_px);
-  // A large step back is enough; a small one must last, or it is noise of the contact points.
   const double recoil = back - needle_back;
-  recoil_frames_ = recoil > recoil_px_ ? recoil_frames_ + 1 : 0;
-  if (!punctured_ && (recoil > 3 * recoil_px_ || recoil_frames_ >= 2)) {
+  const double dimple = std::max(0.0, deepest_ - (in.membrane_px - in.depth_px));
+  const double least = std::max(recoil_px_, 0.25 * dimple);
+  recoil_frames_ = recoil > least ? recoil_frames_ + 1 : 0;
+  if (!punctured_ && (recoil_frames_ >= 2 || recoil > std::max(3 * recoil_px_, 0.75 * dimple))) {
     punctured_ = true;
   }
   // A tip far inside a membrane that is hardly dented is through it, whether or not the recoil was seen.
@@ -57,7 +64,7 @@ bool Puncture::update(const PunctureInput& in) {
   }
   have_last_ = true;
   last_ns_ = in.t_ns;
-  last_membrane_ = in.membrane_px;
+  last_membrane_ = membrane;
   last_tip_ = in.tip_px;
   return punctured_;
 }

@@ -343,8 +343,10 @@ tl::expected<std::string, std::string> draw_figure(const std::string& folder, co
   for (std::size_t i = 0; scene.servo.phases && i < std::min<std::size_t>(drawn, 40); ++i) {
     const auto& p = m.phases[i];
     row = p.start_s < free_from ? (row + 1) % 3 : 0;
-    labels += fmt::format("set label {} '{}' at first {:.6f}, graph {:.3f} font ',9' front\n", i + 1,
-                          rt::name(p.phase), p.start_s + 0.003 * t_end, 0.94 - 0.07 * row);
+    const bool last = p.start_s > 0.94 * t_end;  // no room to its right
+    labels += fmt::format("set label {} '{}' at first {:.6f}, graph {:.3f} {} font ',9' front\n", i + 1,
+                          rt::name(p.phase), p.start_s + (last ? -0.003 : 0.003) * t_end, 0.94 - 0.07 * row,
+                          last ? "right" : "left");
     free_from = p.start_s + t_end * 0.085;
   }
 
@@ -381,12 +383,10 @@ tl::expected<std::string, std::string> draw_figure(const std::string& folder, co
           << "(column('tip_force_N')*1e6) with lines lc rgb '#c0392b' title 'estimate'";
     out << "\nset ylabel 'depth [um]'\nset xlabel 'time [s]'\nplot ";
     if (cell)
-      out << data << x
-          << "(-column('true_gap_m')*1e6) with lines lw 2 lc rgb '#999999' title 'tip past membrane, true', ";
+      out << data << x << "(-column('true_gap_m')*1e6) with lines lw 2 lc rgb '#999999' title 'tip, true', ";
     if (cell)
-      out << data << x
-          << "(column('true_wd_m')*1e6) with lines lw 2 lc rgb '#77aadd' title 'dimple w_d, true', ";
-    out << data << x << "(column('wd_m')*1e6) with lines lc rgb '#c0392b' title 'depth w_d, core'\n";
+      out << data << x << "(column('true_wd_m')*1e6) with lines lw 2 lc rgb '#77aadd' title 'dimple, true', ";
+    out << data << x << "(column('wd_m')*1e6) with lines lc rgb '#c0392b' title 'core'\n";
   } else {
     out << "set ylabel 'hand [mm]'\nplot " << data << x << "(column('x_m')*1e3) with lines title 'x', "
         << data << x << "(column('y_m')*1e3) with lines title 'y', " << data << x

@@ -33,9 +33,9 @@ class Clock {
 };
 
 // Buttons of the haptic handle.
-inline constexpr std::uint32_t kButtonClutch = 1U << 0;   // pressed: hand and stage are uncoupled
-inline constexpr std::uint32_t kButtonInject = 1U << 1;   // pressed: deposit the substance
-inline constexpr std::uint32_t kButtonNextCell = 1U << 2; // rising edge: a fresh cell is in place
+inline constexpr std::uint32_t kButtonClutch = 1U << 0;    // pressed: hand and stage are uncoupled
+inline constexpr std::uint32_t kButtonInject = 1U << 1;    // pressed: deposit the substance
+inline constexpr std::uint32_t kButtonNextCell = 1U << 2;  // rising edge: a fresh cell is in place
 
 struct HandState {
   Vec3 position_m = Vec3::Zero();  // device frame: x right, y up, z towards the operator
@@ -54,8 +54,8 @@ class HapticDevice {
 };
 
 struct StageState {
-  Vec3 tip_m = Vec3::Zero();            // needle tip by the stage's own encoders
-  Vec3 axis = -Vec3::UnitX();           // unit vector of the needle, pointing out of its tip
+  Vec3 tip_m = Vec3::Zero();   // needle tip by the stage's own encoders
+  Vec3 axis = -Vec3::UnitX();  // unit vector of the needle, pointing out of its tip
   Vec3 following_error_m = Vec3::Zero();
   bool enabled = false;
   bool at_standstill = false;
@@ -70,8 +70,8 @@ class Stage {
  public:
   [[nodiscard]] virtual Status read(StageState& out) noexcept = 0;
   [[nodiscard]] virtual Status command(const StageCommand& set_point) noexcept = 0;
-  virtual void quick_stop() noexcept = 0;        // brake on the drive's own ramp, then hold
-  virtual void enable(bool on) noexcept = 0;     // drive power; off only at standstill or past the limit
+  virtual void quick_stop() noexcept = 0;     // brake on the drive's own ramp, then hold
+  virtual void enable(bool on) noexcept = 0;  // drive power; off only at standstill or past the limit
 
  protected:
   ~Stage() = default;
@@ -82,7 +82,7 @@ struct EstopState {
   bool contact_a_closed = true;  // false = stop; a cut wire reads false
   bool contact_b_closed = true;
   bool reset_pressed = false;
-  bool pulse_seen = false;       // an open pulse shorter than a tick was queued as an event
+  bool pulse_seen = false;  // an open pulse shorter than a tick was queued as an event
 };
 
 class EstopChain {
@@ -125,10 +125,10 @@ struct Frame {
   const std::uint8_t* pixels = nullptr;
   int width = 0;
   int height = 0;
-  int stride = 0;                 // bytes from row to row
-  std::uint64_t sequence = 0;     // gaps are lost frames
-  std::int64_t exposure_ns = 0;   // on the clock of the station
-  std::int64_t deliver_ns = 0;    // simulated latency: the observation may not be seen before; 0 in real time
+  int stride = 0;                // bytes from row to row
+  std::uint64_t sequence = 0;    // gaps are lost frames
+  std::int64_t exposure_ns = 0;  // on the clock of the station
+  std::int64_t deliver_ns = 0;   // simulated latency: the observation may not be seen before; 0 in real time
 };
 
 // Used by the vision program only; may block and allocate.

@@ -15,27 +15,27 @@ struct Observation {
     punctured = 1U << 5,  // latched by vision from the membrane's reversal until the needle is clear
   };
 
-  std::uint64_t frame = 0;        // camera sequence number
-  std::int64_t exposure_ns = 0;   // station clock
+  std::uint64_t frame = 0;       // camera sequence number
+  std::int64_t exposure_ns = 0;  // station clock
   std::uint32_t flags = 0;
   std::uint32_t reserved = 0;
 
   // Metres, microscope frame (see hal/devices.hpp); z is 0: one picture does not tell depth.
-  double tip_m[3] = {};           // needle tip as seen
-  double axis[3] = {-1, 0, 0};    // needle direction as seen, unit
-  double holder_m[3] = {};        // holding pipette: centre of its mouth
-  double holder_score = 0;        // eq. 1, -1 .. 1
-  double centre_m[3] = {};        // undeformed cell
-  double R_m = 0;                 // radius of the undeformed outer membrane
-  double R_inner_m = 0;           // of the inner one, 0 if unknown
-  double entry_m[3] = {};         // where the needle's axis meets the undeformed outer membrane
-  double gap_m = 0;               // along the axis from tip to entry_m: > 0 before contact, < 0 past it
-  double wd_m = 0;                // depth of the dimple from the undeformed membrane, 0 without contact
-  double a_m = 0;                 // half-width of the dimple where its depth is 1 % of w_d
-  double membrane_velocity_m_s = 0;  // of the contact points, along the axis; < 0 = recoil
-  double contact_point_m[2][3] = {}; // the two contact points on the pipette's edges
-  double noise_m = 0;             // standard deviation of gap_m and wd_m, as vision estimates it
-  std::uint64_t total_us = 0;     // processing time; never used by the core
+  double tip_m[3] = {};               // needle tip as seen
+  double axis[3] = {-1, 0, 0};        // needle direction as seen, unit
+  double holder_m[3] = {};            // holding pipette: centre of its mouth
+  double holder_score = 0;            // eq. 1, -1 .. 1
+  double centre_m[3] = {};            // undeformed cell
+  double R_m = 0;                     // radius of the undeformed outer membrane
+  double R_inner_m = 0;               // of the inner one, 0 if unknown
+  double entry_m[3] = {};             // where the needle's axis meets the undeformed outer membrane
+  double gap_m = 0;                   // along the axis from tip to entry_m: > 0 before contact, < 0 past it
+  double wd_m = 0;                    // depth of the dimple from the undeformed membrane, 0 without contact
+  double a_m = 0;                     // half-width of the dimple where its depth is 1 % of w_d
+  double membrane_velocity_m_s = 0;   // of the contact points, along the axis; < 0 = recoil
+  double contact_point_m[2][3] = {};  // the two contact points on the pipette's edges
+  double noise_m = 0;                 // standard deviation of gap_m and wd_m, as vision estimates it
+  std::uint64_t total_us = 0;         // processing time; never used by the core
 
   [[nodiscard]] bool has(Flag f) const noexcept { return (flags & f) != 0; }
 };

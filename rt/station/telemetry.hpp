@@ -24,19 +24,19 @@ enum class Fault : std::uint8_t {
   hand_invalid,       // its position is not finite or jumped further than a hand can
   stage_lost,
   stage_fault,
-  stage_following,    // following error above its limit
-  tip_force,          // tip force above its hard limit
-  overrun,            // too many missed ticks in the window (real actuators only)
-  not_finite,         // a force or set-point was not finite
-  command_stop,       // someone asked for a stop
-  vacuum_lost,        // holding vacuum below its limit while a cell is held
+  stage_following,  // following error above its limit
+  tip_force,        // tip force above its hard limit
+  overrun,          // too many missed ticks in the window (real actuators only)
+  not_finite,       // a force or set-point was not finite
+  command_stop,     // someone asked for a stop
+  vacuum_lost,      // holding vacuum below its limit while a cell is held
 };
 inline constexpr int kFaults = 14;
 [[nodiscard]] constexpr const char* name(Fault f) noexcept {
   constexpr const char* names[kFaults] = {
-      "none",       "estop",       "estop_discrepancy", "estop_lost", "hand_lost",
+      "none",         "estop",      "estop_discrepancy", "estop_lost",      "hand_lost",
       "hand_invalid", "stage_lost", "stage_fault",       "stage_following", "tip_force",
-      "overrun",    "not_finite",  "command_stop",      "vacuum_lost"};
+      "overrun",      "not_finite", "command_stop",      "vacuum_lost"};
   return names[static_cast<int>(f)];
 }
 
@@ -57,21 +57,21 @@ enum Alarm : std::uint32_t {
 enum class StopStage : std::uint8_t { running, stopping, stopped };  // of the safety latch
 
 struct TelemetrySample {
-  std::uint64_t tick = 0;          // of the absolute grid: gaps are missed releases
-  double t_s = 0;                  // since the start of the run
+  std::uint64_t tick = 0;  // of the absolute grid: gaps are missed releases
+  double t_s = 0;          // since the start of the run
   Phase phase = Phase::free;
   Fault fault = Fault::none;
   StopStage stop = StopStage::running;
-  std::uint8_t estop = 0;          // bit 0 contact a open, bit 1 contact b open, bit 2 reset pressed
+  std::uint8_t estop = 0;  // bit 0 contact a open, bit 1 contact b open, bit 2 reset pressed
   std::uint32_t alarms = 0;
   std::uint32_t buttons = 0;
-  std::uint32_t cell = 0;          // counts cells of this run from 0
+  std::uint32_t cell = 0;  // counts cells of this run from 0
 
-  double x_m[3] = {};              // hand, device frame
-  double v_m_s[3] = {};            // hand velocity, filtered
-  double tip_m[3] = {};            // needle tip by the stage's encoders
-  double cmd_m[3] = {};            // stage set-point
-  double force_N[3] = {};          // to the hand, after guard and limits
+  double x_m[3] = {};      // hand, device frame
+  double v_m_s[3] = {};    // hand velocity, filtered
+  double tip_m[3] = {};    // needle tip by the stage's encoders
+  double cmd_m[3] = {};    // stage set-point
+  double force_N[3] = {};  // to the hand, after guard and limits
 
   // Magnitudes of the parts, at the hand.
   double membrane_N = 0;
@@ -84,21 +84,21 @@ struct TelemetrySample {
   double wd_m = 0;
   double a_m = 0;
   double R_m = 0;
-  double tip_force_N = 0;          // membrane law, not scaled
-  double sigma_d_Pa = 0;           // membrane stress of eq. 4
-  double pressure_Pa = 0;          // internal pressure of eq. 4
-  double entry_m[3] = {};          // entry point in the stage's frame
-  double axis[3] = {};             // approach axis
+  double tip_force_N = 0;             // membrane law, not scaled
+  double sigma_d_Pa = 0;              // membrane stress of eq. 4
+  double pressure_Pa = 0;             // internal pressure of eq. 4
+  double entry_m[3] = {};             // entry point in the stage's frame
+  double axis[3] = {};                // approach axis
   double contact_force_N[4][3] = {};  // membrane force as vectors at four points of the pipette's rim
 
-  double obs_age_s = 0;            // age of the newest observation; -1 if none yet
-  double sensor_N = 0;             // force sensor, 0 if there is none
+  double obs_age_s = 0;  // age of the newest observation; -1 if none yet
+  double sensor_N = 0;   // force sensor, 0 if there is none
   double vacuum_Pa = 0;
-  double stored_energy_J = 0;      // in the fixtures, at the hand
-  double injected_energy_J = 0;    // by moving or switching fixtures, cumulative
-  double obs_gap_m = 0;            // newest observation's gap, for comparison
+  double stored_energy_J = 0;    // in the fixtures, at the hand
+  double injected_energy_J = 0;  // by moving or switching fixtures, cumulative
+  double obs_gap_m = 0;          // newest observation's gap, for comparison
   std::uint64_t observations = 0;
-  std::uint64_t stale_ticks = 0;   // ticks on which the newest observation was too old
+  std::uint64_t stale_ticks = 0;  // ticks on which the newest observation was too old
   std::uint8_t injector_open = 0;
   std::uint8_t pad[7] = {};
 };

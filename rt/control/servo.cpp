@@ -48,7 +48,8 @@ Servo::Servo(const ServoConfig& config, const Devices& devices, Station& station
       foaw_(at_rate(config.velocity, config.rate_Hz)),
       mapping_(config.mapping),
       stage_limits_(config.limits, config.mapping),
-      latch_(config.estop) {
+      latch_(config.estop),
+      following_(config.stage_timeout_s) {
   if (config.membrane) membrane_.emplace(*config.membrane);
   if (config.cone) cone_.emplace(*config.cone, config.mapping.position_scale);
   if (config.axis) axis_.emplace(*config.axis, config.mapping.position_scale);
@@ -77,7 +78,8 @@ void Servo::tick(const TickInfo& now) noexcept {
 
 Outcome Servo::outcome() const noexcept {
   if (latch_.stage() == StopStage::stopped) {
-    const bool for_good = safety_rule(latch_.cause()).cleared_by == ClearedBy::never || !devices_.estop;
+    const bool for_good =
+        stop_requested_ || !devices_.estop || safety_rule(latch_.cause()).cleared_by == ClearedBy::never;
     return for_good ? Outcome::fault : Outcome::running;
   }
   const bool at_rest = presence_.at() == 0 && (!devices_.stage || stage_.at_standstill);
@@ -149,7 +151,10 @@ Fault Servo::read_hand() noexcept {
     const bool lost = status != hal::Status::no_data || since_hand_s_ > config_.hand_timeout_s;
     return lost ? Fault::hand_lost : Fault::none;
   }
-  const double possible_m = config_.hand_jump_m * (since_hand_s_ / 1e-3);
+  double possible_m = config_.hand_jump_m * (since_hand_s_ / 1e-3);
+  if (hand_watch_.still_s() > config_.hand_timeout_s) {
+    possible_m = std::min(possible_m, HandWatch::reach_from_rest_m(since_hand_s_));
+  }
   const bool finite = is_finite(read.position_m) && read.orientation.coeffs().allFinite();
   const bool jumped = finite && hand_seen_ && !((read.position_m - hand_.position_m).norm() <= possible_m);
   if (!finite || jumped) {
@@ -157,6 +162,8 @@ Fault Servo::read_hand() noexcept {
     hand_.buttons = 0;
     return Fault::hand_invalid;
   }
+  hand_watch_.step(read, hand_force_N_, since_hand_s_);
+  if (hand_watch_.stuck()) alarms_ |= alarm_sensor;
   hand_ = read;
   hand_seen_ = true;
   hand_fresh_ = true;
@@ -170,6 +177,7 @@ Fault Servo::read_stage() noexcept {
   hal::StageState read;
   const hal::Status status = devices_.stage->read(read);
   since_stage_s_ += elapsed_s_;
+  following_.step(elapsed_s_);
   stage_fresh_ = false;
   if (status != hal::Status::ok) {
     alarms_ |= alarm_sensor;
@@ -192,7 +200,9 @@ Fault Servo::read_stage() noexcept {
   }
   if (stage_was_enabled_ && !stage_.enabled) return Fault::stage_fault;  // power went without being asked
   stage_was_enabled_ = stage_.enabled;
-  const bool follows = stage_.following_error_m.norm() <= config_.limits.following_error_m;
+  // By the drive's own word, and by what it was sent and is read back.
+  const double error_m = std::max(stage_.following_error_m.norm(), following_.error_m(stage_.tip_m));
+  const bool follows = error_m <= config_.limits.following_error_m;
   return stage_.enabled && !follows ? Fault::stage_following : Fault::none;
 }
 
@@ -279,13 +289,15 @@ void Servo::follow_hand() noexcept {
   const bool holding = latch_.stage() == StopStage::running && (!devices_.stage || stage_.enabled);
   if (!holding || !mapping_.anchored()) {
     anchor(stage_.tip_m, stage_.axis);
+    following_.restart();
     return;
   }
-  if (sighted() && !was_sighted_) {
+  if ((sighted() && !was_sighted_) || (hand_was_stuck_ && !hand_watch_.stuck())) {
     // What the hand did meanwhile is forgotten: the needle does not catch up by itself.
     anchor(stage_limits_.set_point().tip_m, stage_limits_.set_point().axis);
   }
   was_sighted_ = sighted();
+  hand_was_stuck_ = hand_watch_.stuck();
   const bool coupled = !button(hal::kButtonClutch) && !ending();
   const bool tilting = phase() == Phase::free && sighted();
   mapping_.step(hand_, coupled, tilting);
@@ -379,7 +391,7 @@ hal::Vec3 Servo::sum_force_effects() noexcept {
   const bool running = latch_.stage() == StopStage::running;
   const bool holding = running && mapping_.anchored() && (!devices_.stage || stage_.enabled);
   const double return_s = config_.mapping.coupling_s;
-  presence_.step(holding && !ending(), return_s, running ? kDecouple_s : 0, dt_s_);
+  presence_.step(holding && !ending() && !hand_watch_.stuck(), return_s, running ? kDecouple_s : 0, dt_s_);
   coupling_.step(holding && !button(hal::kButtonClutch), return_s, kDecouple_s, dt_s_);
 
   const hal::Vec3& tip = mapping_.hand_point();
@@ -440,9 +452,11 @@ void Servo::render_membrane(double gain) noexcept {
 // ---- limits and safety ----
 
 Fault Servo::limit_force(const hal::Vec3& wanted_N) noexcept {
-  // The tip's own force: measured if it can be, otherwise the membrane law's.
+  // The tip's own force: the membrane law's, or the measured one if that is more. A sensor that hangs at zero
+  // lifts no limit.
   const bool measured = sensor_seen_ && since_sensor_s_ < kSensorTimeout_s;
-  tip_force_N_ = measured ? sensor_filtered_N_ : (membrane_ ? membrane_->state().force_N : 0);
+  tip_force_N_ = membrane_ ? membrane_->state().force_N : 0;
+  if (measured) tip_force_N_ = std::max(tip_force_N_, sensor_filtered_N_);
   const double soft_N = config_.limits.tip_force_soft_N;
   tip_force_soft_ = tip_force_N_ > (tip_force_soft_ ? kSoftHysteresis * soft_N : soft_N);
   if (tip_force_soft_) alarms_ |= alarm_tip_force;
@@ -463,7 +477,7 @@ void Servo::latch(Fault cause) noexcept {
   in.contacts_closed = estop_.contact_a_closed && estop_.contact_b_closed;
   in.reset_pressed = estop_.reset_pressed;
   in.at_standstill = !devices_.stage || (stage_fresh_ && stage_.at_standstill);
-  stop_ = latch_.step(in, dt_s_);
+  stop_ = latch_.step(in, elapsed_s_);
 
   if (latch_.cause() != Fault::none) faults_latched_ |= 1ULL << static_cast<unsigned>(latch_.cause());
   if (stop_.cleared) {
@@ -509,6 +523,7 @@ void Servo::write_devices() noexcept {
       if (stage_seen_) stage->enable(true);
     } else if (until_command_ <= 0 && mapping_.anchored()) {
       const hal::Status status = stage->command(stage_limits_.set_point());
+      following_.sent(stage_limits_.set_point().tip_m);
       if (status == hal::Status::disconnected) write_fault_ = Fault::stage_lost;
       if (status == hal::Status::fault) write_fault_ = Fault::stage_fault;
       until_command_ = std::max(config_.stage_divisor, 1);
@@ -517,8 +532,10 @@ void Servo::write_devices() noexcept {
   }
 
   if (hal::Injector* injector = devices_.injector) {
-    const bool wanted = running && !ending() && config_.injector && phase() == Phase::injection &&
-                        button(hal::kButtonInject) && hand_fresh_;
+    // A button that is still down from before a stop opens nothing.
+    inject_released_ = running && (inject_released_ || !button(hal::kButtonInject));
+    const bool wanted = running && !ending() && inject_released_ && config_.injector &&
+                        phase() == Phase::injection && button(hal::kButtonInject) && hand_fresh_;
     gate_open_ = wanted && injected_s_ + elapsed_s_ <= config_.injector->max_open_s + kRounding_s;
     if (gate_open_) injected_s_ += elapsed_s_;
     injector->gate(gate_open_ && !stop_.gate_shut);

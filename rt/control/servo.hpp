@@ -10,6 +10,8 @@
 
 #include "hal/devices.hpp"
 #include "rt/control/config.hpp"
+#include "rt/control/following.hpp"
+#include "rt/control/hand_watch.hpp"
 #include "rt/control/limits.hpp"
 #include "rt/control/local_membrane_model.hpp"
 #include "rt/control/master_to_stage.hpp"
@@ -142,10 +144,13 @@ class Servo {
   bool hand_fresh_ = false;
   double since_hand_s_ = 0;    // since its last good sample
   double between_hand_s_ = 0;  // the last two good samples
+  HandWatch hand_watch_;
+  bool hand_was_stuck_ = false;
   hal::StageState stage_;
   bool stage_seen_ = false;
   bool stage_fresh_ = false;
   bool stage_was_enabled_ = false;
+  FollowingCheck following_;
   double since_stage_s_ = 0;
   hal::EstopState estop_;
   bool estop_readable_ = true;
@@ -183,13 +188,14 @@ class Servo {
   hal::Vec3 tip_before_m_ = hal::Vec3::Zero();
   hal::Vec3 approach_ = -hal::Vec3::UnitX();  // axis of the needle, frozen from contact on
   FixtureFrame insertion_;                    // the line of insertion, latched at the puncture
-  double tip_force_N_ = 0;                    // measured, or the law's
+  double tip_force_N_ = 0;                    // the law's, or the measured one if that is more
   bool tip_force_soft_ = false;
   bool was_sighted_ = false;
   double injected_s_ = 0;            // gate open, this cell
   std::uint32_t injected_cell_ = 0;  // the cell it counts for
   bool gate_open_ = false;
-  int until_command_ = 0;  // ticks until the next stage set-point
+  bool inject_released_ = false;  // the button was up since the start or the last stop
+  int until_command_ = 0;         // ticks until the next stage set-point
   double stored_J_ = 0;
   double injected_J_ = 0;
   double model_moved_m_ = 0;  // depth added by vision's correction on this tick

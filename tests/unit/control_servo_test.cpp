@@ -28,9 +28,13 @@ struct FakeHand final : hal::HapticDevice {
   Status status = Status::ok;
   bool nan = false;
   double jump_m = 0;
+  bool frozen = false;  // readings repeat and look fresh
+  Vec3 frozen_at = Vec3::Zero();
+  bool held = false;  // the handle does not move
   int writes = 0;
 
   void step(double dt) {
+    if (held) return v.setZero(), void();
     const int n = 50;
     for (int i = 0; i < n; ++i) {
       const Vec3 f = force + arm_k * (intention - x) - arm_c * v - 0.1 * v;
@@ -42,6 +46,8 @@ struct FakeHand final : hal::HapticDevice {
     if (status != Status::ok) return status;
     for (int i = 0; i < 3; ++i) out.position_m[i] = 0.03e-3 * std::round(x[i] / 0.03e-3);
     out.position_m.x() += jump_m;
+    if (frozen) out.position_m = frozen_at;
+    frozen_at = out.position_m;
     if (nan) out.position_m.y() = std::numeric_limits<double>::quiet_NaN();
     out.buttons = buttons;
     return Status::ok;
@@ -59,19 +65,26 @@ struct FakeStage final : hal::Stage {
   Status status = Status::ok;
   double extra_error_m = 0;
   bool nan = false;
+  bool frozen = false;    // the encoders stand still, the drive finds nothing wrong
+  bool deaf = false;      // it does not move any more
+  bool runaway = false;   // it moves by itself
+  std::size_t delay = 0;  // readings are so many ticks old
+  std::vector<Vec3> readings;
   int commands = 0, quick_stops = 0;
   std::vector<Vec3> commanded;
 
   explicit FakeStage(const Vec3& start) : tip(start), target(start) {}
   void step(double dt) {
-    if (!on || stopped) target = tip;
+    if (!on || stopped || deaf) target = tip;
+    if (runaway && on && !stopped) target += Vec3(0, 100e-6 * dt, 0);
     const Vec3 next = target + (tip - target) * std::exp(-dt / 0.004);
     speed = (next - tip) / dt;
     tip = next;
   }
   Status read(hal::StageState& out) noexcept override {
     if (status != Status::ok) return status;
-    out.tip_m = tip + registration;
+    readings.push_back(frozen && !readings.empty() ? readings.back() : Vec3(tip + registration));
+    out.tip_m = readings[readings.size() - 1 - std::min(delay, readings.size() - 1)];
     if (nan) out.tip_m.x() = std::numeric_limits<double>::infinity();
     out.axis = axis;
     out.following_error_m = Vec3(extra_error_m, 0, 0);
@@ -80,7 +93,7 @@ struct FakeStage final : hal::Stage {
     return Status::ok;
   }
   Status command(const hal::StageCommand& set_point) noexcept override {
-    target = set_point.tip_m - registration;
+    if (!runaway) target = set_point.tip_m - registration;
     commanded.push_back(set_point.tip_m);
     ++commands;
     return Status::ok;
@@ -702,6 +715,175 @@ TEST(Servo, clutch_uncouples_the_needle_and_its_forces) {
   b.run(0.5);
   EXPECT_NEAR(b.gap(), gap, 3e-6);
   EXPECT_GT(b.sample().membrane_N, 0);
+}
+
+TEST(Servo, notices_a_stage_whose_readings_stand_still_or_run_away_while_its_drive_says_all_is_well) {
+  for (const double rate : {1000.0, 8000.0}) {
+    for (const int how : {0, 1, 2}) {
+      ServoConfig config = icsi();
+      config.rate_Hz = rate;
+      Bench b(config);
+      b.run(1);
+      (how == 0 ? b.stage.frozen : how == 1 ? b.stage.deaf : b.stage.runaway) = true;
+      const Vec3 told = b.stage.commanded.back();
+      const Vec3 stood = b.stage.tip;
+      for (int k = 0; k < 3 * rate && b.servo->fault() == Fault::none; ++k) {
+        if (how != 2) b.wanted_x -= 20e-6 * b.dt();
+        b.tick();
+      }
+      EXPECT_EQ(b.servo->fault(), Fault::stage_following) << how;
+      EXPECT_GE(b.stage.quick_stops, 1);
+      // No further than the limit and what a reading may be old.
+      EXPECT_LT((b.stage.commanded.back() - told).norm(), 11e-6) << how;
+      EXPECT_LT((b.stage.tip - stood).norm(), 13e-6) << how;
+    }
+  }
+}
+
+TEST(Servo, follows_a_stage_whose_readings_are_as_old_as_they_may_be_at_full_speed) {
+  for (const double rate : {1000.0, 8000.0}) {
+    ServoConfig config = icsi();
+    config.rate_Hz = rate;
+    config.mapping.tremor_cutoff_Hz = 0;
+    Bench b(config);
+    b.stage.delay = static_cast<std::size_t>(0.019 * rate);
+    b.run(1);
+    double fastest = 0;
+    b.every_tick = [&] { fastest = std::max(fastest, b.stage.speed.norm()); };
+    b.move(250e-6, 380e-6);
+    b.move(60e-6, 380e-6);
+    EXPECT_EQ(b.servo->fault(), Fault::none);
+    EXPECT_GT(fastest, 350e-6);
+  }
+}
+
+TEST(Servo, does_not_follow_a_hand_whose_readings_stood_still_and_are_suddenly_elsewhere) {
+  Bench b(icsi());
+  b.to_indentation();
+  b.hand.frozen = true;
+  b.move(b.wanted_x + 20e-6, 40e-6);  // 10 mm at the hand
+  b.run(0.5);
+  EXPECT_EQ(b.servo->fault(), Fault::none);
+  const Vec3 tip = b.stage.tip;
+  b.hand.frozen = false;
+  b.run(1);
+  EXPECT_EQ(b.servo->fault(), Fault::hand_invalid);
+  EXPECT_LT((b.stage.tip - tip).norm(), 0.1e-6);
+}
+
+TEST(Servo, fades_the_force_on_a_handle_that_a_changing_force_does_not_move) {
+  Bench b(icsi());
+  b.to_indentation();
+  b.run(1);
+  b.hand.frozen = true;
+  b.run(1);
+  // At rest under a steady force: an arm can do that.
+  EXPECT_EQ(b.sample().alarms & alarm_sensor, 0U);
+  EXPECT_GT(b.force(), 0.1);
+  // Vision finds the cell nearer: the force rises, and nothing moves.
+  b.centre.x() += 20e-6;
+  b.puncture_at = 1;
+  double most = 0;
+  b.every_tick = [&] { most = std::max(most, b.force()); };
+  b.run(2);
+  EXPECT_GT(most, 0.6);
+  EXPECT_NE(b.sample().alarms & alarm_sensor, 0U);
+  EXPECT_EQ(b.force(), 0);
+  EXPECT_EQ(b.servo->fault(), Fault::none);
+  // The handle moves again: the force returns by a ramp, and the needle stays where it is meanwhile.
+  const Vec3 tip = b.stage.tip;
+  double before = 0;
+  double steepest = 0;
+  b.every_tick = [&] {
+    steepest = std::max(steepest, b.force() - before);
+    before = b.force();
+  };
+  b.hand.x = b.hand.frozen_at;
+  b.hand.v.setZero();
+  b.hand.intention = b.hand.x + Vec3(0, 0.1e-3, 0);
+  b.hand.frozen = false;
+  b.tip_start.x() = b.wanted_x - b.hand.x.x() / 500;
+  b.run(0.05);
+  EXPECT_LT((b.stage.tip - tip).norm(), 0.3e-6);
+  b.run(1);
+  EXPECT_EQ(b.sample().alarms & alarm_sensor, 0U);
+  EXPECT_GT(b.force(), 0.1);
+  EXPECT_LT(steepest, 0.03);
+}
+
+TEST(Servo, lets_a_hand_rest_still_for_a_minute) {
+  Bench b(icsi());
+  b.to_indentation();
+  b.run(1);
+  b.hand.held = true;
+  std::uint32_t alarms = 0;
+  b.every_tick = [&] { alarms |= b.sample().alarms; };
+  b.run(60);
+  EXPECT_EQ(alarms & alarm_sensor, 0U);
+  EXPECT_EQ(b.servo->fault(), Fault::none);
+  EXPECT_GT(b.force(), 0.05);
+}
+
+TEST(Servo, does_not_open_the_injector_again_after_a_stop_while_the_button_is_still_held) {
+  Bench b(icsi());
+  b.to_inside();
+  b.hand.buttons = hal::kButtonInject;
+  b.run(0.2);
+  ASSERT_TRUE(b.injector.open);
+  b.estop.state.contact_a_closed = b.estop.state.contact_b_closed = false;
+  b.run(1);
+  b.estop.state.contact_a_closed = b.estop.state.contact_b_closed = true;
+  b.run(0.1);
+  b.estop.state.reset_pressed = true;
+  const int open_ticks = b.injector.open_ticks;
+  b.run(1);
+  ASSERT_EQ(b.servo->stop_stage(), StopStage::running);
+  ASSERT_EQ(b.servo->phase(), injection);
+  EXPECT_EQ(b.injector.open_ticks, open_ticks);
+  b.hand.buttons = 0;
+  b.run(0.1);
+  b.hand.buttons = hal::kButtonInject;
+  b.run(0.1);
+  EXPECT_TRUE(b.injector.open);
+}
+
+TEST(Servo, a_commanded_stop_ends_a_run_that_has_stopped_already) {
+  Bench b(icsi());
+  b.run(0.5);
+  b.hand.status = Status::disconnected;
+  b.run(1);
+  ASSERT_EQ(b.servo->stop_stage(), StopStage::stopped);
+  EXPECT_FALSE(b.servo->finished());  // a reset could still clear it
+  b.servo->request_stop();
+  b.tick();
+  EXPECT_EQ(b.servo->outcome(), Outcome::fault);
+  EXPECT_EQ(b.servo->fault(), Fault::hand_lost);  // the first cause
+}
+
+TEST(Servo, is_not_fooled_about_the_tip_force_by_a_sensor_that_says_zero) {
+  ServoConfig config = icsi();
+  config.force_sensor = true;
+  config.limits.tip_force_soft_N = 2e-6;
+  Bench b(config);
+  b.puncture_at = 1;
+  b.to_indentation();
+  b.move(-20e-6, 10e-6);
+  b.run(0.5);
+  EXPECT_NE(b.sample().alarms & alarm_tip_force, 0U);
+  EXPECT_LT(b.sample().tip_force_N, 2.4e-6);
+}
+
+TEST(Servo, takes_the_drive_power_away_in_time_however_late_its_ticks_are) {
+  Bench b(icsi());
+  b.run(0.5);
+  b.stage.speed = Vec3(1, 0, 0);
+  b.estop.state.contact_a_closed = false;
+  b.tick();
+  ASSERT_TRUE(b.stage.on);
+  b.stage.speed = Vec3(1, 0, 0);  // it does not come to rest
+  b.now += 600'000'000;
+  b.servo->tick({b.ticks++, b.now, b.now, 0.6, 0});
+  EXPECT_FALSE(b.stage.on);
 }
 
 TEST(Servo, checks_the_range_of_commands) {

@@ -37,13 +37,26 @@ constexpr std::int64_t kSetUp_ns = 200'000'000;  // for rights, memory and the s
 
 std::atomic<int> signals{0};
 std::atomic<bool> stop_now{false};
-sim::VirtualClock* waiting_clock = nullptr;
-static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_always_lock_free);
+std::atomic<sim::VirtualClock*> waiting_clock{nullptr};
+static_assert(std::atomic<int>::is_always_lock_free && std::atomic<bool>::is_always_lock_free &&
+              std::atomic<sim::VirtualClock*>::is_always_lock_free);
 
 // SIGTERM, or the death of the parent: a commanded stop. The third one ends the loop at once.
 extern "C" void on_stop_signal(int) {
   if (signals.fetch_add(1) >= 2) stop_now.store(true);
-  if (waiting_clock != nullptr) waiting_clock->stop_waiting();
+  if (sim::VirtualClock* clock = waiting_clock.load()) clock->stop_waiting();
+}
+
+// The death of the parent becomes a stop signal. False: it has died already. (One that died before this
+// program came to life is found out when the station is attached: the segment has no living owner then.)
+bool stop_with_parent() {
+  const pid_t parent = getppid();
+  struct sigaction action {};
+  action.sa_handler = on_stop_signal;
+  sigaction(SIGTERM, &action, nullptr);
+  sigaction(SIGINT, &action, nullptr);
+  prctl(PR_SET_PDEATHSIG, SIGTERM);
+  return getppid() == parent;
 }
 
 // The plant of a simulated scene, the servo, and what ends the run: the slots of the executive.
@@ -162,6 +175,7 @@ int end_code(rt::CoreStatus& status, const tools::Scene& scene, rt::Executive::E
 }
 
 int run(int argc, char** argv) {
+  if (!stop_with_parent()) return bad("punctum-core: the program that started it has died");
   const auto arguments = read_arguments(argc, argv);
   if (!arguments) return bad(arguments.error());
   auto scene = tools::load_scene(arguments->scene);
@@ -170,16 +184,11 @@ int run(int argc, char** argv) {
     scene->clock = arguments->clock == "real" ? tools::ClockKind::real : tools::ClockKind::virtual_time;
   if (arguments->bench.empty()) return bad("--bench is missing: the devices of this scene are simulated");
 
-  prctl(PR_SET_PDEATHSIG, SIGTERM);
-  struct sigaction action {};
-  action.sa_handler = on_stop_signal;
-  sigaction(SIGTERM, &action, nullptr);
-  sigaction(SIGINT, &action, nullptr);
-
   auto station = hal::Shared<rt::Station>::attach(arguments->station);
   if (!station) return bad(station.error());
   auto bench = hal::Shared<sim::Bench>::attach(arguments->bench);
   if (!bench) return bad(bench.error());
+  if (signals.load() > 0) return kNotDone;  // stopped before anything has moved
   rt::CoreStatus& status = (*station)->core;
   status.pid.store(static_cast<std::uint64_t>(getpid()));
 
@@ -192,6 +201,7 @@ int run(int argc, char** argv) {
   } else {
     virtual_clock.emplace(**bench);
     waiting_clock = &*virtual_clock;
+    if (signals.load() > 0) virtual_clock->stop_waiting();
   }
   hal::Clock& clock = real ? static_cast<hal::Clock&>(monotonic) : *virtual_clock;
 

@@ -164,6 +164,25 @@ TEST_F(Programs, WhenTheParentIsKilledTheCoreStopsByItselfAndTheNextRunCleansUp)
   EXPECT_FALSE(fs::exists(station));
 }
 
+TEST_F(Programs, WhenTheParentIsKilledACoreThatHasStoppedAlreadyEndsToo) {
+  pid_t core = 0;
+  {
+    Running run({"run", "free", "--seconds", "60", "--report", report(), "--no-figure", "--set",
+                 "failure=[{device=\"haptic\", kind=\"disconnect\", at_s=0.2}]"},
+                words());
+    Look look("free", run);
+    ASSERT_TRUE(look.until_started()) << run.output();
+    core = look.core();
+    std::this_thread::sleep_for(1500ms);
+    ASSERT_TRUE(alive(core));  // a reset could still clear it
+    run.send(SIGKILL);
+    EXPECT_EQ(run.wait(), -SIGKILL);
+  }
+  for (int i = 0; i < 500 && alive(core); ++i) std::this_thread::sleep_for(10ms);
+  EXPECT_FALSE(alive(core));
+  if (alive(core)) kill(core, SIGKILL);
+}
+
 // ---- the safety chain, under the virtual clock ----
 
 TEST_F(Programs, APressedEmergencyStopLatchesAndTheRunEndsAsAFault) {

@@ -96,7 +96,8 @@ struct LocalModelParams {
 };
 
 struct InjectorParams {
-  double max_open_s = 2.0;  // clamped by the tick
+  double max_open_s = 2.0;      // clamped by the tick
+  double shut_within_s = 0.25;  // of the gate: open for longer is a fault
 };
 
 struct VacuumParams {

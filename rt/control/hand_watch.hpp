@@ -1,6 +1,6 @@
 // Tells a haptic device whose readings stand still, although they look fresh, from a hand that holds still.
 //
-// Two things give it away without a guess at what the hand is doing:
+// Two things give it away without a guess at what the hand is doing, axis by axis:
 //  - From rest a handle cannot be far away on its next reading. If it is, the readings stood still, not the
 //    handle.
 //  - A force that changes by more than friction, and the pull of an arm over one encoder step, moves a handle
@@ -9,6 +9,11 @@
 // nothing goes out that would tell. It is not reported.
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+
 #include "hal/devices.hpp"
 
 namespace punctum::rt {
@@ -16,45 +21,58 @@ namespace punctum::rt {
 class HandWatch {
  public:
   // A good reading, elapsed_s after the one before; force: on the handle meanwhile.
-  void step(const hal::HandState& reading, const hal::Vec3& force_N, double elapsed_s) noexcept {
-    if (!same(reading, last_)) {
-      last_ = reading;
-      still_s_ = unmoved_s_ = 0;
-      low_N_ = high_N_ = force_N;
-      return;
+  void step(const hal::Vec3& position_m, const hal::Vec3& force_N, double elapsed_s) noexcept {
+    for (std::size_t i = 0; i < axes_.size(); ++i) {
+      Axis& axis = axes_[i];
+      const double x_m = position_m[static_cast<Eigen::Index>(i)];
+      const double f_N = force_N[static_cast<Eigen::Index>(i)];
+      if (x_m != axis.at_m) {
+        axis = {.at_m = x_m, .low_N = f_N, .high_N = f_N};
+        continue;
+      }
+      axis.still_s += elapsed_s;
+      axis.low_N = std::min(axis.low_N, f_N);
+      axis.high_N = std::max(axis.high_N, f_N);
+      if (axis.high_N - axis.low_N > kMoving_N) axis.unmoved_s += elapsed_s;
     }
-    still_s_ += elapsed_s;
-    low_N_ = low_N_.cwiseMin(force_N);
-    high_N_ = high_N_.cwiseMax(force_N);
-    if ((high_N_ - low_N_).maxCoeff() > kMoving_N) unmoved_s_ += elapsed_s;
   }
 
-  // All readings have been the same for so long.
-  [[nodiscard]] double still_s() const noexcept { return still_s_; }
   // A changing force has not moved the handle.
-  [[nodiscard]] bool stuck() const noexcept { return unmoved_s_ > kUnmoved_s; }
+  [[nodiscard]] bool stuck() const noexcept {
+    return std::any_of(axes_.begin(), axes_.end(), [](const Axis& a) { return a.unmoved_s > kUnmoved_s; });
+  }
 
-  // How far a handle at rest can be elsewhere elapsed_s later: a hard push, by a device that samples slowly.
+  // An axis whose readings were the same for longer than still_s is further away than a hand can push it
+  // within elapsed_s.
+  [[nodiscard]] bool leaps(const hal::Vec3& position_m, double still_s, double elapsed_s) const noexcept {
+    const double reach_m = reach_from_rest_m(elapsed_s);
+    for (std::size_t i = 0; i < axes_.size(); ++i) {
+      const double way_m = std::abs(position_m[static_cast<Eigen::Index>(i)] - axes_[i].at_m);
+      if (axes_[i].still_s > still_s && way_m > reach_m) return true;
+    }
+    return false;
+  }
+
+ private:
+  static constexpr double kPush_m_s2 = 100;
+  static constexpr double kSampling_s = 0.005;  // a device may sample slowly and repeat its readings
+  static constexpr double kMoving_N = 0.5;
+  static constexpr double kUnmoved_s = 0.1;  // half a newton moves a kilogram by an encoder step in 15 ms
+
+  struct Axis {
+    double at_m = 0;
+    double low_N = 0;
+    double high_N = 0;
+    double still_s = 0;    // so long it has been there
+    double unmoved_s = 0;  // since the force has changed by kMoving_N
+  };
+
   [[nodiscard]] static double reach_from_rest_m(double elapsed_s) noexcept {
     const double t = elapsed_s + kSampling_s;
     return 0.5 * kPush_m_s2 * t * t;
   }
 
- private:
-  static constexpr double kPush_m_s2 = 100;
-  static constexpr double kSampling_s = 0.005;
-  static constexpr double kMoving_N = 0.5;
-  static constexpr double kUnmoved_s = 0.1;  // half a newton moves a kilogram by an encoder step in 15 ms
-
-  [[nodiscard]] static bool same(const hal::HandState& a, const hal::HandState& b) noexcept {
-    return a.position_m == b.position_m && a.orientation.coeffs() == b.orientation.coeffs();
-  }
-
-  hal::HandState last_;
-  hal::Vec3 low_N_ = hal::Vec3::Zero();
-  hal::Vec3 high_N_ = hal::Vec3::Zero();
-  double still_s_ = 0;
-  double unmoved_s_ = 0;
+  std::array<Axis, 3> axes_{};
 };
 
 }  // namespace punctum::rt

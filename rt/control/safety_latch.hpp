@@ -21,7 +21,7 @@ enum class SafetyAction : std::uint8_t {
   quick_stop,          // within the tick that saw the level
   gate_shut,           // the same tick
   hand_force_to_zero,  // over EstopParams::hand_ramp_s at most
-  heartbeat_off,       // once stopped: the loop itself is not to be trusted, the relay shall open
+  heartbeat_off,       // once stopped: loop or gate are not to be trusted, the relay shall open
   drive_power_off,     // at standstill or after EstopParams::power_off_after_s
 };
 // The holding vacuum appears nowhere: a stop never touches it, releasing it loses the cell.
@@ -60,6 +60,7 @@ inline constexpr auto kSafetyRules = [] {
       {Fault::not_finite, stop_and_relay, release_and_reset},
       {Fault::command_stop, stop, never},
       {Fault::vacuum_lost, stop, release_and_reset},
+      {Fault::injector_open, stop_and_relay, release_and_reset},
   }};
 }();
 

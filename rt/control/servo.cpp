@@ -109,9 +109,10 @@ Fault Servo::read_devices(const TickInfo& now) noexcept {
   cause = first_of(cause, read_hand());
   cause = first_of(cause, read_stage());
   cause = first_of(cause, read_vacuum());
+  cause = first_of(cause, read_injector());
   cause = first_of(cause, check_overruns(now));
   cause = first_of(cause, write_fault_);
-  read_sensors();
+  read_force_sensor();
   follow_hand();
   return cause;
 }
@@ -151,18 +152,17 @@ Fault Servo::read_hand() noexcept {
     const bool lost = status != hal::Status::no_data || since_hand_s_ > config_.hand_timeout_s;
     return lost ? Fault::hand_lost : Fault::none;
   }
-  double possible_m = config_.hand_jump_m * (since_hand_s_ / 1e-3);
-  if (hand_watch_.still_s() > config_.hand_timeout_s) {
-    possible_m = std::min(possible_m, HandWatch::reach_from_rest_m(since_hand_s_));
-  }
+  const double possible_m = config_.hand_jump_m * (since_hand_s_ / 1e-3);
   const bool finite = is_finite(read.position_m) && read.orientation.coeffs().allFinite();
-  const bool jumped = finite && hand_seen_ && !((read.position_m - hand_.position_m).norm() <= possible_m);
+  const bool jumped = finite && hand_seen_ &&
+                      (!((read.position_m - hand_.position_m).norm() <= possible_m) ||
+                       hand_watch_.leaps(read.position_m, config_.hand_timeout_s, since_hand_s_));
   if (!finite || jumped) {
     alarms_ |= alarm_sensor;
     hand_.buttons = 0;
     return Fault::hand_invalid;
   }
-  hand_watch_.step(read, hand_force_N_, since_hand_s_);
+  hand_watch_.step(read.position_m, hand_force_N_, since_hand_s_);
   if (hand_watch_.stuck()) alarms_ |= alarm_sensor;
   hand_ = read;
   hand_seen_ = true;
@@ -253,28 +253,31 @@ Fault Servo::take_commands() noexcept {
   return stop_requested_ ? Fault::command_stop : Fault::none;
 }
 
-void Servo::read_sensors() noexcept {
-  if (devices_.force_sensor && config_.force_sensor) {
-    double axial_N = 0;
-    if (devices_.force_sensor->read(axial_N) == hal::Status::ok && std::isfinite(axial_N)) {
-      sensor_N_ = axial_N;
-      const double part = sensor_seen_ ? 1 - std::exp(-dt_s_ / kSensorTau_s) : 1.0;
-      sensor_filtered_N_ += part * (axial_N - sensor_filtered_N_);
-      sensor_seen_ = true;
-      since_sensor_s_ = 0;
-    } else {
-      alarms_ |= alarm_sensor;
-      since_sensor_s_ += elapsed_s_;
-    }
+Fault Servo::read_injector() noexcept {
+  if (!devices_.injector || !config_.injector) return Fault::none;
+  bool open = false;
+  if (devices_.injector->read(open) == hal::Status::ok) {
+    injector_open_ = open;
+  } else {
+    alarms_ |= alarm_sensor;
   }
-  if (devices_.injector) {
-    bool open = false;
-    if (devices_.injector->read(open) == hal::Status::ok) {
-      injector_open_ = open;
-    } else {
-      alarms_ |= alarm_sensor;
-    }
+  open_unasked_s_ = injector_open_ && !gate_open_ ? open_unasked_s_ + elapsed_s_ : 0;
+  return open_unasked_s_ > config_.injector->shut_within_s ? Fault::injector_open : Fault::none;
+}
+
+void Servo::read_force_sensor() noexcept {
+  if (!devices_.force_sensor || !config_.force_sensor) return;
+  double axial_N = 0;
+  if (devices_.force_sensor->read(axial_N) != hal::Status::ok || !std::isfinite(axial_N)) {
+    alarms_ |= alarm_sensor;
+    since_sensor_s_ += elapsed_s_;
+    return;
   }
+  sensor_N_ = axial_N;
+  const double part = sensor_seen_ ? 1 - std::exp(-dt_s_ / kSensorTau_s) : 1.0;
+  sensor_filtered_N_ += part * (axial_N - sensor_filtered_N_);
+  sensor_seen_ = true;
+  since_sensor_s_ = 0;
 }
 
 void Servo::anchor(const hal::Vec3& tip_m, const hal::Vec3& axis) noexcept {
@@ -513,7 +516,6 @@ void Servo::choose_stage_set_point() noexcept {
 
 void Servo::write_devices() noexcept {
   write_fault_ = Fault::none;
-  const bool running = latch_.stage() == StopStage::running;
 
   if (hal::Stage* stage = devices_.stage) {
     if (stop_.quick_stop) {
@@ -533,12 +535,12 @@ void Servo::write_devices() noexcept {
 
   if (hal::Injector* injector = devices_.injector) {
     // A button that is still down from before a stop opens nothing.
-    inject_released_ = running && (inject_released_ || !button(hal::kButtonInject));
-    const bool wanted = running && !ending() && inject_released_ && config_.injector &&
+    inject_released_ = !stop_.gate_shut && (inject_released_ || !button(hal::kButtonInject));
+    const bool wanted = !stop_.gate_shut && !ending() && inject_released_ && config_.injector &&
                         phase() == Phase::injection && button(hal::kButtonInject) && hand_fresh_;
     gate_open_ = wanted && injected_s_ + elapsed_s_ <= config_.injector->max_open_s + kRounding_s;
     if (gate_open_) injected_s_ += elapsed_s_;
-    injector->gate(gate_open_ && !stop_.gate_shut);
+    injector->gate(gate_open_);
   }
 
   const hal::Status status = devices_.hand.write_force(hand_force_N_);

@@ -100,7 +100,8 @@ class Servo {
   [[nodiscard]] Fault read_vacuum() noexcept;
   [[nodiscard]] Fault check_overruns(const TickInfo& now) noexcept;
   [[nodiscard]] Fault take_commands() noexcept;
-  void read_sensors() noexcept;
+  [[nodiscard]] Fault read_injector() noexcept;
+  void read_force_sensor() noexcept;
   void follow_hand() noexcept;
 
   [[nodiscard]] StageConstraint constraint() const noexcept;
@@ -164,6 +165,7 @@ class Servo {
   double since_sensor_s_ = 0;
   bool sensor_seen_ = false;
   bool injector_open_ = false;
+  double open_unasked_s_ = 0;  // the injector, against its gate
   std::uint64_t observation_head_ = 0;
   std::uint64_t observations_ = 0;
   std::uint64_t stale_ticks_ = 0;

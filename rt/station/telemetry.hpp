@@ -30,13 +30,15 @@ enum class Fault : std::uint8_t {
   not_finite,       // a force or set-point was not finite
   command_stop,     // someone asked for a stop
   vacuum_lost,      // holding vacuum below its limit while a cell is held
+  injector_open,    // the injector stays open although its gate is shut
 };
-inline constexpr int kFaults = 14;
+inline constexpr int kFaults = 15;
 [[nodiscard]] constexpr const char* name(Fault f) noexcept {
-  constexpr const char* names[kFaults] = {
+  constexpr const char* names[] = {
       "none",         "estop",      "estop_discrepancy", "estop_lost",      "hand_lost",
       "hand_invalid", "stage_lost", "stage_fault",       "stage_following", "tip_force",
-      "overrun",      "not_finite", "command_stop",      "vacuum_lost"};
+      "overrun",      "not_finite", "command_stop",      "vacuum_lost",     "injector_open"};
+  static_assert(sizeof names == kFaults * sizeof names[0]);
   return names[static_cast<int>(f)];
 }
 

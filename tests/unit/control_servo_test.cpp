@@ -29,6 +29,7 @@ struct FakeHand final : hal::HapticDevice {
   bool nan = false;
   double jump_m = 0;
   bool frozen = false;  // readings repeat and look fresh
+  bool only_x = false;  // of one axis
   Vec3 frozen_at = Vec3::Zero();
   bool held = false;  // the handle does not move
   int writes = 0;
@@ -46,7 +47,8 @@ struct FakeHand final : hal::HapticDevice {
     if (status != Status::ok) return status;
     for (int i = 0; i < 3; ++i) out.position_m[i] = 0.03e-3 * std::round(x[i] / 0.03e-3);
     out.position_m.x() += jump_m;
-    if (frozen) out.position_m = frozen_at;
+    if (frozen) out.position_m.x() = frozen_at.x();
+    if (frozen && !only_x) out.position_m = frozen_at;
     frozen_at = out.position_m;
     if (nan) out.position_m.y() = std::numeric_limits<double>::quiet_NaN();
     out.buttons = buttons;
@@ -126,8 +128,9 @@ struct FakeEstop final : hal::EstopChain {
 struct FakeInjector final : hal::Injector {
   bool open = false;
   int open_ticks = 0;
+  bool jammed = false;
   void gate(bool o) noexcept override {
-    open = o;
+    if (!jammed) open = o;
     if (o) ++open_ticks;
   }
   Status read(bool& o) noexcept override {
@@ -758,21 +761,28 @@ TEST(Servo, follows_a_stage_whose_readings_are_as_old_as_they_may_be_at_full_spe
 }
 
 TEST(Servo, does_not_follow_a_hand_whose_readings_stood_still_and_are_suddenly_elsewhere) {
-  Bench b(icsi());
-  b.to_indentation();
-  b.hand.frozen = true;
-  b.move(b.wanted_x + 20e-6, 40e-6);  // 10 mm at the hand
-  b.run(0.5);
-  EXPECT_EQ(b.servo->fault(), Fault::none);
-  const Vec3 tip = b.stage.tip;
-  b.hand.frozen = false;
-  b.run(1);
-  EXPECT_EQ(b.servo->fault(), Fault::hand_invalid);
-  EXPECT_LT((b.stage.tip - tip).norm(), 0.1e-6);
+  for (const bool one_axis : {false, true}) {
+    Bench b(icsi());
+    b.to_indentation();
+    b.hand.frozen = true;
+    b.hand.only_x = one_axis;
+    int tick = 0;
+    b.every_tick = [&] { b.hand.intention.y() = 0.5e-3 * std::sin(0.05 * ++tick); };
+    b.move(b.wanted_x + 20e-6, 40e-6);  // 10 mm at the hand
+    b.run(0.5);
+    EXPECT_EQ(b.servo->fault(), Fault::none);
+    const Vec3 tip = b.stage.tip;
+    b.hand.frozen = false;
+    b.run(1);
+    EXPECT_EQ(b.servo->fault(), Fault::hand_invalid);
+    EXPECT_LT(std::abs(b.stage.tip.x() - tip.x()), 0.1e-6);
+  }
 }
 
 TEST(Servo, fades_the_force_on_a_handle_that_a_changing_force_does_not_move) {
-  Bench b(icsi());
+  ServoConfig config = icsi();
+  config.local_model->dimple_scale = 0.45;
+  Bench b(config);
   b.to_indentation();
   b.run(1);
   b.hand.frozen = true;
@@ -800,9 +810,9 @@ TEST(Servo, fades_the_force_on_a_handle_that_a_changing_force_does_not_move) {
   };
   b.hand.x = b.hand.frozen_at;
   b.hand.v.setZero();
-  b.hand.intention = b.hand.x + Vec3(0, 0.1e-3, 0);
+  b.hand.intention = b.hand.x + Vec3(0.1e-3, 0.1e-3, 0);
   b.hand.frozen = false;
-  b.tip_start.x() = b.wanted_x - b.hand.x.x() / 500;
+  b.tip_start.x() = b.wanted_x - b.hand.x.x() / 500 - 0.2e-6;
   b.run(0.05);
   EXPECT_LT((b.stage.tip - tip).norm(), 0.3e-6);
   b.run(1);
@@ -845,6 +855,36 @@ TEST(Servo, does_not_open_the_injector_again_after_a_stop_while_the_button_is_st
   b.hand.buttons = hal::kButtonInject;
   b.run(0.1);
   EXPECT_TRUE(b.injector.open);
+}
+
+TEST(Servo, stops_when_the_injector_stays_open_although_its_gate_is_shut) {
+  Bench b(icsi());
+  b.to_inside();
+  b.hand.buttons = hal::kButtonInject;
+  b.run(0.2);
+  ASSERT_TRUE(b.injector.open);
+  b.injector.jammed = true;
+  b.run(0.2);
+  b.hand.buttons = 0;
+  b.run(0.2);
+  EXPECT_EQ(b.servo->fault(), Fault::none);  // a valve takes its time
+  b.run(0.1);
+  EXPECT_EQ(b.servo->fault(), Fault::injector_open);
+  // The relay takes the power that keeps it open.
+  b.run(0.6);
+  const int toggles = b.estop.toggles;
+  b.run(0.1);
+  EXPECT_EQ(b.estop.toggles, toggles);
+  // No reset while it is open.
+  b.estop.state.reset_pressed = true;
+  b.run(0.1);
+  EXPECT_EQ(b.servo->stop_stage(), StopStage::stopped);
+  b.injector.jammed = false;
+  b.estop.state.reset_pressed = false;
+  b.run(0.1);
+  b.estop.state.reset_pressed = true;
+  b.run(0.1);
+  EXPECT_EQ(b.servo->stop_stage(), StopStage::running);
 }
 
 TEST(Servo, a_commanded_stop_ends_a_run_that_has_stopped_already) {

@@ -110,10 +110,10 @@ TEST(SafetyLatch, lets_the_hand_force_only_fall) {
   });
 }
 
-TEST(SafetyLatch, lets_the_relay_open_only_when_the_loop_itself_is_not_to_be_trusted) {
+TEST(SafetyLatch, lets_the_relay_open_only_when_loop_or_gate_are_not_to_be_trusted) {
   explore([](const auto&, const auto&, const auto& after, const auto& out) {
-    const bool distrusted =
-        after.cause == Fault::overrun || after.cause == Fault::not_finite || after.cause == Fault::estop_lost;
+    const bool distrusted = after.cause == Fault::overrun || after.cause == Fault::not_finite ||
+                            after.cause == Fault::estop_lost || after.cause == Fault::injector_open;
     EXPECT_EQ(out.heartbeat, !(after.stage == StopStage::stopped && distrusted));
   });
 }

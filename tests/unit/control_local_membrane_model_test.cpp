@@ -105,7 +105,8 @@ TEST(LocalMembraneModel, corrects_itself_at_a_bounded_rate) {
 }
 
 TEST(LocalMembraneModel, stays_bounded_whatever_vision_claims) {
-  const LocalModelParams params;
+  LocalModelParams params;
+  params.dimple_scale_rate_1_s = 0.5;
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> u(-1, 1);
   std::uniform_int_distribution<int> pick(0, 9);
@@ -156,8 +157,10 @@ TEST(LocalMembraneModel, stays_bounded_whatever_vision_claims) {
   }
 }
 
-TEST(LocalMembraneModel, learns_the_width_of_the_dimple) {
-  Bench b;
+TEST(LocalMembraneModel, learns_the_width_of_the_dimple_when_it_may) {
+  LocalModelParams params;
+  params.dimple_scale_rate_1_s = 0.5;
+  Bench b(params);
   b.tip = Vec3(25e-6, 2e-6, 0);
   for (int k = 0; k < 6000; ++k) {
     if (b.tip.x() > 8e-6) b.tip.x() -= 10e-9;

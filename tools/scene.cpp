@@ -416,18 +416,16 @@ class Reader {
   std::map<std::string, std::string> given_;
 };
 
-// An override as a small TOML document; bare words (paper, on) need no quotes.
+// An override as a small TOML document; bare words and paths (paper, on, frames/*.png) need no quotes.
 std::string override_document(std::string_view text) {
   const auto equal = text.find('=');
-  std::string key(text.substr(0, equal));
+  const std::string key(text.substr(0, equal));
   std::string value(text.substr(equal + 1));
-  const bool word = !value.empty() && std::all_of(value.begin(), value.end(), [](char c) {
-    return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '/' || c == '.' || c == '-' ||
-           c == '~';
-  });
-  const bool letter = word && (std::isalpha(static_cast<unsigned char>(value[0])) != 0 || value[0] == '/' ||
-                               value[0] == '~' || value.starts_with("./") || value.starts_with("../"));
-  if (letter && value != "true" && value != "false" && value != "nan" && value != "inf")
+  const bool plain = value.find_first_of("\"\\\t") == std::string::npos;
+  const bool word =
+      !value.empty() && (std::isalpha(static_cast<unsigned char>(value[0])) != 0 || value[0] == '/' ||
+                         value[0] == '~' || value.starts_with("./") || value.starts_with("../"));
+  if (plain && word && value != "true" && value != "false" && value != "nan" && value != "inf")
     value = "\"" + value + "\"";
   return key + " = " + value + "\n";
 }

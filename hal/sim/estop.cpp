@@ -34,7 +34,8 @@ void SimEstop::step(std::int64_t t_ns, double from_s, double to_s, Failure failu
   state_.contact_a_closed = a ? 1 : 0;
   state_.contact_b_closed = b ? 1 : 0;
   state_.reset_pressed = reset ? 1 : 0;
-  state_.pulse_seen = pulse ? 1 : 0;
+  unread_ = unread_ || pulse || !a || !b;
+  state_.pulse_seen = unread_ && a && b ? 1 : 0;
 
   if (reset) {
     state_.last_reset_ns = t_ns;
@@ -56,6 +57,7 @@ hal::Status SimEstop::read(hal::EstopState& out) noexcept {
   EstopPlantState s;
   const hal::Status status = reader_.read(s);
   if (status != hal::Status::ok) return status;
+  unread_ = false;
   if (failure_ == Failure::nan) return hal::Status::fault;
   out.contact_a_closed = s.contact_a_closed != 0;
   out.contact_b_closed = s.contact_b_closed != 0;

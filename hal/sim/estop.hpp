@@ -20,7 +20,7 @@ struct EstopPlantState {
   std::uint8_t contact_a_closed = 1;
   std::uint8_t contact_b_closed = 1;
   std::uint8_t reset_pressed = 0;
-  std::uint8_t pulse_seen = 0;  // a contact was open for less than a tick
+  std::uint8_t pulse_seen = 0;  // a contact was open since the last reading, and no more
   std::uint8_t heartbeat_level = 0;
   std::uint8_t heartbeat_seen = 0;  // it has toggled at least once
   std::uint8_t relay_closed = 0;
@@ -49,6 +49,7 @@ class SimEstop final : public hal::EstopChain {
   FailingReader<EstopPlantState> reader_;
   Failure failure_ = Failure::none;
   std::int64_t now_ns_ = 0;
+  bool unread_ = false;  // an opening that nobody has read, as the line's event queue keeps it
 };
 
 }  // namespace punctum::sim

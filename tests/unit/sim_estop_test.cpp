@@ -71,6 +71,20 @@ TEST_F(SimEstopTest, SeesAPulseShorterThanATick) {
   EXPECT_FALSE(read(chain).pulse_seen);
 }
 
+TEST_F(SimEstopTest, KeepsAPulseUntilItIsRead) {
+  config.estop_events[0] = {0.0103, 0.0004, true, false, false};
+  config.estop_events[1] = {0.0203, 0.0015, true, false, false};
+  config.estop_event_count = 2;
+  SimEstop chain(config);
+  for (const int until : {15, 25}) {  // both lie within one late tick
+    run(chain, until - static_cast<int>(ticks));
+    EXPECT_TRUE(read(chain).pulse_seen);
+    EXPECT_TRUE(read(chain).contact_a_closed);
+    tick(chain);
+    EXPECT_FALSE(read(chain).pulse_seen);
+  }
+}
+
 TEST_F(SimEstopTest, GivesPowerOnlyOnceTheHeartbeatRuns) {
   SimEstop chain(config);
   run(chain, 100, false);

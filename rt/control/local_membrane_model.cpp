@@ -11,6 +11,11 @@ constexpr double kFarthest_m = 5e-3;
 constexpr double kLargestCell_m = 2e-3;
 constexpr double kScaleMin = 0.1;
 constexpr double kScaleMax = 3;
+// Stage minus picture: more is no error of vision's; slower than the time constant it is drift; a way of the
+// needle that both see alike is a new agreement.
+constexpr double kDisagree_m = 8e-6;
+constexpr double kDrift_s = 10;
+constexpr double kAgain_m = 20e-6;
 
 [[nodiscard]] bool plausible(const double (&p)[3]) noexcept {
   return std::abs(p[0]) < kFarthest_m && std::abs(p[1]) < kFarthest_m && std::abs(p[2]) < kFarthest_m;
@@ -68,6 +73,7 @@ bool LocalMembraneModel::observe(const Observation& seen, bool inside) noexcept 
   const bool shows_cell = shows_needle && seen.has(Observation::outer_ok) && plausible(seen.centre_m) &&
                           seen.R_m > c_m_ && seen.R_m < kLargestCell_m && std::abs(seen.gap_m) < kFarthest_m;
   if (!shows_cell && !(inside && shows_needle && membrane_.known)) return false;
+  if (!agrees(pose, vec(seen.tip_m))) return false;
 
   newest_exposure_ns_ = seen.exposure_ns;
   seen_ = true;
@@ -109,6 +115,36 @@ bool LocalMembraneModel::observe(const Observation& seen, bool inside) noexcept 
   return true;
 }
 
+bool LocalMembraneModel::agrees(const TipPose& pose, const hal::Vec3& seen_tip_m) noexcept {
+  hal::Vec3 off = pose.tip_m - seen_tip_m;
+  off.z() = 0;
+  const double since_s = static_cast<double>(pose.t_ns - registered_ns_) * 1e-9;
+  registered_ns_ = pose.t_ns;
+  if (!registered_) {
+    registered_ = true;
+    disagreed_ = false;
+    registration_m_ = off;
+    return true;
+  }
+  if ((off - registration_m_).norm() <= kDisagree_m) {
+    disagreed_ = false;
+    registration_m_ += (1 - std::exp(-since_s / kDrift_s)) * (off - registration_m_);
+    return true;
+  }
+  if (!disagreed_) {
+    disagreed_ = true;
+    disagreed_at_m_ = pose.tip_m;
+    disagreed_off_m_ = off;
+    return false;
+  }
+  hal::Vec3 way = pose.tip_m - disagreed_at_m_;
+  way.z() = 0;
+  if (way.norm() < kAgain_m) return false;
+  registered_ = (off - disagreed_off_m_).norm() > kDisagree_m;  // a new agreement counts from the next frame
+  disagreed_ = false;
+  return false;
+}
+
 void LocalMembraneModel::step(std::int64_t now_ns, const hal::Vec3& axis, double dt_s) noexcept {
   if (!started_) {
     started_ = true;
@@ -142,6 +178,7 @@ void LocalMembraneModel::restart(std::int64_t now_ns) noexcept {
   dimple_scale_ = params_.dimple_scale;
   not_before_ns_ = now_ns;
   started_ = true;
+  registered_ = false;
   seen_ = false;
   stale_ = true;
   age_s_ = -1;

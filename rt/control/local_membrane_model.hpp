@@ -45,8 +45,8 @@ class LocalMembraneModel {
   void push_pose(const TipPose& pose) noexcept { history_.push(pose); }
 
   // A new observation: true if it could be used (finite, plausible, exposed within the history, after the
-  // last restart). inside: past the puncture, where a frame that shows the needle is enough to count as
-  // sight.
+  // last restart, its needle where the stage has it). inside: past the puncture, where a frame that shows the
+  // needle is enough to count as sight.
   bool observe(const Observation& seen, bool inside) noexcept;
 
   // Bounded-rate correction, age, fade.
@@ -69,6 +69,10 @@ class LocalMembraneModel {
   [[nodiscard]] std::uint64_t used() const noexcept { return used_; }
 
  private:
+  // The picture lies beside the stage's frame, nobody knows how far, but it stays there. A picture that
+  // stands still while the needle moves would drag the membrane along, and no depth limit would ever bite.
+  [[nodiscard]] bool agrees(const TipPose& pose, const hal::Vec3& seen_tip_m) noexcept;
+
   LocalModelParams params_;
   double c_m_;
   double R_default_m_;
@@ -85,6 +89,12 @@ class LocalMembraneModel {
   bool overdue_ = false;
   bool started_ = false;
   double centre_z_m_ = 0;
+  bool registered_ = false;
+  hal::Vec3 registration_m_ = hal::Vec3::Zero();  // stage minus picture, across the optical axis
+  std::int64_t registered_ns_ = 0;                // exposure it is of
+  bool disagreed_ = false;
+  hal::Vec3 disagreed_at_m_ = hal::Vec3::Zero();   // the stage when picture and stage began to disagree
+  hal::Vec3 disagreed_off_m_ = hal::Vec3::Zero();  // and stage minus picture then
   double age_s_ = -1;
   Ramp fade_;
   bool contact_ = false;

@@ -190,6 +190,9 @@ struct Bench {
   Vec3 centre{-40e-6, 0, 0};
   double R = 60e-6, puncture_at = 14e-6, dimple = 0.45;
   bool punctured = false, seeing = true, aim = true;
+  bool same_picture = false;          // again and again, with fresh times
+  Vec3 picture_shift = Vec3::Zero();  // somebody has bumped the microscope
+  Observation shown;
   std::vector<std::pair<std::int64_t, Observation>> on_its_way;
   std::int64_t now = 1'000'000'000;
   std::uint64_t ticks = 0, missed = 0;
@@ -226,6 +229,13 @@ struct Bench {
         o.wd_m = punctured ? 0 : -gap();
         o.a_m = 3.8e-6 + dimple * std::sqrt(2 * R * -gap());
       }
+      for (int i = 0; i < 2; ++i) {
+        o.tip_m[i] += picture_shift[i];
+        o.centre_m[i] += picture_shift[i];
+      }
+      if (same_picture) o = shown;
+      o.exposure_ns = now;
+      shown = o;
       on_its_way.emplace_back(now + 60'000'000, o);
     }
   }
@@ -322,7 +332,9 @@ TEST(Servo, takes_a_needle_through_a_whole_injection) {
 }
 
 TEST(Servo, renders_the_membrane_law_of_the_depth_it_reports_within_a_percent_at_rest) {
-  Bench b(icsi());
+  ServoConfig config = icsi();
+  config.local_model->dimple_scale_rate_1_s = 0.5;
+  Bench b(config);
   b.to_indentation();
   b.run(3);
   const TelemetrySample& s = b.sample();
@@ -641,6 +653,40 @@ TEST(Servo, accepts_only_withdrawal_while_vision_is_silent_and_goes_on_when_it_i
   b.move(b.wanted_x - 15e-6, 15e-6);
   b.run(0.3);
   EXPECT_LT(b.stage.tip.x(), silent_tip - 5e-6);
+}
+
+TEST(Servo, does_not_push_the_needle_on_by_a_picture_that_stands_still) {
+  Bench b(icsi());
+  b.puncture_at = 1;
+  b.to_indentation();
+  b.same_picture = true;
+  const double tip = b.stage.tip.x();
+  b.move(b.wanted_x - 40e-6, 10e-6);
+  EXPECT_NE(b.sample().alarms & alarm_vision_stale, 0U);
+  EXPECT_EQ(b.sample().membrane_N, 0);
+  EXPECT_LT(tip - b.stage.tip.x(), 8e-6 + 0.4 * 10e-6);
+  // Pictures again: it goes on.
+  b.same_picture = false;
+  b.run(1);
+  EXPECT_EQ(b.sample().alarms & alarm_vision_stale, 0U);
+  const double again = b.stage.tip.x();
+  b.move(b.wanted_x - 3e-6, 10e-6);
+  b.run(0.3);
+  EXPECT_LT(b.stage.tip.x(), again - 2e-6);
+}
+
+TEST(Servo, trusts_a_bumped_microscope_again_once_the_needle_has_moved_in_its_picture) {
+  Bench b(icsi());
+  b.to_indentation();
+  b.picture_shift = Vec3(0, 30e-6, 0);
+  b.run(1);
+  EXPECT_NE(b.sample().alarms & alarm_vision_stale, 0U);
+  b.run(60);
+  EXPECT_NE(b.sample().alarms & alarm_vision_stale, 0U);
+  b.move(b.wanted_x + 30e-6, 20e-6);  // out is allowed
+  b.run(1);
+  EXPECT_EQ(b.sample().alarms & alarm_vision_stale, 0U);
+  EXPECT_EQ(b.servo->fault(), Fault::none);
 }
 
 TEST(Servo, does_not_let_the_needle_approach_before_anything_was_seen) {

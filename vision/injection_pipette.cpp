@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
 
 #include "vision/correlation.hpp"
@@ -52,7 +53,8 @@ bool InjectionPipette::start(const GradientField& field, double noise) {
   double straight = 0;
   for (int round = 0; round < 3; ++round) {
     straight = fit_edges(field, noise, last_);
-    if (const auto s = walls_end(field, last_, std::min(30.0, 0.5 * best->length), round == 0 ? 25 : 10)) {
+    if (const auto s =
+            walls_end(field, last_, std::min(30.0, 0.5 * best->length), round == 0 ? 25 : 10, noise)) {
       last_.tip += *s * last_.axis;
     }
   }
@@ -210,7 +212,7 @@ std::optional<double> InjectionPipette::wall_step(const GradientField& field, co
 }
 
 std::optional<double> InjectionPipette::walls_end(const GradientField& field, const NeedleFix& fix,
-                                                  double back, double ahead) const {
+                                                  double back, double ahead, double noise) const {
   // Cross profiles in units of the half-width, without mean and slope: a membrane that the needle meets
   // head-on is even across it and drops out. How much of the shaft's own profile each station holds:
   constexpr int kLanes = 21;
@@ -254,7 +256,10 @@ std::optional<double> InjectionPipette::walls_end(const GradientField& field, co
   for (double x : shaft) {
     norm2 += x * x;
   }
-  if (stations < 5 || norm2 < 1e-6) {
+  // Walls and lumen must stand out of what smoothing leaves of the noise.
+  const double contrast = std::sqrt(norm2 / kLanes) / std::max(stations, 1);
+  const double smooth_noise = noise / (2 * field.sigma * std::sqrt(std::numbers::pi));
+  if (stations < 5 || contrast < std::max(0.7, 4 * smooth_noise / std::sqrt(stations))) {
     return std::nullopt;
   }
   constexpr double kStep = 0.5;
@@ -334,11 +339,16 @@ NeedleFix InjectionPipette::find(const GradientField& field, double noise) {
   fix.tip = last_.tip + velocity_ - end_offset_ * last_.axis;
   fix.tip += (correlated - fix.tip).dot(across) * across;
   (void)fit_edges(field, noise, fix);
-  auto end = walls_end(field, fix, 36, 44);
+  // Near where its motion says first: what lies further ahead cannot be taken for it then.
+  auto end = walls_end(field, fix, 18, 18, noise);
+  const bool near = end.has_value();
+  if (!near) {
+    end = walls_end(field, fix, 36, 44, noise);
+  }
   if (end) {
     fix.tip += *end * fix.axis;
     (void)fit_edges(field, noise, fix);
-    if (const auto again = walls_end(field, fix, 16, 16)) {
+    if (const auto again = walls_end(field, fix, 16, 16, noise)) {
       fix.tip += *again * fix.axis;
     }
   }
@@ -349,6 +359,15 @@ NeedleFix InjectionPipette::find(const GradientField& field, double noise) {
     return fix;
   }
   fix.tip += end_offset_ * fix.axis;
+  // Far from where it should be by its motion and from where the whole tip is recognised: something else
+  // crosses.
+  constexpr double kJump_px = 4;
+  if (!near && std::abs((fix.tip - last_.tip - velocity_).dot(fix.axis)) > kJump_px &&
+      std::abs((fix.tip - correlated).dot(fix.axis)) > kJump_px && ++jumps_ <= 3) {
+    fix.why = "end of the needle jumped";
+    return fix;
+  }
+  jumps_ = 0;
   fix.ok = true;
   velocity_ = lost_ == 0 ? fix.tip - last_.tip : Point();
   lost_ = 0;

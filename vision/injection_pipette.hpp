@@ -51,7 +51,7 @@ class InjectionPipette {
                                                 double reach, double floor) const;
   // Distance ahead of fix.tip (< 0: behind) at which the pattern of walls and lumen ends; sub-pixel.
   [[nodiscard]] std::optional<double> walls_end(const GradientField& field, const NeedleFix& fix, double back,
-                                                double ahead) const;
+                                                double ahead, double noise) const;
 
   Side side_;
   double c_px_;
@@ -63,6 +63,7 @@ class InjectionPipette {
   NeedleFix last_;
   Point velocity_;
   int lost_ = 0;
+  int jumps_ = 0;
   void calibrate_end(const GradientField& field, const NeedleFix& fix, double noise);
 
   double end_offset_ = 0;  // from where the walls' pattern ends to the end face, px

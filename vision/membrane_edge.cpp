@@ -303,6 +303,39 @@ EdgePath closed_path(const GradientField& field, const EdgeBand& band, Polarity 
     out.raw[a] = band.anchor->second;
     weight[a] = 4;
   }
+  // Long arcs that nothing is seen of: drawn a little to the line between what is seen on either side, or
+  // noise at their ends would bend them far out.
+  for (int i = 0; i < n; ++i) {
+    if (!out.seen[static_cast<std::size_t>(i)] || out.seen[static_cast<std::size_t>((i + 1) % n)]) {
+      continue;
+    }
+    int run = 1;
+    while (run < n && !out.seen[static_cast<std::size_t>((i + 1 + run) % n)]) {
+      ++run;
+    }
+    const auto side = [&](int from, int step) {
+      std::vector<float> near;
+      for (int k = 0; k < n / 8 && near.size() < 8; ++k) {
+        const std::size_t a = static_cast<std::size_t>(((from + k * step) % n + n) % n);
+        if (out.seen[a] && k > 0) {  // the outermost one may be half hidden
+          near.push_back(static_cast<float>(out.raw[a]));
+        }
+      }
+      return near.size() < 4 ? -1.0 : median(near);
+    };
+    const double left = side(i, -1), right = side(i + 1 + run, 1);
+    if (left < 0 || right < 0) {
+      continue;
+    }
+    for (int k = 0; k < run; ++k) {
+      const std::size_t a = static_cast<std::size_t>((i + 1 + k) % n);
+      if (!band.anchor || static_cast<int>(a) != band.anchor->first) {
+        const double t = (k + 1.0) / (run + 1.0);
+        out.raw[a] = (1 - t) * left + t * right;
+        weight[a] = std::max(weight[a], 0.01);
+      }
+    }
+  }
   out.r = out.raw;
   // (weights of the smoother are set by the caller's stiffness; the default holds about 25 modes)
   std::vector<double> stiff(static_cast<std::size_t>(n));

@@ -36,7 +36,8 @@ bool Puncture::update(const PunctureInput& in) {
   // Pushed, the membrane goes no faster than the needle: what jumps ahead of it is a mistaken point.
   double membrane = in.membrane_px;
   if (have_last_) {
-    membrane = std::min(membrane, last_membrane_ + std::max(0.0, in.tip_px - last_tip_) + 0.7);
+    membrane =
+        std::min(membrane, std::max(last_membrane_, deepest_) + std::max(0.0, in.tip_px - last_tip_) + 0.7);
   }
   if (membrane >= deepest_) {
     deepest_ = membrane;

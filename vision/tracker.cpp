@@ -23,7 +23,9 @@ namespace {
 
 using Seconds = std::chrono::steady_clock;
 
+constexpr int kRestMature = 6;  // frames without touch after which the undeformed outline is relied on
 constexpr double kNeedleMargin_px = 2.5;  // what blur spreads beyond the needle's edges
+constexpr double kFaceReach_px = 6.5;  // so near the face of the holding pipette an edge is blurred into it
 
 class Stopwatch {
  public:
@@ -134,12 +136,13 @@ struct Tracker::Impl {
   bool start_pair(const Found& main);
   void start_inner();
   void start_by_snake(const Circle& circle);
-  EdgePath search(const Point& centre, double lo, double hi, Polarity polarity, double saturation);
+  EdgePath search(const Point& centre, double lo, double hi, double expected, Polarity polarity,
+                  double saturation);
   void follow(Followed& m, Membrane& out, const Followed* inside_of, const Followed* outside_of);
   void behind_holder(EdgeBand& band, const std::vector<double>& expected) const;
   void remove_impurities();
   void measure();
-  [[nodiscard]] bool strays(const std::vector<double>& rested, const EdgePath& path,
+  [[nodiscard]] bool strays(const Followed& m, const std::vector<double>& rested, const EdgePath& path,
                             double needle_angle) const;
   void keep_rest(const Followed& outer_before, const Followed& inner_before);
   void learn_rest(Followed& m, const Membrane& seen, bool touched);
@@ -313,7 +316,7 @@ void Tracker::Impl::behind_holder(EdgeBand& band, const std::vector<double>& exp
       continue;
     }
     band.upper[i] = std::min(band.upper[i], r);
-    if (expected[i] > r - 5) {
+    if (expected[i] > r - kFaceReach_px) {
       band.hidden[i] = 1;
     }
   }
@@ -321,7 +324,7 @@ void Tracker::Impl::behind_holder(EdgeBand& band, const std::vector<double>& exp
 
 // ---- membranes ----
 
-EdgePath Tracker::Impl::search(const Point& centre, double lo, double hi, Polarity polarity,
+EdgePath Tracker::Impl::search(const Point& centre, double lo, double hi, double expected, Polarity polarity,
                                double saturation) {
   EdgeBand band;
   band.centre = centre;
@@ -331,6 +334,7 @@ EdgePath Tracker::Impl::search(const Point& centre, double lo, double hi, Polari
   band.slope = 1.5;
   band.stiffness = 0.5;
   band.visible = [this](const Point& p) { return hidden(p) ? 0.0 : 1.0; };
+  behind_holder(band, std::vector<double>(band.middle.size(), 1.08 * expected));
   return closed_path(field, band, polarity, 3 * gn, saturation);
 }
 
@@ -344,7 +348,7 @@ std::optional<Tracker::Impl::Found> Tracker::Impl::strongest_closed_edge(const C
     Found f;
     f.polarity = polarity;
     for (int i = 0; i < rounds; ++i) {
-      f.path = search(centre, lo, hi, polarity, level);
+      f.path = search(centre, lo, hi, circle.r, polarity, level);
       f.centre = centre;
       if (f.path.r.empty()) {
         break;
@@ -826,7 +830,7 @@ void Tracker::Impl::follow(Followed& m, Membrane& out, const Followed* inside_of
     out.why = "edge has faded";
   } else if (moved > 0.6 * band.half_width) {
     out.why = "contour jumped";
-  } else if (strays(rested, path, needle_angle)) {
+  } else if (strays(m, rested, path, needle_angle)) {
     out.why = "contour left the cell's outline";
   } else {
     out.ok = true;
@@ -860,7 +864,9 @@ void Tracker::Impl::follow(Followed& m, Membrane& out, const Followed* inside_of
 // place.
 void Tracker::Impl::keep_rest(const Followed& outer_before, const Followed& inner_before) {
   bool same = false;
-  if (rest && outer.known) {
+  // Learnt over a few frames only, or not needed because nothing touches: better learnt anew.
+  const bool needed = was_contact || puncture.punctured() || result.phase != rt::Phase::free;
+  if (rest && outer.known && needed && outer_before.rest_frames >= kRestMature) {
     const Contour now = from_polar(outer.centre, outer.r);
     std::vector<double> weight(now.size(), 1.0);
     if (result.needle.ok) {
@@ -912,9 +918,9 @@ void Tracker::Impl::learn_rest(Followed& m, const Membrane& seen, bool touched) 
 }
 
 // Away from the needle a membrane keeps its outline: an arc that has left it follows something else.
-bool Tracker::Impl::strays(const std::vector<double>& rested, const EdgePath& path,
+bool Tracker::Impl::strays(const Followed& m, const std::vector<double>& rested, const EdgePath& path,
                            double needle_angle) const {
-  if (rested.size() != path.r.size() || !result.needle.ok) {
+  if (rested.size() != path.r.size() || !result.needle.ok || m.rest_frames < kRestMature) {
     return false;
   }
   const double limit = std::max(6.0, 0.1 * median_of(rested));

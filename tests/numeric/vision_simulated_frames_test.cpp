@@ -1,0 +1,189 @@
+// The tracker on the simulated microscope's pictures, whose truth comes from the large-deflection membrane:
+// approach, contact, indentation, puncture, withdrawal.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "hal/sim/cell.hpp"
+#include "hal/sim/microscope.hpp"
+#include "vision/tracker.hpp"
+
+namespace {
+
+using namespace punctum;
+using namespace punctum::vision;
+
+struct Case {
+  const char* name;
+  std::uint64_t seed = 1;
+  double noise = 2;
+  double aim_um = 3;
+  double tilt = 0.03;
+  bool inner = true;
+  bool holder = true;
+  double outer_um = 0.3;  // rms allowed, hidden arcs included
+  double wd_um = 0.9;     // rms allowed
+};
+
+std::string label(const testing::TestParamInfo<Case>& info) { return info.param.name; }
+
+class SimulatedFrames : public testing::TestWithParam<Case> {};
+
+TEST_P(SimulatedFrames, AreFollowedThroughAnInjection) {
+  const Case& c = GetParam();
+  sim::MicroscopeParams lens;
+  lens.noise = c.noise;
+  const sim::NeedleParams needle;
+  sim::CellParams cell_params;
+  cell_params.inner = c.inner;
+  const std::optional<sim::HolderParams> holder =
+      c.holder ? std::optional(sim::HolderParams{}) : std::nullopt;
+  sim::Microscope microscope(lens, needle, holder, c.seed);
+  const sim::Cell cell(cell_params, needle, holder, c.seed, 0);
+  sim::CellState state;
+  VisionConfig config;
+  config.inner = c.inner;
+  if (!c.holder) {
+    config.holder.reset();
+  }
+  Tracker tracker(config, lens.width, lens.height);
+  std::vector<std::uint8_t> pixels(static_cast<std::size_t>(lens.width * lens.height));
+  std::vector<std::array<double, 2>> outer(sim::Cell::kContour), inner(sim::Cell::kContour);
+
+  const sim::Vec3 axis(-std::cos(c.tilt), std::sin(c.tilt), 0);
+  sim::Vec3 tip(75e-6, c.aim_um * 1e-6, 0);
+  const double um = lens.pixel_m * 1e6;
+  const auto pixel = [&](double x, double y) {
+    return Point(x / lens.pixel_m + (lens.width - 1) / 2.0, y / lens.pixel_m + (lens.height - 1) / 2.0);
+  };
+  struct Sum {
+    double ss = 0;
+    int n = 0;
+    void add(double x) { ss += x * x, ++n; }
+    [[nodiscard]] double rms() const { return n > 0 ? std::sqrt(ss / n) : 0; }
+  };
+  Sum outer_error, inner_error, tip_error, wd_error, gap_error, us;
+  int frames = 0, lost = 0;
+  double contact_s = -1, puncture_s = -1, seen_contact_s = -1, seen_puncture_s = -1, beyond = 0, dwell = 0;
+  bool leaving = false;
+  for (int tick = 0; tick < 40000; ++tick) {
+    const double t = tick * 1e-3;
+    const double gap = (cell.centre_m(state) - tip).dot(axis) - cell.R_m();
+    double speed = gap > 2e-6 ? 25e-6 : 8e-6;
+    const bool through = state.outer.punctured && (!c.inner || state.inner.punctured);
+    if (through && !leaving) {
+      speed = beyond < 12e-6 ? 20e-6 : 0;
+      beyond += speed * 1e-3;
+      dwell += speed > 0 ? 0 : 1e-3;
+      leaving = dwell > 0.3;
+    }
+    if (leaving) {
+      speed = -30e-6;
+      if (gap > 20e-6) {
+        break;
+      }
+    }
+    sim::TipMotion motion;
+    motion.tip_begin_m = tip;
+    tip += axis * speed * 1e-3;
+    motion.tip_end_m = tip;
+    motion.axis_begin = motion.axis_end = axis;
+    const sim::CellForce truth = cell.step(state, motion, 1e-3);
+    contact_s = contact_s < 0 && state.contact ? t : contact_s;
+    puncture_s = puncture_s < 0 && state.outer.punctured ? t : puncture_s;
+    if (tick % 40 != 0) {
+      continue;
+    }
+    const auto no = static_cast<std::size_t>(cell.contour(state, sim::Membrane::outer, outer));
+    const auto ni = static_cast<std::size_t>(cell.contour(state, sim::Membrane::inner, inner));
+    sim::PictureScene scene;
+    scene.needle = sim::NeedleInPicture{tip, axis};
+    if (c.holder) {
+      scene.holder_mouth_m = cell.holder_mouth_m();
+    }
+    sim::CellInPicture shown;
+    shown.outer = std::span<const std::array<double, 2>>(outer.data(), no);
+    shown.inner = std::span<const std::array<double, 2>>(inner.data(), ni);
+    shown.centre_m = cell.centre_m(state);
+    shown.zona_h_m = cell_params.zona_h_m;
+    scene.cell = shown;
+    microscope.render(scene, static_cast<std::uint64_t>(frames), pixels);
+    hal::Frame frame;
+    frame.pixels = pixels.data();
+    frame.width = lens.width;
+    frame.height = lens.height;
+    frame.stride = lens.width;
+    frame.sequence = static_cast<std::uint64_t>(frames++);
+    frame.exposure_ns = static_cast<std::int64_t>(tick) * 1'000'000;
+    const Result& r = tracker.process(frame);
+
+    seen_contact_s = seen_contact_s < 0 && r.contact ? t : seen_contact_s;
+    seen_puncture_s = seen_puncture_s < 0 && r.punctured ? t : seen_puncture_s;
+    if (!r.outer.ok || !r.needle.ok) {
+      ++lost;
+      continue;
+    }
+    Contour line;
+    for (std::size_t i = 0; i < no; ++i) {
+      line.push_back(pixel(outer[i][0], outer[i][1]));
+    }
+    double ss = 0;
+    for (const Point& p : r.outer.contour) {
+      const double d = distance_to(line, p) * um;
+      ss += d * d / static_cast<double>(r.outer.contour.size());
+    }
+    const bool recoiling = puncture_s > 0 && t < puncture_s + 0.25;
+    if (!recoiling) {
+      outer_error.add(std::sqrt(ss));
+    }
+    if (r.inner.ok && ni > 0 && !recoiling) {
+      line.clear();
+      for (std::size_t i = 0; i < ni; ++i) {
+        line.push_back(pixel(inner[i][0], inner[i][1]));
+      }
+      ss = 0;
+      for (const Point& p : r.inner.contour) {
+        const double d = distance_to(line, p) * um;
+        ss += d * d / static_cast<double>(r.inner.contour.size());
+      }
+      inner_error.add(std::sqrt(ss));
+    }
+    tip_error.add(cv::norm(r.needle.tip - pixel(tip.x(), tip.y())) * um);
+    gap_error.add(*r.gap_px * um + truth.depth_m * 1e6);
+    if (!recoiling) {
+      wd_error.add(*r.wd_px * um - truth.wd_m * 1e6);
+    }
+    if (frames > 1) {
+      us.add(r.us.total);
+    }
+  }
+  std::printf(
+      "%-14s rms um: outer %.3f inner %.3f tip %.3f gap %.3f w_d %.3f; contact %+.0f ms puncture %+.0f ms; "
+      "lost %d of %d; %.0f us a frame\n",
+      c.name, outer_error.rms(), inner_error.rms(), tip_error.rms(), gap_error.rms(), wd_error.rms(),
+      1e3 * (seen_contact_s - contact_s), 1e3 * (seen_puncture_s - puncture_s), lost, frames, us.rms());
+  EXPECT_LE(lost, frames / 50);
+  EXPECT_LT(outer_error.rms(), c.outer_um);
+  EXPECT_LT(tip_error.rms(), 1.2);
+  EXPECT_LT(gap_error.rms(), 1.2);
+  EXPECT_LT(wd_error.rms(), c.wd_um);
+  EXPECT_NEAR(seen_contact_s, contact_s, 0.2);
+  EXPECT_GT(seen_puncture_s, puncture_s);  // never before it happened
+  EXPECT_LT(seen_puncture_s, puncture_s + 0.2);
+}
+
+INSTANTIATE_TEST_SUITE_P(Cases, SimulatedFrames,
+                         testing::Values(Case{"standard"}, Case{"noisy", 2, 6},
+                                         Case{"very_noisy", 1, 10, 3, 0.03, true, true, 0.5, 1.5},
+                                         Case{"off_centre", 5, 2, 8, 0.08, true, true, 0.5, 1.2},
+                                         Case{"from_below", 6, 2, -7, -0.06, true, true, 0.5, 1.2},
+                                         Case{"outer_only", 1, 2, 3, 0.03, false, true, 0.5},
+                                         Case{"no_holder", 3, 2, 3, 0.03, true, false},
+                                         Case{"another_cell", 9, 3, -2, 0.0}),
+                         label);
+
+}  // namespace

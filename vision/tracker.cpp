@@ -123,6 +123,8 @@ struct Tracker::Impl {
     EdgePath path;
     Point centre;
     Polarity polarity = Polarity::any;
+    EdgePath unsigned_path;  // the same whatever its sign, about its own centre
+    Point unsigned_centre;
   };
   [[nodiscard]] std::optional<Found> strongest_closed_edge(const Circle& circle, double saturation);
   struct Second {
@@ -384,7 +386,11 @@ std::optional<Tracker::Impl::Found> Tracker::Impl::strongest_closed_edge(const C
       one_sign = std::move(f);
     }
   }
+  best.unsigned_path = best.path;
+  best.unsigned_centre = best.centre;
   if (!one_sign.path.r.empty()) {
+    one_sign.unsigned_path = std::move(best.unsigned_path);
+    one_sign.unsigned_centre = best.unsigned_centre;
     best = std::move(one_sign);
   }
   if (best.path.visible < 0.45 || best.path.support < 0.6 || best.path.level < 1.8 * best.path.background ||
@@ -510,27 +516,51 @@ bool Tracker::Impl::start_pair(const Found& main) {
     }
     return true;
   }
-  // A dark wall seen by its inner face: the outer face belongs to it, and the inner membrane lies further in.
-  const bool wall = good(out) && main.polarity == Polarity::darker_out &&
-                    out.polarity == Polarity::brighter_out && median_of(out.path.r) - mean < 0.25 * mean;
-  if (wall) {
-    set(outer, out.path.r, out.polarity, out.path.level);
-    if (good(in)) {
-      set(inner, in.path.r, in.polarity, in.path.level);
+  // Two flanks of one dark line belong to one membrane.
+  const auto flank = [&](const Second& x) {
+    return main.polarity != Polarity::any && x.polarity != Polarity::any && x.polarity != main.polarity &&
+           std::abs(median_of(x.path.r) - mean) < 0.13 * mean;
+  };
+  const bool out_is_flank = good(out) && flank(out), in_is_flank = good(in) && flank(in);
+  const std::vector<double>& face = out_is_flank ? out.path.r : r1;  // outer face of what main belongs to
+  const Polarity face_sign = out_is_flank ? out.polarity : main.polarity;
+  const double face_level = out_is_flank ? out.path.level : main.path.level;
+  if (good(in) && !in_is_flank) {
+    set(outer, face, face_sign, face_level);
+    set(inner, in.path.r, in.polarity, in.path.level);
+    if (good(out) && !out_is_flank && out.quality > in.quality) {
+      set(outer, out.path.r, out.polarity, out.path.level);
+      set(inner, r1, main.polarity, main.path.level);
     }
     return true;
   }
-  const bool main_is_inner = only_inner_possible || out.quality > in.quality || !good(in);
-  if (main_is_inner && (good(out) || out.quality > in.quality)) {
+  if (good(out) && !out_is_flank) {
+    set(outer, out.path.r, out.polarity, out.path.level);
     set(inner, r1, main.polarity, main.path.level);
-    if (good(out)) {
-      set(outer, out.path.r, out.polarity, out.path.level);
+    return true;
+  }
+  // Only one: is it the zona, with a brighter space inside it and the ooplasm too faint, or the ooplasm
+  // itself?
+  bool is_outer = in.quality > out.quality;
+  if (out_is_flank || in_is_flank) {
+    const std::vector<double>& inside_face = out_is_flank ? r1 : in.path.r;
+    double near = 0, deep = 0, outside = 0, wall = 0;
+    for (int i = 0; i < angles; ++i) {
+      const std::size_t k = static_cast<std::size_t>(i);
+      const double middle = 0.5 * (face[k] + inside_face[k]);
+      near += field.grey(from_angle(centre, i, inside_face[k] - 3)) / angles;
+      deep += field.grey(from_angle(centre, i, inside_face[k] - 14)) / angles;
+      wall += field.grey(from_angle(centre, i, middle)) / angles;
+      outside += field.grey(from_angle(centre, i, face[k] + 5)) / angles;
     }
+    is_outer = near - deep > 0.25 * std::abs(outside - wall);
+  }
+  if (is_outer && !only_inner_possible) {
+    set(outer, face, face_sign, face_level);
   } else {
-    set(outer, r1, main.polarity, main.path.level);
-    if (good(in)) {
-      set(inner, in.path.r, in.polarity, in.path.level);
-    }
+    // An edge of oolemma in phase-like contrast has flanks of both signs.
+    set(inner, main.unsigned_path.r, Polarity::any, main.unsigned_path.level);
+    inner.centre = main.unsigned_centre;
   }
   return true;
 }

@@ -143,10 +143,10 @@ class Servo {
   hal::HandState hand_;
   bool hand_seen_ = false;
   bool hand_fresh_ = false;
+  bool hand_was_stuck_ = false;
   double since_hand_s_ = 0;    // since its last good sample
   double between_hand_s_ = 0;  // the last two good samples
   HandWatch hand_watch_;
-  bool hand_was_stuck_ = false;
   hal::StageState stage_;
   bool stage_seen_ = false;
   bool stage_fresh_ = false;
@@ -155,16 +155,16 @@ class Servo {
   double since_stage_s_ = 0;
   hal::EstopState estop_;
   bool estop_readable_ = true;
+  bool discrepancy_ = false;    // until both have been seen open together
+  bool sensor_seen_ = false;    // the force sensor
+  bool injector_open_ = false;  // as it says itself
   double since_estop_s_ = 0;
-  double differing_s_ = 0;    // the two contacts
-  bool discrepancy_ = false;  // until both have been seen open together
+  double differing_s_ = 0;  // the two contacts
   double vacuum_Pa_ = 0;
   double vacuum_low_s_ = 0;
   double sensor_N_ = 0;
   double sensor_filtered_N_ = 0;
   double since_sensor_s_ = 0;
-  bool sensor_seen_ = false;
-  bool injector_open_ = false;
   double open_unasked_s_ = 0;  // the injector, against its gate
   std::uint64_t observation_head_ = 0;
   std::uint64_t observations_ = 0;
@@ -174,11 +174,10 @@ class Servo {
   bool stop_requested_ = false;
   bool end_requested_ = false;
   bool task_done_ = false;
+  Fault write_fault_ = Fault::none;  // found while writing, latched on the next tick
   std::uint32_t cells_done_ = 0;
   std::uint64_t commands_refused_ = 0;
   std::uint64_t faults_latched_ = 0;
-  Fault write_fault_ = Fault::none;  // found while writing, latched on the next tick
-  bool heartbeat_level_ = false;
   double force_scale_wanted_ = 1;  // command force_scale, 0 .. 1
   double force_scale_ = 1;
   Ramp presence_;  // of every force: from the start, after a reset, to the end
@@ -191,13 +190,14 @@ class Servo {
   hal::Vec3 approach_ = -hal::Vec3::UnitX();  // axis of the needle, frozen from contact on
   FixtureFrame insertion_;                    // the line of insertion, latched at the puncture
   double tip_force_N_ = 0;                    // the law's, or the measured one if that is more
-  bool tip_force_soft_ = false;
-  bool was_sighted_ = false;
-  double injected_s_ = 0;            // gate open, this cell
-  std::uint32_t injected_cell_ = 0;  // the cell it counts for
+  double injected_s_ = 0;                     // gate open, this cell
+  std::uint32_t injected_cell_ = 0;           // the cell it counts for
   bool gate_open_ = false;
   bool inject_released_ = false;  // the button was up since the start or the last stop
-  int until_command_ = 0;         // ticks until the next stage set-point
+  bool tip_force_soft_ = false;
+  bool was_sighted_ = false;
+  int until_command_ = 0;  // ticks until the next stage set-point
+  bool heartbeat_level_ = false;
   double stored_J_ = 0;
   double injected_J_ = 0;
   double model_moved_m_ = 0;  // depth added by vision's correction on this tick

@@ -146,6 +146,7 @@ struct Tracker::Impl {
   void measure();
   [[nodiscard]] bool strays(const Followed& m, const std::vector<double>& rested, const EdgePath& path,
                             double needle_angle) const;
+  [[nodiscard]] double thin_wall_bias(const Followed& m, const EdgePath& path, const Point& centre) const;
   void keep_rest(const Followed& outer_before, const Followed& inner_before);
   void learn_rest(Followed& m, const Membrane& seen, bool touched);
   void classify_contact();
@@ -840,6 +841,15 @@ void Tracker::Impl::follow(Followed& m, Membrane& out, const Followed* inside_of
     return;
   }
   out.contour = from_polar(band.centre, path.r);
+  if (is_outer) {
+    if (const double bias = thin_wall_bias(m, path, band.centre); bias > 0) {
+      std::vector<double> moved_in = path.r;
+      for (double& r : moved_in) {
+        r -= bias;
+      }
+      out.contour = from_polar(band.centre, moved_in);
+    }
+  }
   out.support = path.support;
   out.visible = path.visible;
   out.residual_px = path.residual;
@@ -945,6 +955,42 @@ void Tracker::Impl::learn_rest(Followed& m, const Membrane& seen, bool touched) 
   for (std::size_t i = 0; i < now.size(); ++i) {
     m.rest[i] += g * (now[i] - m.rest[i]);
   }
+}
+
+// Blur moves the two faces of a wall apart when it is thinner than the blur: the outer one then lies too far
+// out by half of what the wall looks thicker than it is. 0 where the wall is seen as thick as it is.
+double Tracker::Impl::thin_wall_bias(const Followed& m, const EdgePath& path, const Point& centre) const {
+  const double thickness = px(config.h_m);
+  constexpr double kPsf_px = 1.2;  // of a lens in focus
+  const double sigma = std::sqrt(field.sigma * field.sigma + kPsf_px * kPsf_px + 0.5);
+  if (m.polarity == Polarity::any || !(thickness > 0) || thickness > 2 * sigma) {
+    return 0;
+  }
+  const double sign = m.polarity == Polarity::brighter_out ? 1 : -1;
+  std::vector<double> apart;
+  for (int i = 0; i < angles; ++i) {
+    const std::size_t k = static_cast<std::size_t>(i);
+    if (!path.seen[k]) {
+      continue;
+    }
+    const Point d = from_angle(Point(0, 0), i, 1);
+    double top = 0.4 * static_cast<double>(path.strength[k]), at = 0;
+    for (double s = 1; s < 3 * sigma; s += 0.25) {
+      const double e = -sign * field.gradient(centre + (path.r[k] - s) * d).dot(d);
+      if (e > top) {
+        top = e;
+        at = s;
+      }
+    }
+    if (at > 0) {
+      apart.push_back(at);
+    }
+  }
+  if (static_cast<int>(apart.size()) < angles / 2) {
+    return 0;
+  }
+  const double seen = median_of(apart);
+  return seen < 2.6 * sigma ? std::max(0.0, 0.5 * (seen - thickness)) : 0;
 }
 
 // Away from the needle a membrane keeps its outline: an arc that has left it follows something else.

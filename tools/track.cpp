@@ -14,6 +14,7 @@
 #include "tools/observation_csv.hpp"
 #include "tools/scene.hpp"
 #include "vision/overlay.hpp"
+#include "vision/picture_change.hpp"
 #include "vision/tracker.hpp"
 
 namespace punctum::tools {
@@ -55,18 +56,17 @@ int track(const TrackOptions& options) {
                              r[0], r[1], r[2], r[3], camera->width(), camera->height()));
     }
   }
-  vision::Tracker tracker(config, roi.width, roi.height);
   if (options.seed_circle) {
     const auto& c = *options.seed_circle;
     if (!std::isfinite(c[0]) || !std::isfinite(c[1]) || !(c[2] >= 4) || !(c[2] < 1e4)) {
       return bad(fmt::format("--seed-circle {},{},{}: a centre in the picture and a radius of at least 4 px",
                              c[0], c[1], c[2]));
     }
-    tracker.seed_circle({vision::Point(c[0] - roi.x, c[1] - roi.y), c[2], 0});
   }
   const std::string pattern_path = !options.holder_template.empty() ? options.holder_template
                                    : config.holder                  ? config.holder->template_path
                                                                     : "";
+  cv::Mat pattern;
   if (!pattern_path.empty()) {
     const auto picture = recorded::read_picture(pattern_path);
     if (!picture) {
@@ -77,9 +77,20 @@ int track(const TrackOptions& options) {
       return bad(fmt::format("{}: {}x{} does not fit as a template in {}x{}", pattern_path, picture->width,
                              picture->height, roi.width, roi.height));
     }
-    tracker.holder_template(
-        cv::Mat(picture->height, picture->width, CV_8U, const_cast<std::uint8_t*>(picture->pixels.data())));
+    pattern =
+        cv::Mat(picture->height, picture->width, CV_8U, const_cast<std::uint8_t*>(picture->pixels.data()))
+            .clone();
   }
+  const auto new_tracker = [&] {
+    vision::Tracker tracker(config, roi.width, roi.height);
+    if (options.seed_circle) {
+      const auto& c = *options.seed_circle;
+      tracker.seed_circle({vision::Point(c[0] - roi.x, c[1] - roi.y), c[2], 0});
+    }
+    if (!pattern.empty()) tracker.holder_template(pattern);
+    return tracker;
+  };
+  vision::Tracker tracker = new_tracker();
   auto csv = ObservationCsv::open(options.out, false, false);
   if (!csv) {
     return bad(csv.error());
@@ -102,6 +113,7 @@ int track(const TrackOptions& options) {
 
   int frames = 0, outer = 0, inner = 0, unusable = 0;
   bool overlays_fail = false;
+  cv::Mat before;
   for (;;) {
     hal::Frame frame;
     const hal::Status status = camera->next(frame, 0);
@@ -119,6 +131,14 @@ int track(const TrackOptions& options) {
     part.pixels += static_cast<std::ptrdiff_t>(roi.y) * frame.stride + roi.x;
     part.width = roi.width;
     part.height = roi.height;
+    const cv::Mat grey(part.height, part.width, CV_8U, const_cast<std::uint8_t*>(part.pixels),
+                       static_cast<std::size_t>(part.stride));
+    // Stills of different scenes may share a folder: what was learnt from one says nothing of the next.
+    if (!before.empty() && vision::likeness(before, grey) < vision::kSameScene) {
+      tracker = new_tracker();
+      fmt::print(stderr, "{}: another scene, started afresh\n", camera->name());
+    }
+    grey.copyTo(before);
     const vision::Result& result = tracker.process(part);
     csv->row(result, config, t_s, roi.tl());
     outer += result.outer.ok;
@@ -128,8 +148,6 @@ int track(const TrackOptions& options) {
       contours->rows(result, roi.tl());
     }
     if (!options.overlay.empty() && !overlays_fail) {
-      const cv::Mat grey(part.height, part.width, CV_8U, const_cast<std::uint8_t*>(part.pixels),
-                         static_cast<std::size_t>(part.stride));
       const std::string stem = std::filesystem::path(camera->name()).stem().string();
       const std::string path = fmt::format("{}/{:06}_{}.png", options.overlay, frame.sequence, stem);
       bool written = false;

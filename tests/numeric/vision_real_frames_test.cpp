@@ -10,6 +10,7 @@
 #include <string>
 
 #include "hal/recorded/recorded_camera.hpp"
+#include "vision/picture_change.hpp"
 #include "vision/tracker.hpp"
 
 namespace {
@@ -177,5 +178,27 @@ INSTANTIATE_TEST_SUITE_P(Cases, Vesicles,
                          testing::Values(Vesicle{"large", "20100930-1-01_8bit.png", {{125, 230.5}, 100, 0}},
                                          Vesicle{"small", "snapshot-image_8bit.png", {{187, 115}, 77, 0}}),
                          [](const auto& one) { return std::string(one.param.name); });
+
+TEST(PictureChange, TellsStillsOfDifferentCellsFromFramesOfOneSequence) {
+  SKIP_WITHOUT("icsi")
+  SKIP_WITHOUT("zebrafish-timelapse")
+  const auto read = [](const std::string& file) { return cv::imread(data(file), cv::IMREAD_GRAYSCALE); };
+  const char* stills[] = {"00", "01", "03", "06"};
+  for (const char* a : stills) {
+    for (const char* b : stills) {
+      const double same = likeness(read(std::string("icsi/icsi_") + a + "_img.png"),
+                                   read(std::string("icsi/icsi_") + b + "_img.png"));
+      if (a == b) {
+        EXPECT_NEAR(same, 1, 1e-6);
+      } else {
+        EXPECT_LT(same, kSameScene) << a << ' ' << b;
+      }
+    }
+  }
+  EXPECT_GT(
+      likeness(read("zebrafish-timelapse/frame_LO001.jpg"), read("zebrafish-timelapse/frame_LO016.jpg")),
+      kSameScene);
+  EXPECT_EQ(likeness(cv::Mat(64, 64, CV_8U, cv::Scalar(9)), cv::Mat(64, 64, CV_8U, cv::Scalar(9))), 0);
+}
 
 }  // namespace

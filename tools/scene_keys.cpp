@@ -151,7 +151,8 @@ std::vector<Table> make_tables() {
 
   t.push_back({"velocity", Kind::settings, always, keep, [](Scene& s) {
                  auto& v = s.servo.velocity;
-                 return std::vector<Key>{whole("window", v.window, 2, 64), milli("d_mm", v.d_m, 1e-5, 1)};
+                 return std::vector<Key>{whole("window", v.window, 2, 64), milli("d_mm", v.d_m, 1e-5, 1),
+                                         milli("smooth_ms", v.smooth_s, 0, 100)};
                }});
 
   t.push_back({"mapping", Kind::settings, always, keep, [](Scene& s) {
@@ -246,7 +247,8 @@ std::vector<Table> make_tables() {
                },
                [](Scene& s) {
                  return std::vector<Key>{simulated_only(), milli("open_ms", s.sim->injector->open_s, 0, 1000),
-                                         real("max_open_s", s.servo.injector->max_open_s, 0.001, 60)};
+                                         real("max_open_s", s.servo.injector->max_open_s, 0.001, 60),
+                                         milli("shut_within_ms", s.servo.injector->shut_within_s, 1, 5000)};
                }});
 
   t.push_back({"force_sensor", Kind::thing,

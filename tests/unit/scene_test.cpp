@@ -9,6 +9,8 @@
 #include <filesystem>
 #include <fstream>
 #include <iomanip>
+#include <iterator>
+#include <regex>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -262,6 +264,31 @@ TEST(Scene, ATableThatIsAbsentIsAThingThatIsNotThere) {
   EXPECT_NEAR(load_scene("zebrafish")->sim->cell->R_m, 0.6e-3, 1e-12);
   EXPECT_NEAR(load_scene("zebrafish")->vision->pixel_m, 3.25e-6, 1e-15);
   EXPECT_TRUE(load_scene("recorded")->recorded.has_value());
+}
+
+// A field that no key reaches would silently keep its default.
+TEST(Scene, EveryNumberOfTheConfigurationsHasAKey) {
+  const auto read = [](const char* file) {
+    std::ifstream in(fs::path(PUNCTUM_SOURCE_DIR) / file);
+    return std::string(std::istreambuf_iterator<char>(in), {});
+  };
+  const std::string keys = read("tools/scene_keys.cpp");
+  ASSERT_FALSE(keys.empty());
+  const std::regex field(R"(^\s+(?:double|int|bool|Vec3|std::string|std::uint64_t)\s+(\w+)\s*[={;\[])");
+  int fields = 0;
+  for (const char* file : {"rt/control/config.hpp", "hal/sim/config.hpp", "vision/config.hpp"}) {
+    std::istringstream lines(read(file));
+    std::string line;
+    std::smatch m;
+    while (std::getline(lines, line))
+      if (std::regex_search(line, m, field)) {
+        ++fields;
+        const std::string name = m[1];
+        if (name == "real_actuators") continue;  // follows from the devices
+        EXPECT_TRUE(std::regex_search(keys, std::regex("[.>]" + name + "\\b"))) << file << ": " << name;
+      }
+  }
+  EXPECT_GT(fields, 120);
 }
 
 TEST(Scene, UnitsOfTheFileBecomeSi) {

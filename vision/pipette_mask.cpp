@@ -42,7 +42,7 @@ void draw_mask(cv::Mat& mask, const std::vector<Polygon>& polygons) {
 void erase(cv::Mat& edge, const cv::Mat& mask, cv::Point offset) {
   const cv::Rect part = cv::Rect(offset, edge.size()) & cv::Rect(0, 0, mask.cols, mask.rows);
   if (part.size() == edge.size()) {
-    edge.setTo(0.0F, mask(part));
+    edge.setTo(cv::Scalar(0), mask(part));
   }
 }
 

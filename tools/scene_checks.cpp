@@ -70,6 +70,8 @@ std::optional<Problem> check_together(const Scene& s) {
     if (p) return p;
   if (s.vision && s.vision->method == vision::Method::truth && !sim.microscope)
     return Problem{"vision.method", "\"truth\" is known of a simulated camera only, allowed: \"paper\""};
+  if (s.recorded && s.clock == ClockKind::virtual_time)
+    return Problem{"scene.clock", "\"virtual\" cannot wait for recorded frames, allowed: \"real\""};
   if (s.recorded && s.recorded->frames.empty())
     return Problem{"camera.frames", "is missing, allowed: a folder, a glob or a video file"};
 

@@ -356,7 +356,9 @@ int Run::run() {
       scene_.sim ? scene_.sim->seed : 0);
   say("report: {}", folder_);
 
-  if (scene_.vision)
+  // Recorded frames play from the core's first tick on; a camera is there before it.
+  const bool vision_later = scene_.recorded && scene_.clock == ClockKind::real;
+  if (scene_.vision && !vision_later)
     if (auto r = start_vision(); !r) {
       complain(r.error());
       return 2;
@@ -377,6 +379,13 @@ int Run::run() {
   while (true) {
     const std::uint64_t taken = recorder_->drain();
     if (core_.ended(ended)) break;
+    if (vision_later && !vision_.running() && !vision_over_ && vision_again_at_ == 0 &&
+        restarts_at_.empty() && (*station_)->core.started.load() != 0)
+      if (auto r = start_vision(); !r) {
+        complain(r.error());
+        vision_over_ = vision_refused_ = true;
+        interrupts.store(1);
+      }
     watch_vision();
     watch_interrupts();
     progress();

@@ -177,6 +177,10 @@ const std::vector<Broken>& broken() {
        "b.toml:9:10: vision.method: \"truth\" is known of a simulated camera only, allowed: \"paper\""},
       {"recorded frames from nowhere", kLeast + "[camera]\ndevice = \"recorded\"\n[vision]\n",
        "b.toml:5:2: camera.frames: is missing, allowed: a folder, a glob or a video file"},
+      {"recorded frames in virtual time",
+       "[scene]\nclock = \"virtual\"\n" + kLeast +
+           "[camera]\ndevice = \"recorded\"\nframes = \"f\"\n[vision]\n",
+       "b.toml:2:9: scene.clock: \"virtual\" cannot wait for recorded frames, allowed: \"real\""},
       {"a key of the other camera", kLeast + "[camera]\nlatency_ms = 1\ndevice = \"recorded\"\n",
        "b.toml:6:1: camera.latency_ms: unknown key, allowed: device, frames, fps, pixel_um"},
       {"a failure of a device that is not there",

@@ -114,6 +114,7 @@ tl::expected<Segment, std::string> Segment::create(std::string_view name, std::s
   for (int attempt = 0; attempt < 100 && made.lock_fd_ < 0; ++attempt) {
     const int fd = ::shm_open(path.c_str(), O_RDWR | O_CREAT | O_EXCL, S_IRUSR | S_IWUSR);
     if (fd >= 0) {
+      ::fchmod(fd, S_IRUSR | S_IWUSR);  // whatever the umask
       if (take_lock(fd) && name_means(path, fd)) {
         made.lock_fd_ = fd;
       } else {
@@ -129,7 +130,6 @@ tl::expected<Segment, std::string> Segment::create(std::string_view name, std::s
   if (made.lock_fd_ < 0) return refuse("cannot be created: other processes keep removing it");
   made.name_ = name;
 
-  ::fchmod(made.lock_fd_, S_IRUSR | S_IWUSR);  // whatever the umask
   // Reserved now, because a full /dev/shm would otherwise kill whoever touches the missing page.
   if (const int error = ::posix_fallocate(made.lock_fd_, 0, static_cast<off_t>(size)); error != 0) {
     return refuse("needs " + std::to_string(size >> 20) + " MiB in " + kDirectory + ": " +

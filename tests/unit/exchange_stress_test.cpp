@@ -87,9 +87,11 @@ void read_newest(const Ring& ring, const std::atomic<bool>& stop, Seen& seen) {
 void follow(const Ring& ring, const std::atomic<bool>& stop, Seen& seen) {
   Follower<Ring> follower(ring);
   Sample s;
-  while (!stop.load()) {
-    if (follower.next(s) != Read::ok) continue;
-    seen.look(s, follower.position() - 1);
+  for (bool last_round = false; !last_round;) {
+    last_round = stop.load();  // the writer is done: everything up to its end
+    for (Read r = follower.next(s); r != Read::not_yet; r = follower.next(s)) {
+      if (r == Read::ok) seen.look(s, follower.position() - 1);
+    }
   }
   seen.lost = follower.lost();
 }
@@ -136,8 +138,7 @@ TEST(SeqRing, ReadersOfABusyRingNeverSeeATornSample) {
   for (std::thread& r : readers) r.join();
   EXPECT_EQ(ring->head(), pushed);
   expect_clean(seen);
-  EXPECT_EQ(seen[1].good + seen[1].lost + Ring::kSize >= pushed, true)
-      << "a follower accounts for all it lost";
+  EXPECT_EQ(seen[1].good + seen[1].lost, pushed) << "a follower accounts for all it lost";
 }
 
 TEST(SeqRing, AnEmptyRingSaysSoAndAFutureSampleIsNotYetThere) {

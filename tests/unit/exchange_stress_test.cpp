@@ -188,6 +188,7 @@ TEST(SeqRing, AWriterKilledInTheMiddleOfASampleHarmsNoReaderAndTheNextWriterGoes
     return child;
   };
   pid_t child = fork_writer(1);
+  while (ring->head() == 0) std::this_thread::yield();  // on a busy machine the first one may start late
   std::vector<std::thread> readers;
   readers.emplace_back([&] { read_newest(*ring, stop, seen[0]); });
   readers.emplace_back([&] { follow(*ring, stop, seen[1]); });

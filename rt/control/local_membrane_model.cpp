@@ -88,14 +88,17 @@ bool LocalMembraneModel::observe(const Observation& seen, bool inside) noexcept 
   now.axis = pose.axis.normalized();
   now.R_m = seen.R_m;
   hal::Vec3 centre = pose.tip_m + (vec(seen.centre_m) - vec(seen.tip_m));
-  centre.z() = membrane_.known ? centre_z_m_ : pose.tip_m.z();
+  if (!focused_) {  // no picture tells depth: the needle is in focus when the run begins
+    focused_ = true;
+    focus_z_m_ = pose.tip_m.z();
+  }
+  centre.z() = focus_z_m_;
   now.entry_m = centre - now.R_m * now.axis;
   now.entry_m += (now.depth_m(pose.tip_m) + seen.gap_m) * now.axis;
 
   if (!membrane_.known) {
     membrane_ = now;
     membrane_.known = true;
-    centre_z_m_ = centre.z();
     entry_correction_m_.setZero();
     R_correction_m_ = 0;
     scale_correction_ = 0;

@@ -88,7 +88,8 @@ class LocalMembraneModel {
   bool stale_ = true;
   bool overdue_ = false;
   bool started_ = false;
-  double centre_z_m_ = 0;
+  bool focused_ = false;
+  double focus_z_m_ = 0;  // the focal plane in the stage's frame, where every cell of the run lies
   bool registered_ = false;
   hal::Vec3 registration_m_ = hal::Vec3::Zero();  // stage minus picture, across the optical axis
   std::int64_t registered_ns_ = 0;                // exposure it is of

@@ -249,6 +249,19 @@ TEST(LocalMembraneModel, forgets_the_old_cell_and_waits_for_a_frame_of_the_new_o
   EXPECT_LE(ticks, b.latency + 41);
 }
 
+TEST(LocalMembraneModel, keeps_the_focal_plane_from_cell_to_cell) {
+  Bench b;
+  for (int k = 0; k < 1500; ++k) b.step();
+  const double z = b.model.membrane().entry_m.z();
+  for (int cell = 0; cell < 20; ++cell) {
+    b.tip.z() += 2e-6;  // where she happens to be when the next cell comes
+    b.model.restart(b.now);
+    for (int k = 0; k < 500; ++k) b.step();
+    ASSERT_TRUE(b.model.membrane().known);
+    EXPECT_NEAR(b.model.membrane().entry_m.z(), z, 1e-12);
+  }
+}
+
 TEST(PoseHistory, interpolates_and_reaches_back_more_than_a_second_at_8_kHz) {
   static PoseHistory history;
   const auto place = [](double t) { return Vec3(1e-6 * t, 2e-6 * t * 3, -t * 1e-6); };

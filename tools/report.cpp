@@ -65,6 +65,8 @@ const char* name(Outcome o) noexcept {
       return "done";
     case Outcome::cell_lost:
       return "cell lost";
+    case Outcome::not_injected:
+      return "not injected";
     case Outcome::time_limit:
       return "time limit";
     case Outcome::stopped:

@@ -14,7 +14,7 @@
 
 namespace punctum::tools {
 
-enum class Outcome : std::uint8_t { done, cell_lost, time_limit, stopped, fault, core_died };
+enum class Outcome : std::uint8_t { done, cell_lost, not_injected, time_limit, stopped, fault, core_died };
 [[nodiscard]] const char* name(Outcome o) noexcept;
 
 struct Restart {

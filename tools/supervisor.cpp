@@ -289,7 +289,11 @@ Outcome Run::judge(const Ended& ended) const {
   const Measures& m = recorder_->measures();
   if (m.cells_lost > 0 && scene_.has_task()) return Outcome::cell_lost;
   if (core.task_finished.load() != 0 || !scene_.has_task()) return Outcome::done;
-  return Outcome::time_limit;
+  const bool left = static_cast<rt::Phase>(core.phase.load()) == rt::Phase::clear;
+  return left && !stopped_by_user_ &&
+                 core.exit_reason.load() != static_cast<std::uint64_t>(rt::ExitReason::time_limit)
+             ? Outcome::not_injected
+             : Outcome::time_limit;
 }
 
 int Run::run() {
@@ -439,6 +443,7 @@ int Run::run() {
     case Outcome::done:
       return 0;
     case Outcome::cell_lost:
+    case Outcome::not_injected:
     case Outcome::time_limit:
     case Outcome::stopped:
       return 1;

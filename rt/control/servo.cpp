@@ -84,7 +84,7 @@ Outcome Servo::outcome() const noexcept {
   }
   const bool at_rest = presence_.at() == 0 && (!devices_.stage || stage_.at_standstill);
   if (latch_.stage() == StopStage::running && ending() && at_rest) {
-    return task_done_ ? Outcome::done : Outcome::ended;
+    return task_done() ? Outcome::done : Outcome::ended;
   }
   return Outcome::running;
 }
@@ -377,7 +377,8 @@ void Servo::advance_phase() noexcept {
   if (phases_->entered(Phase::puncture)) insertion_ = {stage_.tip_m, approach_};
   if (phases_->entered(Phase::clear)) {
     ++cells_done_;
-    if (config_.cells > 0 && cells_done_ >= static_cast<std::uint32_t>(config_.cells)) task_done_ = true;
+    if (!config_.injector || injected_s_ > 0) ++cells_injected_;
+    if (config_.cells > 0 && cells_done_ >= static_cast<std::uint32_t>(config_.cells)) task_over_ = true;
   }
   if (phases_->entered(Phase::free) && phases_->cell() == cells_done_ && injected_cell_ != cells_done_) {
     // The next cell: everything that was learned belongs to the old one.
@@ -617,7 +618,7 @@ void Servo::publish(const TickInfo& now) noexcept {
   core.fault.store(static_cast<std::uint64_t>(s.fault), std::memory_order_relaxed);
   core.faults_latched.store(faults_latched_, std::memory_order_relaxed);
   core.phase.store(static_cast<std::uint64_t>(s.phase), std::memory_order_relaxed);
-  core.task_finished.store(task_done_ ? 1 : 0, std::memory_order_relaxed);
+  core.task_finished.store(task_done() ? 1 : 0, std::memory_order_relaxed);
   core.commands_refused.store(commands_refused_, std::memory_order_relaxed);
 }
 

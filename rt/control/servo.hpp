@@ -107,7 +107,9 @@ class Servo {
   [[nodiscard]] StageConstraint constraint() const noexcept;
   [[nodiscard]] bool inside() const noexcept;   // latched puncture
   [[nodiscard]] bool sighted() const noexcept;  // vision is not needed, or not stale
-  [[nodiscard]] bool ending() const noexcept { return task_done_ || end_requested_; }
+  [[nodiscard]] bool ending() const noexcept { return task_over_ || end_requested_; }
+  // Every cell was entered and left, and got its substance where there is an injector.
+  [[nodiscard]] bool task_done() const noexcept { return task_over_ && cells_injected_ == cells_done_; }
   [[nodiscard]] bool button(std::uint32_t b) const noexcept { return (hand_.buttons & b) != 0; }
   void anchor(const hal::Vec3& tip_m, const hal::Vec3& axis) noexcept;
   void render_membrane(double gain) noexcept;
@@ -173,9 +175,10 @@ class Servo {
   // State of the loop.
   bool stop_requested_ = false;
   bool end_requested_ = false;
-  bool task_done_ = false;
+  bool task_over_ = false;
   Fault write_fault_ = Fault::none;  // found while writing, latched on the next tick
   std::uint32_t cells_done_ = 0;
+  std::uint32_t cells_injected_ = 0;
   std::uint64_t commands_refused_ = 0;
   std::uint64_t faults_latched_ = 0;
   double force_scale_wanted_ = 1;  // command force_scale, 0 .. 1

@@ -94,7 +94,7 @@ struct CoreStatus {
   Word fault{};              // rt::Fault, the latched first cause
   Word faults_latched{};     // bit f: rt::Fault f was latched in this run
   Word phase{};              // rt::Phase
-  Word task_finished{};      // 1: `clear` of the last cell was reached
+  Word task_finished{};      // 1: `clear` of the last cell was reached, all injected
   Word exit_reason{};        // rt::ExitReason
   Word commands_refused{};   // out of range
 

@@ -331,6 +331,16 @@ TEST(Servo, takes_a_needle_through_a_whole_injection) {
   }
 }
 
+TEST(Servo, does_not_call_a_cell_done_that_got_nothing) {
+  Bench b(icsi());
+  b.to_inside();
+  b.move(60e-6, 40e-6);
+  b.run(1);
+  EXPECT_EQ(b.servo->phase(), Phase::clear);
+  EXPECT_EQ(b.servo->outcome(), Outcome::ended);
+  EXPECT_EQ(b.station->core.task_finished.load(), 0U);
+}
+
 TEST(Servo, renders_the_membrane_law_of_the_depth_it_reports_within_a_percent_at_rest) {
   ServoConfig config = icsi();
   config.local_model->dimple_scale_rate_1_s = 0.5;

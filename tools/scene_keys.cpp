@@ -387,6 +387,7 @@ std::vector<Table> make_tables() {
         auto& m = *s.servo.local_model;
         return std::vector<Key>{real("gain", m.gain, 0.01, 1),
                                 micro("max_rate_um_s", m.max_rate_m_s, 1, 1e5),
+                                micro("disagree_um", m.disagree_m, 1, 1000),
                                 real("stale_after_s", m.stale_after_s, 0.01, 5),
                                 real("fade_s", m.fade_s, 0.01, 2),
                                 real("return_s", m.return_s, 0.01, 5),

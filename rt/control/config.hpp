@@ -85,7 +85,8 @@ struct PhaseParams {
 
 // The membrane between two frames, and what happens when vision falls silent.
 struct LocalModelParams {
-  double gain = 0.3;             // of one observation
+  double disagree_m = 8e-6;  // stage and picture may move apart by this before the picture is not believed
+  double gain = 0.3;         // of one observation
   double max_rate_m_s = 100e-6;  // bounded correction of the membrane's position
   double stale_after_s = 0.30;   // age from which the rendered force fades
   double fade_s = 0.15;

@@ -11,11 +11,10 @@ constexpr double kFarthest_m = 5e-3;
 constexpr double kLargestCell_m = 2e-3;
 constexpr double kScaleMin = 0.1;
 constexpr double kScaleMax = 3;
-// Stage minus picture: more is no error of vision's; slower than the time constant it is drift; a way of the
-// needle that both see alike is a new agreement.
-constexpr double kDisagree_m = 8e-6;
+// Stage minus picture: slower than the time constant it is drift; a way of the needle this many times
+// disagree_m that both see alike is a new agreement.
 constexpr double kDrift_s = 10;
-constexpr double kAgain_m = 20e-6;
+constexpr double kAgain = 2.5;
 
 [[nodiscard]] bool plausible(const double (&p)[3]) noexcept {
   return std::abs(p[0]) < kFarthest_m && std::abs(p[1]) < kFarthest_m && std::abs(p[2]) < kFarthest_m;
@@ -129,7 +128,7 @@ bool LocalMembraneModel::agrees(const TipPose& pose, const hal::Vec3& seen_tip_m
     registration_m_ = off;
     return true;
   }
-  if ((off - registration_m_).norm() <= kDisagree_m) {
+  if ((off - registration_m_).norm() <= params_.disagree_m) {
     disagreed_ = false;
     registration_m_ += (1 - std::exp(-since_s / kDrift_s)) * (off - registration_m_);
     return true;
@@ -142,8 +141,9 @@ bool LocalMembraneModel::agrees(const TipPose& pose, const hal::Vec3& seen_tip_m
   }
   hal::Vec3 way = pose.tip_m - disagreed_at_m_;
   way.z() = 0;
-  if (way.norm() < kAgain_m) return false;
-  registered_ = (off - disagreed_off_m_).norm() > kDisagree_m;  // a new agreement counts from the next frame
+  if (way.norm() < kAgain * params_.disagree_m) return false;
+  registered_ =
+      (off - disagreed_off_m_).norm() > params_.disagree_m;  // a new agreement counts from the next frame
   disagreed_ = false;
   return false;
 }

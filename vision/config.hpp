@@ -44,6 +44,8 @@ struct VisionConfig {
   double nu = 0.5;
   double h_m = 4.6e-6;
   double c_m = 3.8e-6;
+
+  [[nodiscard]] double px(double m) const noexcept { return m / pixel_m; }
 };
 
 }  // namespace punctum::vision

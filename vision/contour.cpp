@@ -131,6 +131,10 @@ double signed_area(std::span<const Point> contour) {
   return 0.5 * sum;
 }
 
+double mean_radius(std::span<const Point> contour) {
+  return std::sqrt(std::abs(signed_area(contour)) / std::numbers::pi);
+}
+
 Point centroid(std::span<const Point> contour) {
   if (contour.empty()) {
     return {};
@@ -325,5 +329,19 @@ Contour from_polar(const Point& centre, std::span<const double> radii) {
   }
   return out;
 }
+
+double polar_angle(int i, int angles) { return 2 * std::numbers::pi * i / angles; }
+
+int polar_index(const Point& direction, int angles) {
+  const double turns = std::atan2(direction.y, direction.x) / (2 * std::numbers::pi);
+  return (static_cast<int>(std::lround(turns * angles)) + angles) % angles;
+}
+
+Point on_ray(const Point& centre, int i, int angles, double r) {
+  const double t = polar_angle(i, angles);
+  return centre + r * Point(std::cos(t), std::sin(t));
+}
+
+double angle_between(double a, double b) { return std::abs(std::remainder(a - b, 2 * std::numbers::pi)); }
 
 }  // namespace punctum::vision

@@ -24,7 +24,8 @@ struct Circle {
 
 [[nodiscard]] Contour circle_contour(const Circle& circle, int points);
 [[nodiscard]] double signed_area(std::span<const Point> contour);
-[[nodiscard]] Point centroid(std::span<const Point> contour);  // of the area
+[[nodiscard]] double mean_radius(std::span<const Point> contour);  // of the circle of the same area
+[[nodiscard]] Point centroid(std::span<const Point> contour);      // of the area
 [[nodiscard]] bool inside(std::span<const Point> contour, const Point& p);
 [[nodiscard]] double distance_to(std::span<const Point> contour,
                                  const Point& p);  // to the polygon's edges, >= 0
@@ -43,5 +44,10 @@ struct Circle {
 [[nodiscard]] std::vector<double> polar_radii(std::span<const Point> contour, const Point& centre,
                                               int angles);
 [[nodiscard]] Contour from_polar(const Point& centre, std::span<const double> radii);
+
+[[nodiscard]] double polar_angle(int i, int angles);  // rad, of the i-th of so many equally spaced ones
+[[nodiscard]] int polar_index(const Point& direction, int angles);  // of the nearest of them
+[[nodiscard]] Point on_ray(const Point& centre, int i, int angles, double r);
+[[nodiscard]] double angle_between(double a, double b);  // 0 .. pi
 
 }  // namespace punctum::vision

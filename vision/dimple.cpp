@@ -8,6 +8,13 @@
 
 namespace punctum::vision {
 
+namespace {
+
+constexpr double kReach = 0.995;          // of R: beyond it the depth is not to be told
+constexpr double kNeedleMargin_px = 2.5;  // beside the needle's edge the contour is guessed
+
+}  // namespace
+
 std::optional<Undeformed> fit_undeformed(const Contour& contour, std::span<const double> weights) {
   if (contour.size() < 16 || weights.size() != contour.size()) {
     return std::nullopt;
@@ -105,7 +112,7 @@ std::optional<double> half_width(const std::vector<ProfilePoint>& profile, doubl
   for (const double side : {-1.0, 1.0}) {
     constexpr int kBins = 40;
     std::array<std::vector<double>, kBins> bin;
-    const double reach = 0.995 * R;
+    const double reach = kReach * R;
     for (const ProfilePoint& p : profile) {
       const double u = side * p.u;
       if (u > 1.2 * c && u < reach) {
@@ -134,6 +141,16 @@ std::optional<double> half_width(const std::vector<ProfilePoint>& profile, doubl
     return std::nullopt;
   }
   return sum / sides;
+}
+
+std::optional<double> dimple_half_width(const Contour& contour, const Undeformed& undeformed,
+                                        const Point& entry, double wd, double c) {
+  const double R = undeformed.circle.r;
+  Point normal = undeformed.circle.centre - entry;
+  normal *= 1 / std::max(cv::norm(normal), 1e-9);
+  std::vector<ProfilePoint> seen = depth_profile(contour, undeformed.shape, entry, normal, kReach * R);
+  std::erase_if(seen, [c](const ProfilePoint& p) { return !(std::abs(p.u) > c + kNeedleMargin_px); });
+  return half_width(seen, wd, c, R);
 }
 
 }  // namespace punctum::vision

@@ -36,4 +36,9 @@ struct ProfilePoint {
 [[nodiscard]] std::optional<double> half_width(const std::vector<ProfilePoint>& profile, double wd, double c,
                                                double R);
 
+// The same from the contour: about the membrane's own normal at the entry, for a needle off the middle is not
+// the axis of its dimple.
+[[nodiscard]] std::optional<double> dimple_half_width(const Contour& contour, const Undeformed& undeformed,
+                                                      const Point& entry, double wd, double c);
+
 }  // namespace punctum::vision

@@ -7,6 +7,21 @@
 
 namespace punctum::vision {
 
+std::optional<TubeTrace> find_holder_tube(const GradientField& field, std::span<const Side> sides,
+                                          double height, double R_max, double noise) {
+  constexpr double kNarrowest_px = 20;
+  std::optional<TubeTrace> best;
+  const auto worth = [](const TubeTrace& t) { return t.likeness * t.clarity * std::min(t.length, 60.0); };
+  for (const Side side : sides) {
+    const auto t = trace_wide_tube(field, side, kNarrowest_px, std::min(0.7 * height, 2.2 * R_max), noise);
+    if (t && t->likeness > 0.5 && t->length > 10 && std::abs(t->axis.y) < 0.25 &&
+        (!best || worth(*t) > worth(*best))) {
+      best = t;
+    }
+  }
+  return best;
+}
+
 void HoldingPipette::use_template(const cv::Mat& pattern) {
   template_ = pattern.clone();
   mouth_in_template_ = Point((pattern.cols - 1) / 2.0, (pattern.rows - 1) / 2.0);

@@ -3,6 +3,7 @@
 
 #include <opencv2/core.hpp>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "vision/config.hpp"
@@ -18,6 +19,12 @@ struct HolderFix {
   cv::Rect2d box;       // where the template lies
   std::string why;      // when not ok
 };
+
+// Its tube, where it enters through one of these borders. height: of the picture, R_max: of a cell it can
+// hold; px. noise: grey levels.
+[[nodiscard]] std::optional<TubeTrace> find_holder_tube(const GradientField& field,
+                                                        std::span<const Side> sides, double height,
+                                                        double R_max, double noise);
 
 class HoldingPipette {
  public:

@@ -1,73 +1,12 @@
 // Frame -> what is seen: the paper's vision loop, one frame at a time. Not for the real-time core: allocates.
 #pragma once
 
-#include <array>
 #include <memory>
-#include <optional>
-#include <string>
 
 #include "hal/devices.hpp"
-#include "rt/station/observation.hpp"
-#include "rt/station/telemetry.hpp"
-#include "vision/config.hpp"
-#include "vision/contour.hpp"
-#include "vision/holding_pipette.hpp"
-#include "vision/injection_pipette.hpp"
-#include "vision/pipette_mask.hpp"
+#include "vision/result.hpp"
 
 namespace punctum::vision {
-
-// Microseconds spent on one frame, stage by stage.
-struct StageTimes {
-  double prepare = 0;  // noise, smoothing, Sobel
-  double holder = 0;
-  double needle = 0;
-  double erase = 0;  // polygons, impurities
-  double start = 0;  // Hough transform and first contours; 0 while following
-  double outer = 0;
-  double inner = 0;
-  double contact = 0;  // contact points, dilation, labelling, puncture
-  double measure = 0;  // w_d, a, R
-  double total = 0;
-};
-
-struct Membrane {
-  bool ok = false;
-  Contour nodes;           // of the greedy snake
-  Contour contour;         // >= 128 ordered points
-  double support = 0;      // share of the visible angles with an edge above the noise
-  double visible = 0;      // share of the angles not hidden by pipettes or the picture's border
-  double residual_px = 0;  // robust sd of single edges about the contour
-  int snake_iterations = 0;
-  std::string why;  // when not ok
-};
-
-struct Result {
-  std::uint64_t frame = 0;
-  std::int64_t exposure_ns = 0;
-  bool usable = false;  // the picture could be worked on at all
-  double noise = 0;     // grey levels
-
-  HolderFix holder;
-  NeedleFix needle;
-  Membrane outer, inner;
-  std::optional<Circle> undeformed;       // of the outer membrane
-  std::optional<double> inner_radius_px;  // mean of the inner one
-
-  bool merged = false;  // the paper's test: dilation and labelling
-  bool contact = false;
-  bool punctured = false;
-  ContactPoints points;
-  std::optional<Point> entry;                 // needle's axis on the undeformed outer membrane
-  std::optional<double> gap_px, wd_px, a_px;  // a is empty without a dimple; w_d is 0 then
-  double membrane_velocity_px_s = 0;          // of the contact points, into the cell > 0
-  double gap_noise_px = 0;
-  rt::Phase phase = rt::Phase::free;
-  int impurities = 0;
-
-  StageTimes us;
-  std::string verdict;  // "ok", or what is missing and why
-};
 
 class Tracker {
  public:
@@ -89,9 +28,5 @@ class Tracker {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
-
-// Metres in the microscope's frame, for a picture of that size.
-[[nodiscard]] rt::Observation to_observation(const Result& result, const VisionConfig& config, int width,
-                                             int height);
 
 }  // namespace punctum::vision

@@ -1,0 +1,97 @@
+#include "vision/cleared_picture.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+
+#include "vision/impurities.hpp"
+
+namespace punctum::vision {
+
+namespace {
+
+constexpr double kSmoothing_px = 1.2;   // sd of the Gaussian before the gradient
+constexpr int kImpurityLeast_px = 6;    // fewer pixels are noise
+constexpr double kImpurityKeep_px = 4;  // nearer to a membrane it belongs to the membrane
+constexpr double kFaceReach_px = 6.5;   // so near the face of the holding pipette an edge is blurred into it
+
+}  // namespace
+
+void ClearedPicture::take_gradient(const cv::Rect& area) {
+  field.compute(grey, area, kSmoothing_px);
+  gradient_noise = field.noise_of_gradient(noise);
+}
+
+void ClearedPicture::cover(const std::vector<Polygon>& pipettes) {
+  covered.create(grey.size(), CV_8U);
+  covered.setTo(0);
+  draw_mask(covered, pipettes);
+}
+
+int ClearedPicture::cover_impurities(const std::vector<Contour>& membranes, double threshold,
+                                     double max_side) {
+  cv::compare(field.sobel, threshold, strong, cv::CMP_GT);
+  int count = 0;
+  if (!membranes.empty()) {
+    cv::Mat open = strong.clone(), impurities;
+    open.setTo(0, covered(field.area));
+    std::vector<Contour> local = membranes;
+    for (Contour& c : local) {
+      for (Point& p : c) {
+        p -= Point(field.area.x, field.area.y);
+      }
+    }
+    count = static_cast<int>(
+        find_impurities(open, local, max_side, kImpurityLeast_px, kImpurityKeep_px, impurities).size());
+    cv::Mat grown;
+    cv::dilate(impurities, grown, cv::Mat::ones(3, 3, CV_8U));
+    covered(field.area).setTo(255, grown);
+    strong.setTo(0, grown);
+  }
+  edge = field.sobel.clone();
+  erase(edge, covered, field.area.tl());
+  return count;
+}
+
+bool ClearedPicture::hidden(const Point& p) const {
+  const int x = static_cast<int>(p.x + 0.5), y = static_cast<int>(p.y + 0.5);
+  return x < 0 || y < 0 || x >= covered.cols || y >= covered.rows || covered.at<std::uint8_t>(y, x) > 0;
+}
+
+std::function<double(const Point&)> ClearedPicture::visibility() const {
+  return [this](const Point& p) { return hidden(p) ? 0.0 : 1.0; };
+}
+
+void ClearedPicture::keep_off_holder(EdgeBand& band, const std::vector<double>& expected) const {
+  if (!holder_face) {
+    return;
+  }
+  const auto& [mouth, axis, half_width] = *holder_face;
+  const double face = (mouth - band.centre).dot(axis);  // < 0: behind the centre, seen along the tube
+  if (face >= -2) {
+    return;
+  }
+  const int n = static_cast<int>(band.middle.size());
+  band.hidden.resize(band.middle.size(), 0);
+  if (band.upper.empty()) {
+    band.upper.assign(band.middle.size(), 1e9);
+  }
+  for (int i = 0; i < n; ++i) {
+    const Point d = on_ray(Point(0, 0), i, n, 1);
+    if (d.dot(axis) > -0.2) {  // away from the face, or along it
+      continue;
+    }
+    const double r = face / d.dot(axis);
+    if (std::abs(axis.cross(band.centre + r * d - mouth)) > half_width + 2) {
+      continue;
+    }
+    const std::size_t k = static_cast<std::size_t>(i);
+    band.upper[k] = std::min(band.upper[k], r);
+    if (expected[k] > r - kFaceReach_px) {
+      band.hidden[k] = 1;
+    }
+  }
+}
+
+}  // namespace punctum::vision

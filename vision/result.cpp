@@ -1,0 +1,66 @@
+#include "vision/result.hpp"
+
+#include <algorithm>
+
+namespace punctum::vision {
+
+std::string verdict_on(const Result& result, const VisionConfig& config) {
+  std::string v;
+  const auto say = [&v](const char* what, bool wanted, const auto& found) {
+    if (wanted && !found.ok) {
+      v += (v.empty() ? "" : "; ") + (what + (": " + (found.why.empty() ? "not found" : found.why)));
+    }
+  };
+  say("holder", config.holder.has_value(), result.holder);
+  say("needle", config.needle, result.needle);
+  say("outer", true, result.outer);
+  say("inner", config.inner, result.inner);
+  return v.empty() ? "ok" : v;
+}
+
+rt::Observation to_observation(const Result& r, const VisionConfig& config, int width, int height) {
+  rt::Observation o;
+  const double k = config.pixel_m;
+  const auto place = [&](const Point& p, double(&out)[3]) {
+    out[0] = (p.x - (width - 1) / 2.0) * k;
+    out[1] = (p.y - (height - 1) / 2.0) * k;
+    out[2] = 0;
+  };
+  o.frame = r.frame;
+  o.exposure_ns = r.exposure_ns;
+  o.flags = (r.holder.ok ? rt::Observation::holder_ok : 0U) | (r.needle.ok ? rt::Observation::tip_ok : 0U) |
+            (r.outer.ok ? rt::Observation::outer_ok : 0U) | (r.inner.ok ? rt::Observation::inner_ok : 0U) |
+            (r.contact ? rt::Observation::contact : 0U) | (r.punctured ? rt::Observation::punctured : 0U);
+  if (r.needle.ok) {
+    place(r.needle.tip, o.tip_m);
+    o.axis[0] = r.needle.axis.x;
+    o.axis[1] = r.needle.axis.y;
+    o.axis[2] = 0;
+  }
+  if (r.holder.ok) {
+    place(r.holder.mouth, o.holder_m);
+  }
+  o.holder_score = r.holder.score;
+  if (r.undeformed) {
+    place(r.undeformed->centre, o.centre_m);
+    o.R_m = r.undeformed->r * k;
+  }
+  o.R_inner_m = r.inner_radius_px.value_or(0) * k;
+  if (r.entry) {
+    place(*r.entry, o.entry_m);
+  }
+  o.gap_m = r.gap_px.value_or(0) * k;
+  o.wd_m = r.wd_px.value_or(0) * k;
+  o.a_m = r.a_px.value_or(0) * k;
+  o.membrane_velocity_m_s = r.membrane_velocity_px_s * k;
+  for (std::size_t i = 0; i < 2; ++i) {
+    if (r.points.point[i]) {
+      place(*r.points.point[i], o.contact_point_m[i]);
+    }
+  }
+  o.noise_m = r.gap_noise_px * k;
+  o.total_us = static_cast<std::uint64_t>(std::max(0.0, r.us.total));
+  return o;
+}
+
+}  // namespace punctum::vision

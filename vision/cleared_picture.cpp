@@ -2,21 +2,48 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <opencv2/imgproc.hpp>
 
 #include "vision/impurities.hpp"
+#include "vision/noise.hpp"
 
 namespace punctum::vision {
 
 namespace {
 
+constexpr int kSmallest_px = 32;        // side of a picture in which anything can be found
+constexpr double kLeastContrast = 0.5;  // sd of the grey levels
+constexpr double kLeastNoise = 0.3;     // grey levels
 constexpr double kSmoothing_px = 1.2;   // sd of the Gaussian before the gradient
 constexpr int kImpurityLeast_px = 6;    // fewer pixels are noise
 constexpr double kImpurityKeep_px = 4;  // nearer to a membrane it belongs to the membrane
 constexpr double kFaceReach_px = 6.5;   // so near the face of the holding pipette an edge is blurred into it
 
 }  // namespace
+
+std::string ClearedPicture::take(const hal::Frame& frame, int width, int height) {
+  const auto size = [](int w, int h) { return std::to_string(w) + "x" + std::to_string(h); };
+  if (frame.pixels == nullptr || frame.width <= 0 || frame.height <= 0 || frame.stride < frame.width) {
+    return "no picture";
+  }
+  if (frame.width != width || frame.height != height) {
+    return "size " + size(frame.width, frame.height) + " instead of " + size(width, height);
+  }
+  if (width < kSmallest_px || height < kSmallest_px) {
+    return "picture too small: at least " + size(kSmallest_px, kSmallest_px) + " is needed";
+  }
+  // A copy: the camera may take its buffer back, and OpenCV wants none of our constness.
+  cv::Mat(height, width, CV_8U, const_cast<std::uint8_t*>(frame.pixels),
+          static_cast<std::size_t>(frame.stride))
+      .copyTo(grey);
+  cv::Scalar mean, sd;
+  cv::meanStdDev(grey, mean, sd);
+  if (sd[0] < kLeastContrast) {
+    return "no contrast: every pixel is about " + std::to_string(std::lround(mean[0]));
+  }
+  noise = std::max(noise_level(grey), kLeastNoise);
+  return {};
+}
 
 void ClearedPicture::take_gradient(const cv::Rect& area) {
   field.compute(grey, area, kSmoothing_px);

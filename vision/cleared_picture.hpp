@@ -4,8 +4,10 @@
 #include <functional>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <string>
 #include <vector>
 
+#include "hal/devices.hpp"
 #include "vision/gradient.hpp"
 #include "vision/membrane_edge.hpp"
 #include "vision/pipette_mask.hpp"
@@ -30,6 +32,8 @@ struct ClearedPicture {
   cv::Mat strong;   // CV_8U, field.area: 255 = strong gradient, pipettes included, impurities taken out
   cv::Mat edge;     // CV_32F, field.area: Sobel magnitude, 0 where covered
 
+  // A copy of the frame, which must have this size. Says why it cannot be worked on, or nothing.
+  [[nodiscard]] std::string take(const hal::Frame& frame, int width, int height);
   void take_gradient(const cv::Rect& area);  // of grey, whose noise is known
 
   // What was covered before is not any more.

@@ -1,44 +1,25 @@
 #include "vision/tracker.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <vector>
 
 #include "vision/contact.hpp"
 #include "vision/median.hpp"
 #include "vision/membrane_start.hpp"
-#include "vision/noise.hpp"
 #include "vision/phase.hpp"
 #include "vision/puncture.hpp"
+#include "vision/stopwatch.hpp"
 
 namespace punctum::vision {
 
 namespace {
 
-constexpr int kSmallest_px = 32;          // side of a picture in which anything can be found
-constexpr double kLeastContrast = 0.5;    // sd of the grey levels
-constexpr double kLeastNoise = 0.3;       // grey levels
 constexpr int kHolderEvery = 8;           // frames between two looks for a tube that was not found
 constexpr double kNeedleMargin_px = 2.5;  // what blur spreads beyond the needle's edges
 constexpr double kUntouched_px = 12;      // so far outside nothing touches the tip
-constexpr double kFar_px = 99;            // a gap that is not known: nothing is near
 constexpr double kLeastDimple_px = 0.7;   // of a depth whose width can be told
 constexpr double kNear_px = 8;            // nearer than this the needle is touching, or about to
-
-class Stopwatch {
- public:
-  double lap_us() {
-    const auto now = Clock::now();
-    const double us = std::chrono::duration<double, std::micro>(now - last_).count();
-    last_ = now;
-    return us;
-  }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  Clock::time_point last_ = Clock::now();
-};
 
 Side opposite(Side side) { return side == Side::right ? Side::left : Side::right; }
 
@@ -83,7 +64,6 @@ struct Tracker::Impl {
 
   const Result& process(const hal::Frame& frame);
 
-  [[nodiscard]] std::string take(const hal::Frame& frame);
   [[nodiscard]] bool must_start() const;
   [[nodiscard]] cv::Rect area_to_search(bool starting) const;
   void locate_needle();
@@ -117,11 +97,12 @@ const Result& Tracker::Impl::process(const hal::Frame& frame) {
   result.phase = last_phase;
   result.frame = frame.sequence;
   result.exposure_ns = frame.exposure_ns;
-  if (result.verdict = take(frame); !result.verdict.empty()) {
+  if (result.verdict = picture.take(frame, width, height); !result.verdict.empty()) {
     result.us.total = total.lap_us();
     return result;
   }
   result.usable = true;
+  result.noise = picture.noise;
   const bool starting = must_start();
   picture.take_gradient(area_to_search(starting));
   result.us.prepare = watch.lap_us();
@@ -143,7 +124,8 @@ const Result& Tracker::Impl::process(const hal::Frame& frame) {
     result.us.measure = watch.lap_us();
     classify_contact();
     result.us.contact = watch.lap_us();
-    if (result.needle.ok && !result.contact && result.gap_px.value_or(kFar_px) > kUntouched_px) {
+    const bool away = !result.gap_px || *result.gap_px > kUntouched_px;
+    if (result.needle.ok && !result.contact && away) {
       needle.learn(picture.field, result.needle, picture.noise);
     }
   } else {
@@ -153,32 +135,6 @@ const Result& Tracker::Impl::process(const hal::Frame& frame) {
   result.verdict = verdict_on(result, config);
   result.us.total = total.lap_us();
   return result;
-}
-
-// Why it cannot be worked on, or nothing.
-std::string Tracker::Impl::take(const hal::Frame& frame) {
-  const auto size = [](int w, int h) { return std::to_string(w) + "x" + std::to_string(h); };
-  if (frame.pixels == nullptr || frame.width <= 0 || frame.height <= 0 || frame.stride < frame.width) {
-    return "no picture";
-  }
-  if (frame.width != width || frame.height != height) {
-    return "size " + size(frame.width, frame.height) + " instead of " + size(width, height);
-  }
-  if (width < kSmallest_px || height < kSmallest_px) {
-    return "picture too small: at least " + size(kSmallest_px, kSmallest_px) + " is needed";
-  }
-  // A copy: the camera may take its buffer back, and OpenCV wants none of our constness.
-  cv::Mat(height, width, CV_8U, const_cast<std::uint8_t*>(frame.pixels),
-          static_cast<std::size_t>(frame.stride))
-      .copyTo(picture.grey);
-  cv::Scalar mean, sd;
-  cv::meanStdDev(picture.grey, mean, sd);
-  if (sd[0] < kLeastContrast) {
-    return "no contrast: every pixel is about " + std::to_string(std::lround(mean[0]));
-  }
-  picture.noise = std::max(noise_level(picture.grey), kLeastNoise);
-  result.noise = picture.noise;
-  return {};
 }
 
 bool Tracker::Impl::must_start() const { return outer.known ? outer.lost() : !inner.known || inner.lost(); }

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cstdlib>
 #include <exception>
 #include <string>
 #include <vector>
@@ -25,8 +26,7 @@ int main_or_throw(int argc, char** argv) {
   app.failure_message(CLI::FailureMessage::simple);
   std::string scene_name;
   std::vector<std::string> overrides;
-  double seconds = -1, rate = 0;
-  std::string clock, seed;
+  std::string clock, seed, rate, seconds;
   RunSettings settings;
   bool no_frames = false, no_figure = false, keys = false;
 
@@ -41,13 +41,14 @@ int main_or_throw(int argc, char** argv) {
     sub->add_option("--clock", clock, "real, or virtual: as fast as possible, the same every time")
         ->check(CLI::IsMember({"real", "virtual"}));
     sub->add_option("--seed", seed, "of the simulated world");
-    sub->add_option("--seconds", seconds, "time limit")->check(CLI::Range(1e-3, 1e6));
+    sub->add_option("--seconds", seconds, "time limit");
   };
   CLI::App* run = app.add_subcommand("run", "run a scene and write a report");
   common(run);
   run->add_option("--report", settings.report, "folder of the report (default: reports/SCENE-DATE)");
   run->add_option("--samples-every", settings.samples_every,
-                  "write every n-th tick to samples.csv (0: choose)");
+                  "write every n-th tick to samples.csv (0: choose)")
+      ->check(CLI::Range(0, 1'000'000'000));
   run->add_flag("--no-frames", no_frames, "write no annotated frames");
   run->add_flag("--no-figure", no_figure, "draw no figure");
   run->add_flag("--quiet", settings.quiet, "no progress, only the summary");
@@ -67,10 +68,19 @@ int main_or_throw(int argc, char** argv) {
   }
 
   // Options are overrides too, so that their messages are the same.
-  if (rate != 0) overrides.push_back(fmt::format("servo.rate_hz={}", rate));
-  if (!clock.empty()) overrides.push_back("scene.clock=\"" + clock + "\"");
-  if (!seed.empty()) overrides.push_back("scene.seed=" + seed);
-  if (seconds >= 0) overrides.push_back(fmt::format("scene.seconds={}", seconds));
+  // (scene.seconds = 0 is no limit; whoever types --seconds wants one.)
+  const auto given = [&app](const char* option) { return app.get_subcommands().front()->count(option) > 0; };
+  if (given("--seconds")) {
+    char* rest = nullptr;
+    const double s = std::strtod(seconds.c_str(), &rest);
+    if (seconds.empty() || *rest != '\0' || !(s >= 1e-3 && s <= 1e6))
+      return bad(
+          fmt::format("--seconds: {}: not a time limit, allowed: a number from 0.001 to 1000000", seconds));
+    overrides.push_back(fmt::format("scene.seconds={}", s));
+  }
+  if (given("--rate")) overrides.push_back("servo.rate_hz=" + rate);
+  if (given("--clock")) overrides.push_back("scene.clock=\"" + clock + "\"");
+  if (given("--seed")) overrides.push_back("scene.seed=" + seed);
   const auto scene = load_scene(scene_name, overrides);
   if (!scene) return bad(scene.error());
 

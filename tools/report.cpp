@@ -57,6 +57,16 @@ std::vector<std::string> split(const std::string& line) {
   return cells;
 }
 
+// gnuplot's own quoting: a quote is doubled.
+std::string in_single_quotes(const std::string& s) {
+  std::string out;
+  for (const char c : s) {
+    if (c == '\'') out += c;
+    out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+  }
+  return out;
+}
+
 }  // namespace
 
 const char* name(Outcome o) noexcept {
@@ -155,9 +165,14 @@ tl::expected<void, std::string> write_report(const std::string& path, const Scen
   j["slots_us"] = Json::object();
   for (std::uint64_t i = 0; i < std::min<std::uint64_t>(core.slot_count.load(), rt::kMaxSlots); ++i)
     j["slots_us"][core.slots[i].name.text] = times(core.slots[i].execution);
-  j["page_faults"] = {{"minor", core.minor_faults.load()}, {"major", core.major_faults.load()}};
-  j["switches"] = {{"voluntary", core.voluntary_switches.load()},
-                   {"involuntary", core.involuntary_switches.load()}};
+  // Counted by the core when it ends: unknown of one that was killed.
+  const auto counted = [&end](std::uint64_t n) {
+    return end.outcome == Outcome::core_died ? Json(nullptr) : Json(n);
+  };
+  j["page_faults"] = {{"minor", counted(core.minor_faults.load())},
+                      {"major", counted(core.major_faults.load())}};
+  j["switches"] = {{"voluntary", counted(core.voluntary_switches.load())},
+                   {"involuntary", counted(core.involuntary_switches.load())}};
   j["allocations"] = core.allocations_watched.load() != 0 ? Json(core.allocations.load()) : Json(nullptr);
   j["degraded"] = core.degraded.load() != 0;
   j["rights"] = Json::array();
@@ -296,10 +311,12 @@ std::string summary(const Scene& scene, const RunEnd& end, const Measures& m, co
     line("timing",
          fmt::format(
              "wake-up p50 {:.0f} p99.9 {:.0f} max {:.0f} us; tick p50 {:.0f} p99.9 {:.0f} max {:.0f} us; "
-             "page faults {} + {}",
+             "page faults {}",
              core.wake.percentile_us(0.5), core.wake.percentile_us(0.999), core.wake.max_us(),
              core.tick.percentile_us(0.5), core.tick.percentile_us(0.999), core.tick.max_us(),
-             core.minor_faults.load(), core.major_faults.load()));
+             end.outcome == Outcome::core_died
+                 ? "not known"
+                 : fmt::format("{} + {}", core.minor_faults.load(), core.major_faults.load())));
   std::string alarms;
   for (std::size_t i = 0; i < std::size(kAlarms); ++i)
     if (part_of_limit(m, m.alarm_ticks[i]) >= 0.005 && (1U << i) != rt::alarm_degraded)
@@ -358,7 +375,8 @@ tl::expected<std::string, std::string> draw_figure(const std::string& folder, co
       << "set datafile separator ','\nset datafile columnheaders\n"
       << "set terminal pngcairo size 1300,1000 font 'sans,10' background rgb 'white'\n"
       << "set output 'figure.png'\n"
-      << "set multiplot layout 3,1 title '" << scene.name << ": force, depth and phases' font ',13'\n"
+      << "set multiplot layout 3,1 title '" << in_single_quotes(scene.name)
+      << ": force, depth and phases' noenhanced font ',13'\n"
       << "set grid lc rgb '#bbbbbb'\nset key outside right center width -2 samplen 2\nset lmargin 10\nset "
          "rmargin 26\n"
       << fmt::format("set xrange [0:{:.6f}]\n", t_end) << bands << labels;

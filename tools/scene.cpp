@@ -577,8 +577,11 @@ tl::expected<Scene, std::string> load_scene(std::string_view name_or_path,
 }
 
 std::string to_toml(const Scene& scene) {
-  Scene s = scene;  // the key tables point into a scene that could be written to
-  std::string out = fmt::format("# {}: the scene as it ran, every number resolved\n", printable(s.name));
+  Scene s = scene;                        // the key tables point into a scene that could be written to
+  std::string title = printable(s.name);  // of a file name, which need not be text
+  for (char& c : title)
+    if (static_cast<unsigned char>(c) >= 0x80) c = '?';
+  std::string out = fmt::format("# {}{}\n", title, kResolvedScene);
   for (const auto& t : scene_tables()) {
     if (!t.there(s)) continue;
     out += fmt::format("\n[{}]\n", t.name);

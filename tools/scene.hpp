@@ -57,6 +57,9 @@ struct Scene {
                                                            const std::vector<std::string>& overrides = {},
                                                            std::string_view folder = {});
 
+// Ends the first line of what to_toml() writes.
+inline constexpr std::string_view kResolvedScene = ": the scene as it ran, every number resolved";
+
 // The resolved scene, every key of every table that is there. Numbers that were read from a file read back to
 // the same bits; others to the last digit.
 [[nodiscard]] std::string to_toml(const Scene& scene);

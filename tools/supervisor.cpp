@@ -40,6 +40,12 @@ constexpr double kPatience_s = 5;  // for a child to end when asked
 std::atomic<int> interrupts{0};
 extern "C" void on_interrupt(int) { interrupts.fetch_add(1, std::memory_order_relaxed); }
 
+// What cannot be told (a closed pipe, a terminal that is gone) ends no run.
+void put(std::FILE* to, const std::string& text) {
+  (void)std::fwrite(text.data(), 1, text.size(), to);
+  (void)std::fflush(to);
+}
+
 void nap(double s) {
   timespec t{};
   t.tv_sec = static_cast<time_t>(s);
@@ -53,6 +59,17 @@ std::string station_name(const Scene& scene) {
   for (const char c : scene.name)
     if (s.size() < 40) s += std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' ? c : '_';
   return fmt::format("{}-{}", s.empty() ? "scene" : s, getpid());
+}
+
+constexpr const char* kReportFiles[] = {"samples.csv", "obs.csv",    "contours.csv", "report.json",
+                                        "scene.toml",  "figure.png", "figure.svg",   "figure.gp",
+                                        "core.log",    "vision.log", "gnuplot.log",  "frames"};
+
+// A run that has written anything has written its resolved scene first.
+bool is_report(const fs::path& folder) {
+  std::ifstream in(folder / "scene.toml");
+  std::string line;
+  return std::getline(in, line) && line.starts_with("# ") && line.ends_with(kResolvedScene);
 }
 
 tl::expected<std::string, std::string> prepare_folder(const Scene& scene, const std::string& wanted) {
@@ -70,11 +87,32 @@ tl::expected<std::string, std::string> prepare_folder(const Scene& scene, const 
                                       ec ? ec.message() : "it is not a folder"));
   if (access(folder.c_str(), W_OK | X_OK) != 0)
     return tl::unexpected(fmt::format("{}: cannot be written to: {}", folder.string(), std::strerror(errno)));
-  // What an earlier run left, and nothing else.
-  for (const char* file : {"samples.csv", "obs.csv", "contours.csv", "report.json", "scene.toml",
-                           "figure.png", "figure.svg", "figure.gp", "core.log", "vision.log", "gnuplot.log"})
-    fs::remove(folder / file, ec);
-  fs::remove_all(folder / "frames", ec);
+  // What an earlier run left, and nothing else: never a picture or a scene that is somebody's own.
+  const fs::path frames = folder / "frames";
+  if (!is_report(folder))
+    for (const char* file : kReportFiles)
+      if (fs::exists(folder / file, ec))
+        return tl::unexpected(fmt::format(
+            "{}: is there, but no run has written it; allowed: a folder of its own for the report",
+            (folder / file).string()));
+  if (scene.recorded) {
+    fs::path source = fs::weakly_canonical(scene.recorded->frames, ec);
+    for (const fs::path own = fs::weakly_canonical(frames, ec); source.has_relative_path();
+         source = source.parent_path())
+      if (source == own)
+        return tl::unexpected(fmt::format(
+            "{}: the recorded frames come from there; allowed: another --report", frames.string()));
+  }
+  for (const char* file : kReportFiles)
+    if (file != std::string_view("frames")) fs::remove(folder / file, ec);
+  std::vector<fs::path> drawn;
+  for (auto it = fs::directory_iterator(frames, ec); !ec && it != fs::directory_iterator(); it.increment(ec))
+    if (const std::string stem = it->path().stem().string();
+        it->path().extension() == ".png" && stem.size() >= 6 &&
+        std::all_of(stem.begin(), stem.end(), [](char c) { return c >= '0' && c <= '9'; }))
+      drawn.push_back(it->path());
+  for (const auto& picture : drawn) fs::remove(picture, ec);
+  fs::remove(frames, ec);  // if nothing else is in it
   return fs::absolute(folder).string();
 }
 
@@ -88,15 +126,14 @@ class Run {
   template <class... Args>
   void say(fmt::format_string<Args...> text, Args&&... args) {
     clear_line();
-    fmt::print("{}\n", fmt::format(text, std::forward<Args>(args)...));
-    std::fflush(stdout);
+    put(stdout, fmt::format(text, std::forward<Args>(args)...) + "\n");
   }
   void complain(const std::string& text) {
     clear_line();
-    fmt::print(stderr, "punctum: {}\n", text);
+    put(stderr, fmt::format("punctum: {}\n", text));
   }
   void clear_line() {
-    if (line_drawn_) fmt::print("\r\033[K");
+    if (line_drawn_) put(stdout, "\r\033[K");
     line_drawn_ = false;
   }
   [[nodiscard]] bool long_run() const { return scene_.seconds > kLongRun_s || scene_.seconds <= 0; }
@@ -235,9 +272,8 @@ void Run::progress() {
   if (s.fault != rt::Fault::none) line += fmt::format("  FAULT {}", rt::name(s.fault));
   if ((s.alarms & rt::alarm_vision_stale) != 0) line += "  vision stale";
   if (tty_) {
-    fmt::print("\r\033[K{}", line);
+    put(stdout, "\r\033[K" + line);
     line_drawn_ = true;
-    std::fflush(stdout);
   } else {
     say("{}", line);
   }
@@ -245,6 +281,10 @@ void Run::progress() {
 
 void Run::core_died() {
   if (!bench_ || !scene_.sim) return;
+  if ((*bench_)->snapshots.head() == 0) {
+    say("it had not begun: no device was switched on");
+    return;
+  }
   end_.unattended = sim::run_unattended(*scene_.sim, **bench_);
   const auto& u = *end_.unattended;
   const auto when = [](double s) {
@@ -422,8 +462,11 @@ int Run::run() {
   end_.samples_lost = recorder_->lost();
   const auto contour = read_contour_error(folder_ + "/obs.csv");
   const Measures& m = recorder_->measures();
-  if (auto r = write_report(folder_ + "/report.json", scene_, end_, m, status, contour); !r)
+  bool written = true;
+  if (auto r = write_report(folder_ + "/report.json", scene_, end_, m, status, contour); !r) {
+    written = false;
     complain(r.error());
+  }
   if (recorder_->write_failed())
     complain(fmt::format("{}/samples.csv: not complete, is the disk full?", folder_));
   std::string drawn;
@@ -434,14 +477,14 @@ int Run::run() {
       drawn = *r;
     }
   }
-  fmt::print("\n{}", summary(scene_, end_, m, status, contour));
-  if (!drawn.empty()) fmt::print("figure          {}\n", drawn);
-  fmt::print("report          {}\n", folder_ + "/report.json");
-  std::fflush(stdout);
+  std::string last_words = "\n" + summary(scene_, end_, m, status, contour);
+  if (!drawn.empty()) last_words += fmt::format("figure          {}\n", drawn);
+  if (written) last_words += fmt::format("report          {}\n", folder_ + "/report.json");
+  put(stdout, last_words);
   if (vision_refused_) return 2;
   switch (end_.outcome) {
     case Outcome::done:
-      return 0;
+      return written && !recorder_->write_failed() ? 0 : 1;
     case Outcome::cell_lost:
     case Outcome::not_injected:
     case Outcome::time_limit:

@@ -103,6 +103,47 @@ TEST_F(Programs, ASecondRunIntoTheSameFolderReplacesTheFirst) {
   EXPECT_EQ(read_all(fs::path(report()) / "notes.txt"), "mine");
 }
 
+TEST_F(Programs, AFolderWithSomebodysOwnFilesIsNoReportFolder) {
+  fs::create_directories(fs::path(report()) / "frames");
+  std::ofstream(fs::path(report()) / "frames" / "000012.png") << "a picture of theirs";
+  EXPECT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "0.1"}), 2);
+  EXPECT_NE(said_.find("no run has written it"), std::string::npos) << said_;
+  EXPECT_TRUE(fs::exists(fs::path(report()) / "frames" / "000012.png"));
+}
+
+TEST_F(Programs, FramesThatAreToBePlayedAreNotClearedAway) {
+  ASSERT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "0.1"}), 0) << said_;
+  const fs::path frames = fs::path(report()) / "frames";
+  fs::create_directories(frames);
+  std::ofstream(frames / "000000.png") << "a picture";
+  EXPECT_EQ(punctum({"run", "recorded", "--seconds", "0.1", "--set", "camera.frames=" + frames.string()}), 2);
+  EXPECT_NE(said_.find("the recorded frames come from there"), std::string::npos) << said_;
+  EXPECT_TRUE(fs::exists(frames / "000000.png"));
+}
+
+TEST_F(Programs, OutputThatNobodyTakesEndsNoRun) {
+  // Unbuffered, so that the very first word meets the full device.
+  const std::string run = std::string("stdbuf -o0 ") + PUNCTUM_BIN_DIR +
+                          "/punctum run free --clock virtual --seconds 1 --no-figure --report " + report() +
+                          " >/dev/full 2>&1";
+  EXPECT_EQ(WEXITSTATUS(std::system(run.c_str())), 0);
+  EXPECT_EQ(json()["outcome"], "done");
+}
+
+TEST_F(Programs, ASceneMayHaveAnyFileName) {
+  for (const char* name : {"it's_mine.toml", "a b.toml", "caf\xe9.toml"}) {
+    const fs::path file = folder_ / name;
+    ASSERT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "0.1"}, "plain"), 0);
+    fs::copy_file(fs::path(report("plain")) / "scene.toml", file);
+    Running run({"run", file.string(), "--clock", "virtual", "--seconds", "0.5", "--report", report("r")},
+                words());
+    EXPECT_EQ(run.wait(), 0) << run.output();
+    if (run.output().find("gnuplot is not installed") == std::string::npos) {
+      EXPECT_TRUE(fs::exists(fs::path(report("r")) / "figure.png")) << run.output();
+    }
+  }
+}
+
 TEST_F(Programs, InRealTimeTheCoreKeepsItsGridWithoutFaultsOrAllocations) {
   ASSERT_EQ(punctum({"run", "free", "--seconds", "2"}), 0) << said_;
   const auto r = json();
@@ -142,6 +183,7 @@ TEST_F(Programs, WhenTheCoreIsKilledTheDevicesGoToTheirSafeStateAndTheParentSays
   EXPECT_EQ(r["outcome"], "core died");
   EXPECT_TRUE(r["unattended"]["safe"]);
   EXPECT_LT(r["unattended"]["relay_opened_s"], 0.1);
+  EXPECT_TRUE(r["page_faults"]["minor"].is_null());  // nobody counted them: not zero
   EXPECT_NE(run.output().find("the control core was killed by signal 9"), std::string::npos) << run.output();
 }
 
@@ -233,6 +275,11 @@ TEST_F(Programs, BadInputIsRefusedInOneLineAndNothingStarts) {
       {{"run", "free", "--set", "nonsense"}, "--set: nonsense: not an override"},
       {{"run", "free", "--seed", "abc"}, "--set: scene.seed: \"abc\" is not a whole number"},
       {{"run", "free", "--seconds", "-3"}, "--seconds: "},
+      {{"run", "free", "--seconds", "nan"}, "--seconds: nan: not a time limit"},
+      {{"run", "free", "--seconds", "0"}, "--seconds: 0: not a time limit"},
+      {{"run", "free", "--rate", "0"}, "--set: servo.rate_hz: 0 is not one of the choices"},
+      {{"run", "free", "--seed", ""}, "--set: scene.seed: "},
+      {{"run", "free", "--samples-every", "-3"}, "--samples-every: "},
       {{"run", "free", "--clock", "sundial"}, "--clock: "},
       {{"run"}, "SCENE is required"},
       {{"dance"}, ""},

@@ -43,6 +43,7 @@ struct ClearedPicture {
   // membrane.
   int cover_impurities(const std::vector<Contour>& membranes, double threshold, double max_side);
 
+  [[nodiscard]] double edge_floor() const noexcept { return 3 * gradient_noise; }  // less is no edge
   [[nodiscard]] bool hidden(const Point& p) const;                       // covered, or outside the picture
   [[nodiscard]] std::function<double(const Point&)> visibility() const;  // for EdgeBand; refers to this
 

@@ -105,7 +105,7 @@ MembraneOnNeedle membrane_on_needle(const ClearedPicture& picture, const NeedleF
   if (!crossing[0] && !crossing[1]) {
     return out;
   }
-  const double floor = std::max(3 * picture.gradient_noise, 0.3 * level);
+  const double floor = std::max(picture.edge_floor(), 0.3 * level);
   out.points =
       contact_points(picture.field, needle, polarity, floor, kBesideEdge_px, 0, crossing, kContourReach_px);
   double sum = 0;

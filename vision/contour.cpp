@@ -151,17 +151,6 @@ Point centroid(std::span<const Point> contour) {
   return std::abs(area) > 1e-9 ? o + sum / (3 * area) : o;
 }
 
-bool inside(std::span<const Point> contour, const Point& p) {
-  bool in = false;
-  for (std::size_t i = 0, j = contour.size() - 1; i < contour.size(); j = i++) {
-    const Point &a = contour[i], &b = contour[j];
-    if ((a.y > p.y) != (b.y > p.y) && p.x < (b.x - a.x) * (p.y - a.y) / (b.y - a.y) + a.x) {
-      in = !in;
-    }
-  }
-  return in;
-}
-
 double distance_to(std::span<const Point> contour, const Point& p) {
   double best = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < contour.size(); ++i) {
@@ -262,16 +251,6 @@ std::optional<Circle> fit_circle(std::span<const Point> points, std::span<const 
     }
   }
   return c;
-}
-
-std::optional<Point> ray_into_circle(const Point& from, const Point& direction, const Circle& circle) {
-  const Point d = circle.centre - from;
-  const double along = d.dot(direction);
-  const double across2 = d.dot(d) - along * along;
-  if (across2 > circle.r * circle.r) {
-    return std::nullopt;
-  }
-  return from + (along - std::sqrt(circle.r * circle.r - across2)) * direction;
 }
 
 std::vector<double> polar_radii(std::span<const Point> contour, const Point& centre, int angles) {

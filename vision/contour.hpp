@@ -26,7 +26,6 @@ struct Circle {
 [[nodiscard]] double signed_area(std::span<const Point> contour);
 [[nodiscard]] double mean_radius(std::span<const Point> contour);  // of the circle of the same area
 [[nodiscard]] Point centroid(std::span<const Point> contour);      // of the area
-[[nodiscard]] bool inside(std::span<const Point> contour, const Point& p);
 [[nodiscard]] double distance_to(std::span<const Point> contour,
                                  const Point& p);  // to the polygon's edges, >= 0
 
@@ -34,10 +33,6 @@ struct Circle {
 // 1).
 [[nodiscard]] std::optional<Circle> fit_circle(std::span<const Point> points,
                                                std::span<const double> weights = {});
-
-// First crossing of the ray from `from` along `direction` (unit) with the circle; the nearer one in front.
-[[nodiscard]] std::optional<Point> ray_into_circle(const Point& from, const Point& direction,
-                                                   const Circle& circle);
 
 // Radius at `angles` equally spaced polar angles (from 0) seen from centre; empty if not star-shaped enough
 // to tell.

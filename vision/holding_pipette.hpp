@@ -37,7 +37,6 @@ class HoldingPipette {
 
   // Moving window; the whole picture when the place is not known yet.
   [[nodiscard]] HolderFix find(const cv::Mat& grey);
-  void forget() noexcept { last_.reset(); }  // look everywhere next time
 
  private:
   HolderVision config_;

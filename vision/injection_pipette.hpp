@@ -39,7 +39,6 @@ class InjectionPipette {
 
   [[nodiscard]] bool started() const noexcept { return started_; }
   [[nodiscard]] Side side() const noexcept { return found_side_; }
-  [[nodiscard]] const std::string& why() const noexcept { return why_; }
 
  private:
   bool cut(const GradientField& field, const Point& tip);

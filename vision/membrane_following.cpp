@@ -11,7 +11,6 @@ namespace punctum::vision {
 namespace {
 
 constexpr double kSnakeFloor_noise = 4;  // times the gradient's noise: what a flat neighbourhood spreads
-constexpr double kEdgeFloor_noise = 3;   // times the gradient's noise: less is no edge
 constexpr double kSaturation = 0.7;      // times the usual edge: more is no better
 constexpr double kStep_px = 2.0;         // motion of the whole that is believed, per frame and direction
 constexpr double kStill_px = 1.2;        // the snake stands on whole pixels: less is no motion
@@ -42,8 +41,7 @@ void take_snake(FollowedMembrane& m, const ClearedPicture& picture, Membrane& ou
   for (const Point& p : m.nodes) {
     strength += cv::norm(picture.field.gradient(p)) / static_cast<double>(m.nodes.size());
   }
-  if (r.empty() || area < 0.6 * before || area > 1.6 * before ||
-      strength < kEdgeFloor_noise * picture.gradient_noise) {
+  if (r.empty() || area < 0.6 * before || area > 1.6 * before || strength < picture.edge_floor()) {
     out.why = "snake lost the edge";
     m.known = false;
     return;
@@ -91,7 +89,7 @@ struct Search {
     return angle_between(polar_angle(i, angles), needle ? needle->entry_angle : 0);
   }
   [[nodiscard]] EdgePath path_in(const EdgeBand& b) const {
-    return closed_path(picture.field, b, m.polarity, kEdgeFloor_noise * picture.gradient_noise, saturation);
+    return closed_path(picture.field, b, m.polarity, picture.edge_floor(), saturation);
   }
   [[nodiscard]] EdgePath path_free() const;
   [[nodiscard]] EdgePath path_pushed() const;
@@ -386,7 +384,7 @@ Membrane follow(FollowedMembrane& m, const ClearedPicture& picture, const Vision
   const std::vector<double> r = polar_radii(out.contour, centre, search.angles);
   if (r.empty()) {
     out.why = "contour crosses itself";
-    m.lost_frames = 1;
+    ++m.lost_frames;
     return out;
   }
   out.ok = true;

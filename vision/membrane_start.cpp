@@ -11,7 +11,6 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr double kEdgeFloor_noise = 3;    // times the gradient's noise: less is no edge
 constexpr double kEdgeClear_noise = 4;    // times the gradient's noise: an edge that is believed
 constexpr int kCircles = 6;               // candidates tried
 constexpr double kCircleScore = 0.35;     // share of a circumference that must have voted
@@ -53,7 +52,7 @@ EdgePath closed_edge_round(const Point& centre, const Radii& radii, const Cleare
   band.stiffness = 0.5;
   band.visible = picture.visibility();
   picture.keep_off_holder(band, std::vector<double>(band.middle.size(), 1.08 * radii.expected));
-  return closed_path(picture.field, band, polarity, kEdgeFloor_noise * picture.gradient_noise, saturation);
+  return closed_path(picture.field, band, polarity, picture.edge_floor(), saturation);
 }
 
 // Share of the visible angles with half the edge that counts fully, or less.
@@ -141,7 +140,7 @@ SecondEdge find_second(const std::vector<double>& r1, const Point& centre, Polar
     band.slope = 1.0;
     band.stiffness = 0.8;
     band.visible = picture.visibility();
-    EdgePath p = closed_path(picture.field, band, q, kEdgeFloor_noise * picture.gradient_noise, 0);
+    EdgePath p = closed_path(picture.field, band, q, picture.edge_floor(), 0);
     if (p.r.empty() || p.visible < 0.4) {
       continue;
     }

@@ -340,14 +340,20 @@ int live(const LiveOptions& options) {
     phase_before = seen->phase;
     if (csv) {
       csv->row(*seen, config, t_s, cv::Point(0, 0), simulated ? &error : nullptr);
-      csv->flush();
+      if (!csv->flush()) {
+        fmt::print(stderr, "{}: not complete, is the disk full? Going on without it\n", options.out);
+        csv.reset();
+      }
     }
     if (picture) {
+      bool written = false;
       try {
-        (void)cv::imwrite(fmt::format("{}/{:06}.png", options.overlay, frame.sequence),
-                          vision::draw_overlay(*picture, *seen, config));
-      } catch (const cv::Exception& e) {
-        fmt::print(stderr, "{}: {}; going on without overlays\n", options.overlay, e.err);
+        written = cv::imwrite(fmt::format("{}/{:06}.png", options.overlay, frame.sequence),
+                              vision::draw_overlay(*picture, *seen, config));
+      } catch (const cv::Exception&) {
+      }
+      if (!written) {
+        fmt::print(stderr, "{}: cannot be written; going on without overlays\n", options.overlay);
         overlays = false;
       }
     }

@@ -31,7 +31,10 @@ constexpr std::string_view kTruthColumns =
 class Row {
  public:
   explicit Row(std::FILE* file) : file_(file) {}
-  ~Row() { fmt::print(file_, "{}\n", line_); }
+  ~Row() {
+    line_ += '\n';
+    (void)std::fwrite(line_.data(), 1, line_.size(), file_);  // flush() tells
+  }
   Row(const Row&) = delete;
   Row& operator=(const Row&) = delete;
 
@@ -98,7 +101,7 @@ tl::expected<ObservationCsv, std::string> ObservationCsv::open(const std::string
   }
   csv.with_truth_ = with_truth;
   if (!same) {
-    fmt::print(csv.file_.get(), "{}\n", head);
+    (void)std::fputs((head + "\n").c_str(), csv.file_.get());
   }
   return csv;
 }
@@ -201,7 +204,7 @@ void ObservationCsv::row(const vision::Result& r, const vision::VisionConfig& co
   }
 }
 
-void ObservationCsv::flush() { std::fflush(file_.get()); }
+bool ObservationCsv::flush() { return std::fflush(file_.get()) == 0 && std::ferror(file_.get()) == 0; }
 
 tl::expected<ContoursCsv, std::string> ContoursCsv::open(const std::string& path) {
   ContoursCsv csv;
@@ -209,7 +212,7 @@ tl::expected<ContoursCsv, std::string> ContoursCsv::open(const std::string& path
   if (!csv.file_) {
     return tl::unexpected(fmt::format("{}: cannot be written: {}", path, std::strerror(errno)));
   }
-  fmt::print(csv.file_.get(), "frame,membrane,node,x_px,y_px\n");
+  (void)std::fputs("frame,membrane,node,x_px,y_px\n", csv.file_.get());
   return csv;
 }
 
@@ -219,10 +222,13 @@ void ContoursCsv::rows(const vision::Result& r, cv::Point offset) {
       continue;
     }
     for (std::size_t i = 0; i < m->contour.size(); ++i) {
-      fmt::print(file_.get(), "{},{},{},{:.3f},{:.3f}\n", r.frame, name, i, m->contour[i].x + offset.x,
-                 m->contour[i].y + offset.y);
+      const std::string line = fmt::format("{},{},{},{:.3f},{:.3f}\n", r.frame, name, i,
+                                           m->contour[i].x + offset.x, m->contour[i].y + offset.y);
+      (void)std::fwrite(line.data(), 1, line.size(), file_.get());
     }
   }
 }
+
+bool ContoursCsv::flush() { return std::fflush(file_.get()) == 0 && std::ferror(file_.get()) == 0; }
 
 }  // namespace punctum::tools

@@ -33,7 +33,7 @@ class ObservationCsv {
            const TruthError* truth = nullptr);
   // A frame that could not be worked on.
   void row(std::uint64_t frame, double t_s, double total_us, const std::string& verdict);
-  void flush();
+  [[nodiscard]] bool flush();  // false: something could not be written, now or before
 
   // Eq. 5 at what was measured; empty where w_d or a is not known.
   [[nodiscard]] static std::optional<double> force_N(const vision::Result& result,
@@ -51,6 +51,7 @@ class ContoursCsv {
  public:
   [[nodiscard]] static tl::expected<ContoursCsv, std::string> open(const std::string& path);
   void rows(const vision::Result& result, cv::Point offset);
+  [[nodiscard]] bool flush();
 
  private:
   struct Close {

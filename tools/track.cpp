@@ -21,7 +21,7 @@ namespace punctum::tools {
 
 namespace {
 
-constexpr int kDone = 0, kBadInput = 2;
+constexpr int kDone = 0, kNotWritten = 1, kBadInput = 2;
 
 int bad(const std::string& text) {
   fmt::print(stderr, "{}\n", text);
@@ -58,7 +58,8 @@ int track(const TrackOptions& options) {
   }
   if (options.seed_circle) {
     const auto& c = *options.seed_circle;
-    if (!std::isfinite(c[0]) || !std::isfinite(c[1]) || !(c[2] >= 4) || !(c[2] < 1e4)) {
+    if (!(c[0] >= roi.x && c[0] < roi.x + roi.width && c[1] >= roi.y && c[1] < roi.y + roi.height) ||
+        !(c[2] >= 4) || !(c[2] < 1e4)) {
       return bad(fmt::format("--seed-circle {},{},{}: a centre in the picture and a radius of at least 4 px",
                              c[0], c[1], c[2]));
     }
@@ -165,10 +166,17 @@ int track(const TrackOptions& options) {
     }
     camera->release(frame);
   }
-  csv->flush();
+  int code = kDone;
+  const auto complete = [&code](bool written, const std::string& file) {
+    if (written) return;
+    fmt::print(stderr, "{}: not complete, is the disk full?\n", file);
+    code = kNotWritten;
+  };
+  complete(csv->flush(), options.out);
+  if (contours) complete(contours->flush(), options.contours);
   fmt::print("{} frames, outer membrane in {}, inner in {}, unusable {}\n", frames, outer,
              config.inner ? fmt::format("{}", inner) : "-", unusable);
-  return kDone;
+  return code;
 }
 
 }  // namespace punctum::tools

@@ -173,4 +173,21 @@ TEST_F(Track, ATemplateThatIsMissingOrTooLargeIsExitTwo) {
   EXPECT_EQ(track(options_), 2);
 }
 
+TEST_F(Track, ATableThatCannotBeWrittenIsSaid) {
+  for (int i = 0; i < 3; ++i) frame(i);
+  options_.out = "/dev/full";
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(track(options_), 1);
+  EXPECT_NE(testing::internal::GetCapturedStderr().find("/dev/full: not complete"), std::string::npos);
+  options_.out = (folder_ / "obs.csv").string();
+  options_.contours = "/dev/full";
+  EXPECT_EQ(track(options_), 1);
+}
+
+TEST_F(Track, ASeedCircleBesideThePictureIsRefused) {
+  frame(0);
+  options_.seed_circle = {-1000.0, 120.0, 70.0};
+  EXPECT_EQ(track(options_), 2);
+}
+
 }  // namespace

@@ -23,7 +23,7 @@ int bad(const std::string& text) {
 int main_or_throw(int argc, char** argv) {
   CLI::App app{"Haptic cell injection: control core, simulated station and vision"};
   app.require_subcommand(1);
-  app.failure_message(CLI::FailureMessage::simple);
+  app.failure_message([](const CLI::App*, const CLI::Error& e) { return std::string(e.what()) + "\n"; });
   std::string scene_name;
   std::vector<std::string> overrides;
   std::string clock, seed, rate, seconds;

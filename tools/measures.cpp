@@ -60,7 +60,9 @@ void Measures::close_cell() {
   if (closed_cell_) return;
   closed_cell_ = true;
   ++cell_count;
-  cells_done += now_.done && !now_.lost ? 1U : 0U;
+  const bool without = sim_.injector && now_.injected_s == 0.0;
+  cells_done += now_.done && !now_.lost && !without ? 1U : 0U;
+  cells_without += now_.done && !now_.lost && without ? 1U : 0U;
   cells_lost += now_.lost ? 1U : 0U;
   const auto keep = [](const std::optional<double>& v, Spread& into) {
     if (v) into.add(*v);
@@ -163,6 +165,8 @@ void Measures::tick(const rt::TelemetrySample& s, const sim::Snapshot* world) {
       if (truth.zona_punctured && phase_puncture_s_ >= 0 && !now_.puncture_delay_s)
         now_.puncture_delay_s = phase_puncture_s_ - truth.zona_puncture_s;
       const double depth = -truth.gap_m;
+      const double delivered_s = world->injector.delivered_s - delivered_s_;
+      now_.injected_s = now_.injected_s.value_or(0) + (truth.zona_punctured && depth > 0 ? delivered_s : 0);
       if (truth.punctured) {
         if (!puncture_seen_) puncture_seen_ = true, puncture_depth_m_ = depth;
         now_.beyond_puncture_m = std::max(now_.beyond_puncture_m.value_or(0), depth - puncture_depth_m_);
@@ -185,6 +189,7 @@ void Measures::tick(const rt::TelemetrySample& s, const sim::Snapshot* world) {
         ++force_ticks;
       }
     }
+    delivered_s_ = world->injector.delivered_s;
   }
   last = s;
   last_s = s.t_s;

@@ -66,8 +66,9 @@ struct CellMeasures {
   double peak_force_N = 0;  // true, along the needle
   double max_depth_m = 0;   // true, past the undeformed outer membrane
   double peak_hand_N = 0;
-  bool done = false;  // the core came to `clear`
-  bool lost = false;  // in truth: torn, pierced through or off the pipette
+  std::optional<double> injected_s;  // in truth: the injector's opening over time, tip in the cell
+  bool done = false;                 // the core came to `clear`
+  bool lost = false;                 // in truth: torn, pierced through or off the pipette
 };
 
 class Measures {
@@ -82,6 +83,7 @@ class Measures {
   std::vector<PhaseSpan> phases;
   std::vector<CellMeasures> cells;
   std::uint64_t phase_count = 0, cell_count = 0, cells_done = 0, cells_lost = 0;
+  std::uint64_t cells_without = 0;  // clear and whole, but nothing came out of the injector that is there
   Spread contact_delay_s, puncture_delay_s, inner_delay_s, lateral_error_m, lateral_contact_m,
       beyond_puncture_m, withdrawal_s;
   double peak_force_N = 0, max_depth_m = 0, peak_hand_N = 0;
@@ -125,6 +127,7 @@ class Measures {
   bool was_contact_ = false;
   double true_contact_s_ = -1, phase_contact_s_ = -1, phase_puncture_s_ = -1, withdrawal_from_s_ = -1;
   double puncture_depth_m_ = 0;
+  double delivered_s_ = 0;
   bool zona_seen_ = false, puncture_seen_ = false;
   double clutch_until_s_ = 0;
 };

@@ -208,7 +208,10 @@ tl::expected<void, std::string> write_report(const std::string& path, const Scen
   j["tremor_tip_um"] = m.tremor_ticks > 0
                            ? Json(std::sqrt(m.tremor_tip2 / static_cast<double>(m.tremor_ticks)) * 1e6)
                            : Json(nullptr);
-  j["cells"] = {{"tried", m.cell_count}, {"done", m.cells_done}, {"lost", m.cells_lost}};
+  j["cells"] = {{"tried", m.cell_count},
+                {"done", m.cells_done},
+                {"lost", m.cells_lost},
+                {"without_injection", m.cells_without}};
   j["cell_list"] = Json::array();
   for (const auto& c : m.cells)
     j["cell_list"].push_back({{"cell", c.cell},
@@ -221,7 +224,8 @@ tl::expected<void, std::string> write_report(const std::string& path, const Scen
                               {"peak_force_N", c.peak_force_N},
                               {"max_depth_um", c.max_depth_m * 1e6},
                               {"depth_beyond_puncture_um", number(c.beyond_puncture_m, 1e6)},
-                              {"withdrawal_s", number(c.withdrawal_s)}});
+                              {"withdrawal_s", number(c.withdrawal_s)},
+                              {"injected_s", number(c.injected_s)}});
 
   j["observations"] = m.observations;
   j["stale_observations"] = m.stale_spells;  // times an observation became too old
@@ -280,7 +284,9 @@ std::string summary(const Scene& scene, const RunEnd& end, const Measures& m, co
     line("phases", text + " s");
   }
   if (scene.sim && scene.sim->cell) {
-    line("cells", fmt::format("{} done, {} lost, {} tried", m.cells_done, m.cells_lost, m.cell_count));
+    line("cells", fmt::format("{} done, {} lost, {}{} tried", m.cells_done, m.cells_lost,
+                              m.cells_without > 0 ? fmt::format("{} got nothing, ", m.cells_without) : "",
+                              m.cell_count));
     const auto value = [](const Spread& v, double scale, const char* unit) {
       if (v.n == 0) return std::string("-");
       return v.n == 1 ? fmt::format("{:.3g} {}", v.mean * scale, unit)

@@ -328,6 +328,8 @@ Outcome Run::judge(const Ended& ended) const {
     return scene_.has_task() || vision_over_ ? Outcome::stopped : Outcome::done;
   const Measures& m = recorder_->measures();
   if (m.cells_lost > 0 && scene_.has_task()) return Outcome::cell_lost;
+  // The core knows that it opened the gate; the simulated world, whether anything came out.
+  if (m.cells_without > 0 && scene_.has_task()) return Outcome::not_injected;
   if (core.task_finished.load() != 0 || !scene_.has_task()) return Outcome::done;
   const bool left = static_cast<rt::Phase>(core.phase.load()) == rt::Phase::clear;
   return left && !stopped_by_user_ &&

@@ -22,6 +22,7 @@ TEST_F(Programs, AnInjectionGoesThroughItsPhasesInOrder) {
     EXPECT_EQ(phase_names(r), kOrder) << method;
     EXPECT_EQ(r["cells"]["done"], 1);
     EXPECT_EQ(r["cells"]["lost"], 0);
+    EXPECT_GT(r["cell_list"][0]["injected_s"], 0);
     EXPECT_EQ(r["stale_observations"], 0);
     EXPECT_LT(r["max_depth_um"], 90);
     EXPECT_LT(r["peak_force_N"], 60e-6);
@@ -30,6 +31,17 @@ TEST_F(Programs, AnInjectionGoesThroughItsPhasesInOrder) {
     EXPECT_GT(r["withdrawal_s"], 0);
     EXPECT_LT(r["tremor_ratio"], 0.3);
   }
+}
+
+TEST_F(Programs, AnInjectionOfNothingIsNotDone) {
+  EXPECT_EQ(punctum({"run", "icsi", "--clock", "virtual", "--set", "vision.method=truth", "--set",
+                     "failure=[{device=\"injector\", kind=\"disconnect\", at_s=2}]"}),
+            1)
+      << said_;
+  const auto r = json();
+  EXPECT_EQ(r["outcome"], "not injected");
+  EXPECT_EQ(r["cells"]["done"], 0);
+  EXPECT_EQ(r["cells"]["without_injection"], 1);
 }
 
 TEST_F(Programs, TheSameSeedGivesTheSameBytesWithVisionInTheLoop) {

@@ -35,7 +35,9 @@ constexpr double kLongRun_s = 600;  // longer ones are recorded thinner
 constexpr std::uint64_t kRowsOfLongRun = 500'000;
 constexpr std::size_t kRestartsAtOnce = 5;  // of vision, within kRestartWindow_s
 constexpr double kRestartWindow_s = 60;
-constexpr double kPatience_s = 5;  // for a child to end when asked
+constexpr double kHungCore_s = 2;          // without a tick
+constexpr double kHungVirtualCore_s = 30;  // it may wait for camera and recorder
+constexpr double kPatience_s = 5;          // for a child to end when asked
 
 std::atomic<int> interrupts{0};
 extern "C" void on_interrupt(int) { interrupts.fetch_add(1, std::memory_order_relaxed); }
@@ -140,6 +142,7 @@ class Run {
   tl::expected<void, std::string> start_vision();
   void watch_vision();
   void watch_interrupts();
+  void watch_core();
   void progress();
   void core_died();
   void end_vision();
@@ -159,6 +162,8 @@ class Run {
   std::vector<double> restarts_at_;
   RunEnd end_;
   int stop_stage_ = 0;
+  std::uint64_t seen_ticks_ = 0;
+  double ticked_at_ = 0;
   double stop_at_ = 0;
   bool stopped_by_user_ = false;
   bool tty_ = isatty(STDOUT_FILENO) != 0;
@@ -247,6 +252,22 @@ void Run::watch_interrupts() {
     stop_stage_ = 3;
     complain("the core does not end: killed");
     core_.send(SIGKILL);
+  }
+}
+
+// A core that hangs: its heartbeat has stopped and the relay has acted; it will not come back by itself.
+void Run::watch_core() {
+  const auto& core = (*station_)->core;
+  const std::uint64_t ticks = core.ticks.load(std::memory_order_relaxed);
+  const double hung_s = scene_.clock == ClockKind::real ? kHungCore_s : kHungVirtualCore_s;
+  if (ticks != seen_ticks_ || core.started.load(std::memory_order_relaxed) == 0 ||
+      core.counters_final.load(std::memory_order_relaxed) != 0) {
+    seen_ticks_ = ticks;
+    ticked_at_ = wall_s();
+  } else if (wall_s() > ticked_at_ + hung_s) {
+    complain(fmt::format("the core has not ticked for {:.0f} s: killed", hung_s));
+    core_.send(SIGKILL);
+    ticked_at_ = wall_s();
   }
 }
 
@@ -434,6 +455,7 @@ int Run::run() {
       }
     watch_vision();
     watch_interrupts();
+    watch_core();
     progress();
     if (taken < 64) nap(scene_.clock == ClockKind::real ? 2e-3 : 1e-4);
   }

@@ -258,6 +258,7 @@ Fault Servo::read_injector() noexcept {
   bool open = false;
   if (devices_.injector->read(open) == hal::Status::ok) {
     injector_open_ = open;
+    if (open && gate_open_) injected_ = true;
   } else {
     alarms_ |= alarm_sensor;
   }
@@ -377,7 +378,7 @@ void Servo::advance_phase() noexcept {
   if (phases_->entered(Phase::puncture)) insertion_ = {stage_.tip_m, approach_};
   if (phases_->entered(Phase::clear)) {
     ++cells_done_;
-    if (!config_.injector || injected_s_ > 0) ++cells_injected_;
+    if (!config_.injector || injected_) ++cells_injected_;
     if (config_.cells > 0 && cells_done_ >= static_cast<std::uint32_t>(config_.cells)) task_over_ = true;
   }
   if (phases_->entered(Phase::free) && phases_->cell() == cells_done_ && injected_cell_ != cells_done_) {
@@ -386,6 +387,7 @@ void Servo::advance_phase() noexcept {
     if (model_) model_->restart(now_ns_);
     if (membrane_) membrane_->rearm();
     injected_s_ = 0;
+    injected_ = false;
   }
 }
 

@@ -193,7 +193,8 @@ class Servo {
   hal::Vec3 approach_ = -hal::Vec3::UnitX();  // axis of the needle, frozen from contact on
   FixtureFrame insertion_;                    // the line of insertion, latched at the puncture
   double tip_force_N_ = 0;                    // the law's, or the measured one if that is more
-  double injected_s_ = 0;                     // gate open, this cell
+  double injected_s_ = 0;                     // gate told to be open, this cell
+  bool injected_ = false;                     // the injector said it was
   std::uint32_t injected_cell_ = 0;           // the cell it counts for
   bool gate_open_ = false;
   bool inject_released_ = false;  // the button was up since the start or the last stop

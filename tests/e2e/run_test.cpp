@@ -187,6 +187,18 @@ TEST_F(Programs, WhenTheCoreIsKilledTheDevicesGoToTheirSafeStateAndTheParentSays
   EXPECT_NE(run.output().find("the control core was killed by signal 9"), std::string::npos) << run.output();
 }
 
+TEST_F(Programs, WhenTheCoreHangsItIsNoticedAndTheDevicesGoToTheirSafeState) {
+  Running run({"run", "free", "--seconds", "60", "--report", report(), "--no-figure"}, words());
+  Look look("free", run);
+  ASSERT_TRUE(look.until_started()) << run.output();
+  std::this_thread::sleep_for(500ms);
+  ASSERT_GT(look.core(), 1);
+  kill(look.core(), SIGSTOP);
+  EXPECT_EQ(run.wait(), 3) << run.output();
+  EXPECT_TRUE(json()["unattended"]["safe"]);
+  EXPECT_NE(run.output().find("has not ticked"), std::string::npos) << run.output();
+}
+
 TEST_F(Programs, WhenTheParentIsKilledTheCoreStopsByItselfAndTheNextRunCleansUp) {
   pid_t core = 0;
   std::string station;

@@ -332,13 +332,19 @@ TEST(Servo, takes_a_needle_through_a_whole_injection) {
 }
 
 TEST(Servo, does_not_call_a_cell_done_that_got_nothing) {
-  Bench b(icsi());
-  b.to_inside();
-  b.move(60e-6, 40e-6);
-  b.run(1);
-  EXPECT_EQ(b.servo->phase(), Phase::clear);
-  EXPECT_EQ(b.servo->outcome(), Outcome::ended);
-  EXPECT_EQ(b.station->core.task_finished.load(), 0U);
+  for (const bool pressed : {false, true}) {  // pressed: the gate is told to open, but the injector does not
+    Bench b(icsi());
+    b.injector.jammed = true;
+    b.to_inside();
+    if (pressed) b.hand.buttons = hal::kButtonInject;
+    b.run(0.5);
+    b.hand.buttons = 0;
+    b.move(60e-6, 40e-6);
+    b.run(1);
+    EXPECT_EQ(b.servo->phase(), Phase::clear);
+    EXPECT_EQ(b.servo->outcome(), Outcome::ended);
+    EXPECT_EQ(b.station->core.task_finished.load(), 0U);
+  }
 }
 
 TEST(Servo, renders_the_membrane_law_of_the_depth_it_reports_within_a_percent_at_rest) {

@@ -30,38 +30,38 @@ struct Room {
   std::vector<std::string_view> may_use;  // folders or files of this tree, besides the room itself
   bool ground = true;
   bool core = false;         // only kCoreStandard and Eigen from outside the tree
-  std::string_view library;  // regex: the only libraries from outside that this room may name
+  std::string_view outside;  // regex: the only libraries from outside that this room may name
 };
 
 // A library is anything outside the tree in angle brackets with a slash or ".h" that is not the C or POSIX
 // library.
 const std::vector<Room>& rooms() {
   static const std::vector<Room> table = {
-      {.folder = "hal/", .may_use = {}, .library = "Eigen/.*|tl/expected.hpp"},  // the ground itself
-      {.folder = "hal/sim/", .may_use = {}, .library = "Eigen/.*|tl/expected.hpp"},
-      {.folder = "hal/recorded/", .may_use = {}, .library = "Eigen/.*|tl/expected.hpp|opencv2/.*"},
-      {.folder = "hal/gpiod/", .may_use = {}, .library = "Eigen/.*|tl/expected.hpp|gpiod.*"},
-      {.folder = "hal/falcon/", .may_use = {}, .library = "Eigen/.*|tl/expected.hpp|libusb.*"},
-      {.folder = "hal/cia402/", .may_use = {}, .library = "Eigen/.*|tl/expected.hpp"},
-      {.folder = "hal/v4l2/", .may_use = {}, .library = "Eigen/.*|tl/expected.hpp"},
+      {.folder = "hal/", .may_use = {}, .outside = "Eigen/.*|tl/expected.hpp"},  // the ground itself
+      {.folder = "hal/sim/", .may_use = {}, .outside = "Eigen/.*|tl/expected.hpp"},
+      {.folder = "hal/recorded/", .may_use = {}, .outside = "Eigen/.*|tl/expected.hpp|opencv2/.*"},
+      {.folder = "hal/gpiod/", .may_use = {}, .outside = "Eigen/.*|tl/expected.hpp|gpiod.*"},
+      {.folder = "hal/falcon/", .may_use = {}, .outside = "Eigen/.*|tl/expected.hpp|libusb.*"},
+      {.folder = "hal/cia402/", .may_use = {}, .outside = "Eigen/.*|tl/expected.hpp"},
+      {.folder = "hal/v4l2/", .may_use = {}, .outside = "Eigen/.*|tl/expected.hpp"},
       // The core: the interfaces and the exchange, nothing that sets up or may fail.
       {.folder = "rt/",
        .may_use = {"rt/executive/", "rt/station/", "rt/forces/", "rt/control/"},
        .core = true,
-       .library = "Eigen/.*"},
+       .outside = "Eigen/.*"},
       // The machine's clock, injected like any other, in a library of its own.
       {.folder = "rt/executive/monotonic_clock.cpp",
        .may_use = {"rt/executive/monotonic_clock.hpp"},
        .core = true,
-       .library = "cerrno|ctime"},
-      {.folder = "rt/platform/", .may_use = {"rt/"}, .library = "Eigen/.*|tl/expected.hpp"},
-      {.folder = "vision/", .may_use = {"rt/station/"}, .library = "Eigen/.*|tl/expected.hpp|opencv2/.*"},
+       .outside = "cerrno|ctime"},
+      {.folder = "rt/platform/", .may_use = {"rt/"}, .outside = "Eigen/.*|tl/expected.hpp"},
+      {.folder = "vision/", .may_use = {"rt/station/"}, .outside = "Eigen/.*|tl/expected.hpp|opencv2/.*"},
       {.folder = "tools/",
        .may_use = {"rt/", "hal/", "vision/"},
-       .library = "Eigen/.*|tl/expected.hpp|opencv2/.*|fmt/.*|toml\\+\\+/.*|CLI/.*|nlohmann/.*"},
+       .outside = "Eigen/.*|tl/expected.hpp|opencv2/.*|fmt/.*|toml\\+\\+/.*|CLI/.*|nlohmann/.*"},
       {.folder = "tests/",
        .may_use = {"rt/", "hal/", "vision/", "tools/"},
-       .library =
+       .outside =
            "Eigen/.*|tl/expected.hpp|opencv2/.*|fmt/.*|toml\\+\\+/.*|CLI/.*|nlohmann/.*|gtest/.*|gmock/.*"},
   };
   return table;
@@ -114,7 +114,7 @@ std::string objection(std::string_view file, std::string_view target, bool quote
     return "is a room that " + std::string(room->folder) + " may not use";
   }
   // In angle brackets: the standard and POSIX libraries, and what the room is built on.
-  if (std::regex_match(std::string(target), std::regex(std::string(room->library)))) {
+  if (std::regex_match(std::string(target), std::regex(std::string(room->outside)))) {
     return {};
   }
   if (room->core) {

@@ -2,7 +2,12 @@
 
 #include <fmt/format.h>
 
+// toml++ asserts, or lets the compiler assume, what a malformed key denies; without that it reports the key.
 #define TOML_EXCEPTIONS 0
+#define TOML_ASSERT(expr) static_assert(true)
+#include <toml++/impl/preprocessor.h>
+#undef TOML_ASSERT_ASSUME
+#define TOML_ASSERT_ASSUME(expr) static_assert(true)
 #include <toml++/toml.h>
 
 #include <algorithm>

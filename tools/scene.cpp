@@ -5,7 +5,11 @@
 // toml++ asserts, or lets the compiler assume, what a malformed key denies; without that it reports the key.
 #define TOML_EXCEPTIONS 0
 #define TOML_ASSERT(expr) static_assert(true)
+#if __has_include(<toml++/impl/preprocessor.hpp>)  // 3.4
+#include <toml++/impl/preprocessor.hpp>
+#else
 #include <toml++/impl/preprocessor.h>
+#endif
 #undef TOML_ASSERT_ASSUME
 #define TOML_ASSERT_ASSUME(expr) static_assert(true)
 #include <toml++/toml.h>

@@ -33,6 +33,8 @@ MembraneState membrane_law(const MembraneParams& params, double wd_m, double R_m
   s.a_m = c + dimple_reach(R_m, wd_m, scale);
   s.sigma_d_Pa = force / (2 * std::numbers::pi * params.h_m * k);
   s.pressure_Pa = s.force_N / (std::numbers::pi * a * a);
+  // dlnF/dlnw = 3 + (dlnF/dlna) (dlna/dlnw), and dlna/dlnw = reach / 2a by the closure.
+  s.stiffness_N_m = force / w * (3 - (2 + shape.steepness) * reach / (2 * a));
   s.slope = k * (reach / a) * (1 + c / a) / c;  // -w'(c) = k (1/c - c/a^2)
   s.small_slope = s.slope <= kMembraneSlopeMax;
   s.valid = s.small_slope && params.h_m <= c && a < R_m;

@@ -22,8 +22,9 @@ namespace punctum::rt {
 // f(zeta) and -D(zeta)/2 from s = (1-zeta^2)/(1+zeta^2) and atanh s = -ln zeta.
 template <class Real>
 struct MembraneShape {
-  Real f = 0;       // of eq. 5
-  Real half_D = 0;  // -D/2 = ln(a/c) - (1-zeta^2)/2: depth of the profile over its scale k
+  Real f = 0;          // of eq. 5
+  Real half_D = 0;     // -D/2 = ln(a/c) - (1-zeta^2)/2: depth of the profile over its scale k
+  Real steepness = 0;  // dln f / dln zeta
 };
 
 // c > 0, reach = a - c > 0, in the same unit. Pass the difference itself: a - c of rounded numbers is what
@@ -51,7 +52,10 @@ template <class Real>
   }
   const Real p = 1 + s * q * T;
   const Real s2 = s * s;
-  return {q * q * (1 + q * q * T) / (4 * s2 * s2 * p * p * p), s2 * p / q};
+  const Real f = q * q * (1 + q * q * T) / (4 * s2 * s2 * p * p * p);
+  const Real half_D = s2 * p / q;
+  const Real u = (reach / a) * (1 + zeta);  // 1 - zeta^2
+  return {f, half_D, 2 * zeta * zeta / u + u / half_D * (3 - 1 / (2 * f * half_D * half_D))};
 }
 
 // Eq. 5 for a dimple of depth w and radius a, both measured. 0 for w <= 0; a > c is required.
@@ -69,10 +73,11 @@ struct MembraneState {
   double a_m = 0;         // half-width of the dimple
   double sigma_d_Pa = 0;  // membrane stress at the rim, eq. 4
   double pressure_Pa =
-      0;               // inner pressure, eq. 4: F = pi c^2 p + 2 pi c h sigma_d sin(theta), p = F/(pi a^2)
-  double slope = 0;    // tan(theta) at the rim
-  bool valid = false;  // small slope, thin film (h <= c), dimple smaller than the cell
-  bool small_slope = true;  // the part of it that changes as the needle advances
+      0;             // inner pressure, eq. 4: F = pi c^2 p + 2 pi c h sigma_d sin(theta), p = F/(pi a^2)
+  double slope = 0;  // tan(theta) at the rim
+  double stiffness_N_m = 0;  // dF/dw as it is rendered
+  bool valid = false;        // small slope, thin film (h <= c), dimple smaller than the cell
+  bool small_slope = true;   // the part of it that changes as the needle advances
 };
 
 // Slope at the rim up to which the law is within some 6 % of exact slopes.

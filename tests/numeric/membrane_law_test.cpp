@@ -108,6 +108,17 @@ TEST(MembraneLaw, is_exactly_zero_without_a_dimple) {
   }
 }
 
+TEST(MembraneLaw, knows_its_own_stiffness) {
+  // w, scale of the closure, dF/dw: mpmath.diff of the printed formula in 60 digits.
+  constexpr double reference[][3] = {{1e-11, 0.6, 0.0053277159319823256}, {1e-9, 0.6, 0.005920319753638435},
+                                     {1e-7, 0.6, 0.01259227955281439},    {1e-6, 0.6, 0.032615900481338264},
+                                     {5e-6, 0.3, 0.584266185019442},      {20e-6, 0.6, 0.18554616150470585},
+                                     {20e-6, 1.0, 0.047488363141344608},  {60e-6, 0.38, 1.3009518139111886}};
+  for (const auto& [w, scale, stiffness] : reference) {
+    EXPECT_NEAR(membrane_law(MembraneParams{}, w, 60e-6, scale).stiffness_N_m / stiffness, 1, 1e-13) << w;
+  }
+}
+
 TEST(MembraneLaw, vanishes_at_contact_in_proportion_to_the_depth) {
   const MembraneParams params;
   const double R = 60e-6;

@@ -22,7 +22,7 @@
 #include "rt/station/station.hpp"
 #include "tools/child.hpp"
 #include "tools/recorder.hpp"
-#include "tools/report.hpp"
+#include "tools/run_report.hpp"
 
 namespace punctum::tools {
 namespace {

@@ -1,4 +1,4 @@
-#include "tools/report.hpp"
+#include "tools/run_report.hpp"
 
 #include <fmt/format.h>
 #include <sys/utsname.h>

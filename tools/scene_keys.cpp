@@ -98,6 +98,7 @@ std::vector<Table> make_tables() {
                                          milli("encoder_step_mm", h.encoder_step_m, 1e-5, 1),
                                          real("force_max_N", h.force_max_N, 0.1, 40),
                                          milli("workspace_mm", h.workspace_m, 5, 1000),
+                                         whole("delay_ticks", h.delay_ticks, 0, sim::kMaxDelayTicks),
                                          milli("timeout_ms", s.servo.hand_timeout_s, 1, 1000),
                                          milli("jump_mm", s.servo.hand_jump_m, 0.1, 200)};
                }});
@@ -447,7 +448,7 @@ std::vector<List> make_lists() {
                  std::vector<Key> k{
                      choice("device", f.device,
                             {"haptic", "stage", "estop", "injector", "vacuum", "force_sensor", "camera"}),
-                     {"kind", Choice{{"freeze", "drop", "delay", "nan", "disconnect", "saturate"},
+                     {"kind", Choice{{"freeze", "drop", "delay", "nan", "disconnect", "saturate", "noise"},
                                      true,
                                      [&f] { return static_cast<int>(f.kind) - 1; },
                                      [&f](int n) { f.kind = static_cast<Failure>(n + 1); }}},

@@ -18,7 +18,9 @@ struct HandParams {
   double encoder_step_m = 0.03e-3;
   double force_max_N = 8.5;
   double workspace_m = 0.08;  // half-width; she uses the clutch before its border
+  int delay_ticks = 0;        // a force acts this many ticks after it was written; up to kMaxDelayTicks
 };
+inline constexpr int kMaxDelayTicks = 5;
 
 // The biologist: an arm behind the handle that follows an intention.
 struct OperatorParams {
@@ -107,7 +109,7 @@ struct MicroscopeParams {
 };
 
 // A device that fails while running.
-enum class Failure : std::uint8_t { none, freeze, drop, delay, nan, disconnect, saturate };
+enum class Failure : std::uint8_t { none, freeze, drop, delay, nan, disconnect, saturate, noise };
 enum class Device : std::uint8_t { hand, stage, estop, injector, vacuum, force_sensor, camera };
 inline constexpr int kDevices = 7;
 struct ScheduledFailure {

@@ -11,7 +11,8 @@ constexpr double kResetFor_s = 0.1;
 SimEstop::SimEstop(const SimConfig& config)
     : events_(config.estop_events),
       event_count_(config.estop_event_count),
-      timeout_ns_(to_ns(config.relay_timeout_s)) {}
+      timeout_ns_(to_ns(config.relay_timeout_s)),
+      noise_(config.seed, Noise::Stream::estop_reading) {}
 
 void SimEstop::step(std::int64_t t_ns, double from_s, double to_s, Failure failure) noexcept {
   failure_ = failure;
@@ -59,8 +60,10 @@ hal::Status SimEstop::read(hal::EstopState& out) noexcept {
   if (status != hal::Status::ok) return status;
   unread_ = false;
   if (failure_ == Failure::nan) return hal::Status::fault;
-  out.contact_a_closed = s.contact_a_closed != 0;
-  out.contact_b_closed = s.contact_b_closed != 0;
+  const std::uint64_t flicker =
+      failure_ == Failure::noise ? noise_.bits(static_cast<std::uint64_t>(reader_.newest_ns())) : ~0ULL;
+  out.contact_a_closed = s.contact_a_closed != 0 && (flicker & 1) != 0;
+  out.contact_b_closed = s.contact_b_closed != 0 && (flicker & 2) != 0;
   out.reset_pressed = s.reset_pressed != 0;
   out.pulse_seen = s.pulse_seen != 0;
   return hal::Status::ok;

@@ -10,6 +10,7 @@
 #include "hal/devices.hpp"
 #include "hal/sim/config.hpp"
 #include "hal/sim/failures.hpp"
+#include "hal/sim/noise.hpp"
 
 namespace punctum::sim {
 
@@ -27,7 +28,8 @@ struct EstopPlantState {
   std::uint8_t was_reset = 0;  // reset was pressed since the relay opened
 };
 
-// nan: the chain reports a fault. saturate: contact a is welded, it never opens.
+// nan: the chain reports a fault. saturate: contact a is welded, it never opens. noise: both contacts read
+// open half of the time, each by itself.
 class SimEstop final : public hal::EstopChain {
  public:
   explicit SimEstop(const SimConfig& config);
@@ -45,6 +47,7 @@ class SimEstop final : public hal::EstopChain {
   const std::array<EstopEvent, 4> events_;
   const int event_count_;
   const std::int64_t timeout_ns_;
+  const Noise noise_;
   EstopPlantState state_;
   FailingReader<EstopPlantState> reader_;
   Failure failure_ = Failure::none;

@@ -14,7 +14,7 @@ std::array<Failure, kDevices> failures_at(const SimConfig& config, const Failure
   if (live != nullptr) {
     for (std::size_t d = 0; d < now.size(); ++d) {
       const std::uint64_t word = live->word[d].load(std::memory_order_relaxed);
-      if (word != 0 && word <= 1 + static_cast<std::uint64_t>(Failure::saturate)) {
+      if (word != 0 && word <= 1 + static_cast<std::uint64_t>(Failure::noise)) {
         now[d] = static_cast<Failure>(word - 1);
       }
     }

@@ -8,6 +8,9 @@
 //               commands still arrive
 //   disconnect  the device is gone
 //   saturate    the device hangs at the end of its range; what that means is said in each device's header
+//   noise       every reading carries broadband interference of its own, as large as each device's header
+//   says;
+//               commands still arrive
 #pragma once
 
 #include <array>
@@ -79,6 +82,9 @@ class FailingReader {
   }
 
   [[nodiscard]] Failure failure() const noexcept { return failure_; }
+  [[nodiscard]] std::int64_t newest_ns() const noexcept {
+    return head_ == 0 ? 0 : past_[(head_ - 1) % kPast].t_ns;
+  }
 
  private:
   static constexpr std::uint64_t kPast = 256;  // more than kFailureDelay_s at 8 kHz

@@ -11,7 +11,8 @@ SimForceSensor::SimForceSensor(const ForceSensorParams& params, std::uint64_t se
 void SimForceSensor::step(std::int64_t t_ns, double dt_s, double axial_N, Failure failure) noexcept {
   const double part = params_.lag_s > 0 ? -std::expm1(-dt_s / params_.lag_s) : 1.0;
   state_.lagged_N += (axial_N - state_.lagged_N) * part;
-  const double noise_N = params_.noise_N * noise_.gaussian(static_cast<std::uint64_t>(t_ns));
+  const double rms_N = params_.noise_N + (failure == Failure::noise ? kInterference_N : 0.0);
+  const double noise_N = rms_N * noise_.gaussian(static_cast<std::uint64_t>(t_ns));
   state_.reading_N = std::clamp(state_.lagged_N + noise_N, -kFullScale_N, kFullScale_N);
   reader_.push(t_ns, state_, failure);
 }

@@ -15,10 +15,11 @@ struct ForceSensorPlantState {
   double reading_N = 0;
 };
 
-// saturate: it reads its full scale.
+// saturate: it reads its full scale. noise: kInterference_N rms more of it.
 class SimForceSensor final : public hal::ForceSensor {
  public:
   static constexpr double kFullScale_N = 200e-6;
+  static constexpr double kInterference_N = 20e-6;
 
   SimForceSensor(const ForceSensorParams& params, std::uint64_t seed);
 

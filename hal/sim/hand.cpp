@@ -170,14 +170,20 @@ void advance(HandAxis& axis, const HandParams& hand, const ArmImpedance& arm, do
   }
 }
 
-SimHand::SimHand(const HandParams& params, const ArmImpedance& arm) : params_(params), arm_(arm) {}
+SimHand::SimHand(const HandParams& params, const ArmImpedance& arm, std::uint64_t seed)
+    : params_(params), arm_(arm), noise_(seed, Noise::Stream::hand_reading) {}
 
 void SimHand::step(std::int64_t t_ns, double dt_s, const Vec3& p0, const Vec3& p1, bool power,
                    Failure failure) noexcept {
   failure_ = failure;
   const bool on = power && failure != Failure::drop && failure != Failure::disconnect;
   const double most = params_.force_max_N * (failure == Failure::saturate ? kSaturatedForce : 1.0);
-  Vec3 f = on ? state_.commanded_N.vec() : Vec3::Zero();
+  auto& under_way = state_.under_way_N;
+  const int late = std::clamp(params_.delay_ticks, 0, kMaxDelayTicks);
+  const Point due = late > 0 ? under_way[static_cast<std::size_t>(late - 1)] : state_.commanded_N;
+  std::copy_backward(under_way.begin(), under_way.end() - 1, under_way.end());
+  under_way.front() = state_.commanded_N;
+  Vec3 f = on ? due.vec() : Vec3::Zero();
   if (const double size = f.norm(); size > most) f *= most / size;
 
   const Vec3 u = dt_s > 0 ? Vec3((p1 - p0) / dt_s) : Vec3::Zero();
@@ -212,6 +218,10 @@ hal::Status SimHand::read(hal::HandState& out) noexcept {
   Vec3 x;
   for (int i = 0; i < 3; ++i) {
     double xi = true_position[i];
+    if (failure_ == Failure::noise) {
+      const auto n = 3 * static_cast<std::uint64_t>(reader_.newest_ns()) + static_cast<std::uint64_t>(i);
+      xi += kInterference_steps * params_.encoder_step_m * noise_.gaussian(n);
+    }
     if (failure_ == Failure::saturate) xi = std::clamp(xi, -kSaturatedReach_m, kSaturatedReach_m);
     x[i] = params_.encoder_step_m > 0 ? params_.encoder_step_m * std::round(xi / params_.encoder_step_m) : xi;
   }

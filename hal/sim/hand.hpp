@@ -13,6 +13,7 @@
 #include "hal/devices.hpp"
 #include "hal/sim/config.hpp"
 #include "hal/sim/failures.hpp"
+#include "hal/sim/noise.hpp"
 #include "hal/sim/point.hpp"
 
 namespace punctum::sim {
@@ -35,22 +36,25 @@ void advance(HandAxis& axis, const HandParams& hand, const ArmImpedance& arm, do
 struct HandPlantState {
   Point position_m;  // device frame
   Point velocity_m_s;
-  Point applied_N;       // by the amplifier over the last interval, after saturation
-  Point commanded_N;     // for the next one
-  double tilt_rad[2]{};  // of the handle about its x and y axes
-  double work_J = 0;     // done by the amplifier on the handle: sum of f_{k-1} (x_k - x_{k-1})
+  Point applied_N;                                // by the amplifier over the last interval, after saturation
+  Point commanded_N;                              // for the next one, or for delay_ticks later
+  double tilt_rad[2]{};                           // of the handle about its x and y axes
+  std::array<Point, kMaxDelayTicks> under_way_N;  // commands of the last steps, newest first
+  double work_J = 0;  // done by the amplifier on the handle: sum of f_{k-1} (x_k - x_{k-1})
   std::uint32_t buttons = 0;
   std::uint32_t amplifier_on = 0;
 };
 
 // saturate: the encoders end at kSaturatedReach_m and the amplifier gives kSaturatedForce of its force.
+// noise: every reading is kInterference_steps encoder steps rms beside the truth on each axis.
 // freeze: the amplifier keeps giving the last force. drop, disconnect: the amplifier gives none.
 class SimHand final : public hal::HapticDevice {
  public:
   static constexpr double kSaturatedReach_m = 0.01;
   static constexpr double kSaturatedForce = 0.1;
+  static constexpr double kInterference_steps = 4;
 
-  SimHand(const HandParams& params, const ArmImpedance& arm);
+  SimHand(const HandParams& params, const ArmImpedance& arm, std::uint64_t seed = 1);
 
   // Advances to t_ns. p0 and p1: the arm's intention at both ends of the interval, device frame.
   void step(std::int64_t t_ns, double dt_s, const Vec3& p0, const Vec3& p1, bool power,
@@ -66,6 +70,7 @@ class SimHand final : public hal::HapticDevice {
  private:
   HandParams params_;
   ArmImpedance arm_;
+  Noise noise_;
   HandPlantState state_;
   FailingReader<HandPlantState> reader_;
   Failure failure_ = Failure::none;

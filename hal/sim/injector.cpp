@@ -28,6 +28,9 @@ hal::Status SimInjector::read(bool& open) noexcept {
   if (status != hal::Status::ok) return status;
   if (failure_ == Failure::nan) return hal::Status::fault;
   open = failure_ == Failure::saturate || s.opening > kShutBelow;
+  if (failure_ == Failure::noise) {
+    open = (noise_.bits(static_cast<std::uint64_t>(reader_.newest_ns())) & 1) != 0;
+  }
   return hal::Status::ok;
 }
 

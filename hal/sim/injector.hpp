@@ -6,6 +6,7 @@
 #include "hal/devices.hpp"
 #include "hal/sim/config.hpp"
 #include "hal/sim/failures.hpp"
+#include "hal/sim/noise.hpp"
 
 namespace punctum::sim {
 
@@ -16,10 +17,12 @@ struct InjectorPlantState {
   std::uint32_t powered = 0;
 };
 
-// nan: reading fails. saturate: the valve's contact reports open, whatever it does.
+// nan: reading fails. saturate: the valve's contact reports open, whatever it does. noise: it reports open
+// half of the time.
 class SimInjector final : public hal::Injector {
  public:
-  explicit SimInjector(const InjectorParams& params) : params_(params) {}
+  explicit SimInjector(const InjectorParams& params, std::uint64_t seed = 1)
+      : params_(params), noise_(seed, Noise::Stream::injector_reading) {}
 
   void step(std::int64_t t_ns, double dt_s, bool power, Failure failure) noexcept;
 
@@ -31,6 +34,7 @@ class SimInjector final : public hal::Injector {
 
  private:
   InjectorParams params_;
+  Noise noise_;
   InjectorPlantState state_;
   FailingReader<InjectorPlantState> reader_;
   Failure failure_ = Failure::none;

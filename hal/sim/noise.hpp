@@ -8,7 +8,19 @@ namespace punctum::sim {
 class Noise {
  public:
   // One stream per thing that is noisy.
-  enum class Stream : std::uint64_t { force_sensor = 1, vacuum, tremor, aim, drift, tilt, free_use = 64 };
+  enum class Stream : std::uint64_t {
+    force_sensor = 1,
+    vacuum,
+    tremor,
+    aim,
+    drift,
+    tilt,
+    hand_reading,
+    stage_reading,
+    estop_reading,
+    injector_reading,
+    free_use = 64
+  };
 
   constexpr Noise(std::uint64_t seed, Stream stream, std::uint64_t sub = 0) noexcept
       : key_(mix(mix(seed) ^ mix(static_cast<std::uint64_t>(stream) * 0x9E3779B97F4A7C15U + sub))) {}

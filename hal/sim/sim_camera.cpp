@@ -9,15 +9,29 @@
 namespace punctum::sim {
 namespace {
 
-// What a broken line delivers: every grey equally likely.
-void fill_with_noise(std::uint64_t seed, std::span<std::uint8_t> out) noexcept {
+// Calls each(pixel, random bits) for every pixel.
+template <typename Each>
+void at_random(std::uint64_t seed, std::span<std::uint8_t> pixels, Each each) noexcept {
   std::uint64_t state = seed * 0x9e3779b97f4a7c15ULL + 1;
-  for (std::uint8_t& pixel : out) {
+  for (std::uint8_t& pixel : pixels) {
     state ^= state << 13;
     state ^= state >> 7;
     state ^= state << 17;
-    pixel = static_cast<std::uint8_t>(state >> 32);
+    each(pixel, static_cast<std::uint32_t>(state >> 32));
   }
+}
+
+// What a broken line delivers: every grey equally likely.
+void fill_with_noise(std::uint64_t seed, std::span<std::uint8_t> out) noexcept {
+  at_random(seed, out,
+            [](std::uint8_t& pixel, std::uint32_t bits) { pixel = static_cast<std::uint8_t>(bits); });
+}
+
+void add_noise(std::uint64_t seed, int most, std::span<std::uint8_t> out) noexcept {
+  const auto span = static_cast<std::uint32_t>(2 * most + 1);
+  at_random(seed, out, [&](std::uint8_t& pixel, std::uint32_t bits) {
+    pixel = static_cast<std::uint8_t>(std::clamp(pixel + static_cast<int>(bits % span) - most, 0, 255));
+  });
 }
 
 }  // namespace
@@ -88,6 +102,7 @@ hal::Status SimCamera::next(hal::Frame& out, std::int64_t timeout_ns) {
       return unusable ? hal::Status::fault : hal::Status::ok;
     }
     if (failure == Failure::nan) fill_with_noise(config_.seed ^ exposure.frame, pixels_);
+    if (failure == Failure::noise) add_noise(config_.seed ^ exposure.frame, kInterference_grey, pixels_);
     if (failure == Failure::saturate) std::fill(pixels_.begin(), pixels_.end(), std::uint8_t{255});
     out.pixels = pixels_.data();
     return hal::Status::ok;

@@ -9,6 +9,7 @@
 //   nan         noise in place of a picture
 //   disconnect  next() says so
 //   saturate    a white picture
+//   noise       kInterference_grey more on every pixel, up or down; the truth has none
 #pragma once
 
 #include <array>
@@ -30,6 +31,7 @@ namespace punctum::sim {
 class SimCamera final : public hal::Camera {
  public:
   static constexpr double kDelay_s = 0.25;
+  static constexpr int kInterference_grey = 60;  // at most, every value equally likely
 
   enum class Picture : std::uint8_t {
     drawn,

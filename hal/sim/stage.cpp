@@ -25,7 +25,8 @@ Vec3 within(const Vec3& axis, const Vec3& from, double most) {
 
 }  // namespace
 
-SimStage::SimStage(const StageParams& params) : params_(params) {
+SimStage::SimStage(const StageParams& params, std::uint64_t seed)
+    : params_(params), noise_(seed, Noise::Stream::stage_reading) {
   params_.axis.normalize();
   state_.tip_m = params_.start_m;
   state_.set_point_m = params_.start_m;
@@ -95,9 +96,16 @@ hal::Status SimStage::read(hal::StageState& out) noexcept {
   StagePlantState s;
   const hal::Status status = reader_.read(s);
   if (status != hal::Status::ok) return status;
-  out.tip_m = rounded(s.tip_m.vec() + params_.registration_m, params_.resolution_m);
+  Vec3 tip_m = s.tip_m;
+  if (failure_ == Failure::noise) {
+    for (int i = 0; i < 3; ++i) {
+      const auto n = 3 * static_cast<std::uint64_t>(reader_.newest_ns()) + static_cast<std::uint64_t>(i);
+      tip_m[i] += kInterference_steps * params_.resolution_m * noise_.gaussian(n);
+    }
+  }
+  out.tip_m = rounded(tip_m + params_.registration_m, params_.resolution_m);
   out.axis = s.axis;
-  out.following_error_m = s.set_point_m.vec() - s.tip_m.vec();
+  out.following_error_m = s.set_point_m.vec() - tip_m;
   if (failure_ == Failure::nan) {
     out.tip_m.setConstant(kNotANumber);
     out.following_error_m.setConstant(kNotANumber);

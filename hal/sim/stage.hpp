@@ -11,6 +11,7 @@
 #include "hal/devices.hpp"
 #include "hal/sim/config.hpp"
 #include "hal/sim/failures.hpp"
+#include "hal/sim/noise.hpp"
 #include "hal/sim/point.hpp"
 
 namespace punctum::sim {
@@ -29,13 +30,15 @@ struct StagePlantState {
 };
 
 // saturate: the drive gives kSaturatedSpeed of its speed. freeze: the drive hangs: it brakes and hears
-// nothing. disconnect: it brakes (link loss). drop: it goes on to its last set-point and holds there.
+// nothing. disconnect: it brakes (link loss). noise: its encoders are kInterference_steps of their
+// resolution rms beside the truth on each axis. drop: it goes on to its last set-point and holds there.
 class SimStage final : public hal::Stage {
  public:
   static constexpr double kSaturatedSpeed = 0.02;
+  static constexpr double kInterference_steps = 4;
   static constexpr double kTiltMax_rad = 0.35;  // of the axis from where it started
 
-  explicit SimStage(const StageParams& params);
+  explicit SimStage(const StageParams& params, std::uint64_t seed = 1);
 
   void step(std::int64_t t_ns, double dt_s, bool power, Failure failure) noexcept;
 
@@ -52,6 +55,7 @@ class SimStage final : public hal::Stage {
   void follow(double dt_s, double speed_m_s) noexcept;
 
   StageParams params_;
+  Noise noise_;
   StagePlantState state_;
   FailingReader<StagePlantState> reader_;
   Failure failure_ = Failure::none;

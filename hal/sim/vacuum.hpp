@@ -16,11 +16,12 @@ struct VacuumPlantState {
 };
 
 // saturate: the pump fails, the pressure goes to ambient with kLeak_s. The other failures concern the gauge
-// only.
+// only; noise: kInterference_Pa rms more of it.
 class SimVacuum final : public hal::HoldingVacuum {
  public:
   static constexpr double kLeak_s = 0.1;
   static constexpr double kNoise_Pa = 2;  // of the gauge
+  static constexpr double kInterference_Pa = 200;
 
   SimVacuum(const HolderParams& params, std::uint64_t seed);
 

@@ -17,11 +17,11 @@ World::World(const SimConfig& config, Bench* bench, std::int64_t start_ns)
       start_ns_(start_ns),
       t_ns_(start_ns),
       person_(config),
-      hand_(config.hand, arm_of(config.person)),
-      stage_(config.stage),
+      hand_(config.hand, arm_of(config.person), config.seed),
+      stage_(config.stage, config.seed),
       estop_(config) {
   if (config.cell) cell_.emplace(*config.cell, config.needle, config.holder, config.seed, 0);
-  if (config.injector) injector_.emplace(*config.injector);
+  if (config.injector) injector_.emplace(*config.injector, config.seed);
   if (config.holder) vacuum_.emplace(*config.holder, config.seed);
   if (config.force_sensor) force_sensor_.emplace(*config.force_sensor, config.seed);
   snapshot_.start_ns = start_ns;

@@ -188,7 +188,7 @@ const std::vector<Broken>& broken() {
        "b.toml:6:10: failure[0].device: this scene has no such device, allowed: one that is there"},
       {"a failure without a kind", kLeast + "[[failure]]\ndevice = \"stage\"\nat_s = 1\n",
        "b.toml:5:1: failure[0]: kind is missing, allowed: \"freeze\", \"drop\", \"delay\", \"nan\", "
-       "\"disconnect\" or \"saturate\""},
+       "\"disconnect\", \"saturate\" or \"noise\""},
       {"too many failures", kLeast + many_failures(9),
        "b.toml:37:1: failure: more than 8 entries, allowed: at most 8"},
       {"a newline inside a key", "\"a\\nb\" = 1\n", "b.toml:1:1: a b: unknown table, allowed: " + all_tables},

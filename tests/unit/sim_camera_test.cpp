@@ -229,6 +229,35 @@ TEST(SimCameraFailure, a_white_picture_is_white_and_noise_is_noise) {
   }
 }
 
+TEST(SimCameraFailure, interference_is_added_to_the_picture_and_the_truth_has_none) {
+  const auto picture = [](const SimConfig& config) {
+    const auto bench = std::make_unique<Bench>();
+    World world(config, bench.get(), 0);
+    SimCamera camera(config, *bench);
+    SimCamera blind(config, *bench, SimCamera::Picture::none);
+    for (int i = 1; i <= 300; ++i) world.step(i * kMs);
+    hal::Frame frame;
+    EXPECT_EQ(blind.next(frame, 0), hal::Status::ok);
+    EXPECT_EQ(camera.next(frame, 0), hal::Status::ok);
+    return std::vector<std::uint8_t>(frame.pixels, frame.pixels + frame.width * frame.height);
+  };
+  const std::vector<std::uint8_t> clean = picture(station());
+  const std::vector<std::uint8_t> disturbed = picture(failing(Failure::noise, 0));
+  ASSERT_EQ(clean.size(), disturbed.size());
+  double sum2 = 0;
+  int n = 0;
+  for (std::size_t i = 0; i < clean.size(); ++i) {
+    const int off = disturbed[i] - clean[i];
+    ASSERT_LE(std::abs(off), SimCamera::kInterference_grey);
+    if (clean[i] < 60 || clean[i] > 195) continue;  // nothing clips there
+    sum2 += 1.0 * off * off;
+    ++n;
+  }
+  ASSERT_GT(n, 10'000);
+  // Every whole number from -60 to 60 equally likely.
+  EXPECT_NEAR(sum2 / n, (121.0 * 121 - 1) / 12, 30);
+}
+
 TEST(SimCameraFailure, disconnect_says_so_and_time_goes_on) {
   const std::vector<Seen> seen = watch(failing(Failure::disconnect), 990);
   const auto gone = std::count_if(seen.begin(), seen.end(),

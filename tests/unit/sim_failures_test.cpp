@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <vector>
 
 #include "hal/sim/estop.hpp"
 #include "hal/sim/failures.hpp"
@@ -80,8 +81,8 @@ TEST(Failures, ALiveSwitchOverrulesTheSchedule) {
   EXPECT_EQ(stage(), Failure::freeze);
 }
 
-constexpr Failure kAll[] = {Failure::none, Failure::freeze,     Failure::drop,    Failure::delay,
-                            Failure::nan,  Failure::disconnect, Failure::saturate};
+constexpr Failure kAll[] = {Failure::none, Failure::freeze,     Failure::drop,     Failure::delay,
+                            Failure::nan,  Failure::disconnect, Failure::saturate, Failure::noise};
 
 // The status every device gives while it fails; no-number means a fault where there are only yes and no.
 Status expected(Failure f, bool yes_or_no) {
@@ -128,7 +129,8 @@ TEST(Failures, OfTheHandAreSeen) {
     const Status wrote = hand.write_force(Vec3(0, 2, 0));
     EXPECT_EQ(wrote, f == Failure::disconnect ? Status::disconnected : Status::ok);
     run(1, f);
-    const bool arrives = f == Failure::none || f == Failure::delay || f == Failure::nan;
+    const bool arrives =
+        f == Failure::none || f == Failure::delay || f == Failure::nan || f == Failure::noise;
     EXPECT_NEAR(hand.state().applied_N.y,
                 arrives                  ? 2
                 : f == Failure::saturate ? 0.85
@@ -311,6 +313,97 @@ TEST(Failures, OfTheForceSensorAreSeen) {
       EXPECT_EQ(seen, SimForceSensor::kFullScale_N);
     }
   }
+}
+
+// Mean and standard deviation of a reading while its device stands still and is disturbed.
+struct Spread {
+  double mean = 0, deviation = 0;
+};
+template <typename Read>
+Spread spread_of(Read read) {
+  constexpr int n = 4000;
+  std::vector<double> x;
+  for (int i = 0; i < n; ++i) x.push_back(read());
+  Spread s;
+  for (const double v : x) s.mean += v / n;
+  for (const double v : x) s.deviation += (v - s.mean) * (v - s.mean) / n;
+  s.deviation = std::sqrt(s.deviation);
+  return s;
+}
+
+TEST(Failures, NoiseIsAsLargeAsEachDeviceSays) {
+  std::int64_t t = 0;
+  constexpr double rough = 0.05;  // 4000 readings: 1.1 % standard error
+  HandParams handle;
+  SimHand hand(handle, {250, 6});
+  Vec3 before = Vec3::Zero();
+  int repeated = 0;
+  const Spread x = spread_of([&] {
+    hand.step(t += 1'000'000, 0.001, Vec3::Zero(), Vec3::Zero(), true, Failure::noise);
+    hal::HandState seen, again;
+    EXPECT_EQ(hand.read(seen), Status::ok);
+    EXPECT_EQ(hand.read(again), Status::ok);
+    EXPECT_EQ(seen.position_m, again.position_m);  // of one tick the same, however often it is read
+    if (seen.position_m == before) ++repeated;
+    before = seen.position_m;
+    return seen.position_m.y();
+  });
+  EXPECT_NEAR(x.deviation, 4 * handle.encoder_step_m, rough * 4 * handle.encoder_step_m);
+  EXPECT_LT(std::abs(x.mean), handle.encoder_step_m);
+  EXPECT_LT(repeated, 40);  // from tick to tick another
+  EXPECT_EQ(hand.state().position_m.y, 0);
+
+  StageParams params;
+  SimStage stage(params);
+  const Spread tip = spread_of([&] {
+    stage.step(t += 1'000'000, 0.001, true, Failure::noise);
+    hal::StageState seen;
+    EXPECT_EQ(stage.read(seen), Status::ok);
+    return seen.tip_m.x();
+  });
+  EXPECT_NEAR(tip.deviation, 4 * params.resolution_m, rough * 4 * params.resolution_m);
+  EXPECT_NEAR(tip.mean, params.start_m.x() + params.registration_m.x(), params.resolution_m);
+
+  SimVacuum pump(HolderParams{}, 1);
+  const Spread gauge = spread_of([&] {
+    double seen = 0;
+    pump.step(t += 1'000'000, 0.001, Failure::noise);
+    EXPECT_EQ(pump.read(seen), Status::ok);
+    return seen;
+  });
+  EXPECT_NEAR(gauge.deviation, SimVacuum::kInterference_Pa, rough * SimVacuum::kInterference_Pa);
+  EXPECT_EQ(pump.state().pressure_Pa, 600);
+
+  SimForceSensor sensor(ForceSensorParams{0, 0.001}, 1);
+  const Spread force = spread_of([&] {
+    double seen = 0;
+    sensor.step(t += 1'000'000, 0.001, 0, Failure::noise);
+    EXPECT_EQ(sensor.read(seen), Status::ok);
+    return seen;
+  });
+  EXPECT_NEAR(force.deviation, SimForceSensor::kInterference_N, rough * SimForceSensor::kInterference_N);
+
+  SimInjector valve(InjectorParams{0.005});
+  const Spread contact = spread_of([&] {
+    bool open = false;
+    valve.step(t += 1'000'000, 0.001, true, Failure::noise);
+    EXPECT_EQ(valve.read(open), Status::ok);
+    return open ? 1.0 : 0.0;
+  });
+  EXPECT_NEAR(contact.mean, 0.5, rough);
+  EXPECT_EQ(valve.state().opening, 0);
+
+  SimEstop chain{SimConfig{}};
+  double both = 0;
+  const Spread a = spread_of([&] {
+    hal::EstopState seen;
+    chain.step(t += 1'000'000, 0, 0.001, Failure::noise);
+    EXPECT_EQ(chain.read(seen), Status::ok);
+    both += !seen.contact_a_closed && !seen.contact_b_closed ? 1.0 / 4000 : 0;
+    return seen.contact_a_closed ? 1.0 : 0.0;
+  });
+  EXPECT_NEAR(a.mean, 0.5, rough);
+  EXPECT_NEAR(both, 0.25, rough);
 }
 
 TEST(SimForceSensor, IsAsNoisyAsTheSceneSays) {

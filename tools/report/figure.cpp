@@ -1,0 +1,274 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <fstream>
+#include <map>
+#include <thread>
+
+#include "tools/child.hpp"
+#include "tools/report/output.hpp"
+
+namespace punctum::report {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kPanelWidth = 620, kPanelHeight = 470, kKeyLine = 18;
+constexpr double kPatience_s = 120;
+
+// Told apart by people of all colour visions, and by their points.
+constexpr std::array<const char*, 9> kLines = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00",
+                                               "#56b4e9", "#7a4a1e", "#222222", "#8c8c00"};
+constexpr std::array<int, 9> kPoints = {7, 5, 9, 11, 13, 6, 4, 8, 10};
+constexpr std::array<const char*, 5> kCategories = {"#a8dba8", "#fbd178", "#c0392b", "#5b8db8", "#c8c8c8"};
+constexpr std::array<const char*, 4> kDashes = {"2", "4", "5", "3"};
+
+// gnuplot's own quoting: a quote is doubled.
+std::string quoted(const std::string& s) {
+  std::string out = "'";
+  for (const char c : s) {
+    if (c == '\'') out += c;
+    out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+  }
+  return out + "'";
+}
+
+bool drawable(double v, bool log) { return std::isfinite(v) && (!log || v > 0); }
+
+// A data block; a gap where a point cannot be drawn.
+std::string block(const std::string& name, const Series& s, const Panel& p) {
+  std::string data = name + " << EOD\n";
+  for (std::size_t i = 0; i < std::min(s.x.size(), s.y.size()); ++i)
+    data += drawable(s.x[i], p.log_x) && drawable(s.y[i], p.log_y)
+                ? fmt::format("{:.9g} {:.9g}\n", s.x[i], s.y[i])
+                : "\n";
+  return data + "EOD\n";
+}
+
+bool has_points(const Series& s, const Panel& p) {
+  for (std::size_t i = 0; i < std::min(s.x.size(), s.y.size()); ++i)
+    if (drawable(s.x[i], p.log_x) && drawable(s.y[i], p.log_y)) return true;
+  return false;
+}
+
+struct Edges {
+  double low = 0, high = 0;
+};
+
+// Each value's cell ends half-way to its neighbours.
+std::map<double, Edges> cells_of(std::vector<double> values, bool log) {
+  std::erase_if(values, [log](double v) { return !drawable(v, log); });
+  std::sort(values.begin(), values.end());
+  values.erase(std::unique(values.begin(), values.end()), values.end());
+  const auto to = [log](double v) { return log ? std::log(v) : v; };
+  const auto from = [log](double v) { return log ? std::exp(v) : v; };
+  std::map<double, Edges> cells;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const bool alone = values.size() == 1;
+    const double here = to(values[i]);
+    const double below = i > 0 ? to(values[i - 1]) : alone ? here - 1 : 2 * here - to(values[i + 1]);
+    const double above = i + 1 < values.size() ? to(values[i + 1]) : 2 * here - below;
+    cells[values[i]] = {from((here + below) / 2), from((here + above) / 2)};
+  }
+  return cells;
+}
+
+struct Box {
+  Edges x, y;
+  double value = 0;
+};
+
+// One box per cell; neighbours of one category in a row become one.
+std::vector<Box> boxes_of(const Map& map, const std::map<double, Edges>& x,
+                          const std::map<double, Edges>& y) {
+  std::map<std::pair<double, double>, double> grid;  // by row, then column
+  for (std::size_t i = 0; i < map.value.size(); ++i)
+    if (x.contains(map.x[i]) && y.contains(map.y[i]) && std::isfinite(map.value[i]))
+      grid[{map.y[i], map.x[i]}] = map.value[i];
+  std::vector<Box> boxes;
+  double row = 0;
+  for (const auto& [at, value] : grid) {
+    const Edges column = x.at(at.second), line = y.at(at.first);
+    const bool joins = !boxes.empty() && !map.categories.empty() && at.first == row &&
+                       boxes.back().value == value && boxes.back().x.high == column.low;
+    if (joins)
+      boxes.back().x.high = column.high;
+    else
+      boxes.push_back({column, line, value});
+    row = at.first;
+  }
+  return boxes;
+}
+
+std::string axis(const char* which, const std::string& label, bool log, double low, double high) {
+  std::string s = fmt::format("set {}label {} noenhanced\n", which, quoted(label));
+  if (!log) return s + fmt::format("set format {} '%g'\n", which);
+  s += fmt::format("set logscale {}\n", which);
+  // Within one decade powers of ten alone say too little.
+  return s + (high / low > 30 ? fmt::format("set format {} '10^{{%T}}'\n", which)
+                              : fmt::format("set format {} '%g'\n", which));
+}
+
+struct Range {
+  double low = std::numeric_limits<double>::infinity(), high = -std::numeric_limits<double>::infinity();
+  void take(double v, bool log) {
+    if (!drawable(v, log)) return;
+    low = std::min(low, v);
+    high = std::max(high, v);
+  }
+};
+
+std::string panel_script(const Panel& p, int index) {
+  std::string blocks, plots;
+  const auto plot = [&plots](const std::string& what) {
+    plots += (plots.empty() ? "plot " : ", \\\n  ") + what;
+  };
+  std::string set =
+      "reset\nset encoding utf8\nset grid lc rgb '#e4e4e4'\nset border lc rgb '#777777'\n"
+      "set tics textcolor rgb '#222222'\n"
+      "set key outside below center horizontal Left reverse samplen 2.5 noenhanced font ',11'\n";
+  set += fmt::format("set title {} noenhanced font ',13'\n", quoted(p.title));
+
+  Range x, y;
+  if (p.map) {
+    const auto columns = cells_of(p.map->x, p.log_x), lines = cells_of(p.map->y, p.log_y);
+    for (const auto& [at, e] : columns) x.take(e.low, false), x.take(e.high, false);
+    for (const auto& [at, e] : lines) y.take(e.low, false), y.take(e.high, false);
+    const auto boxes = boxes_of(*p.map, columns, lines);
+    const std::size_t categories = p.map->categories.size();
+    for (std::size_t c = 0; c < std::max<std::size_t>(1, categories); ++c) {
+      const std::string name = fmt::format("$m{}_{}", index, c);
+      std::string data;
+      for (const Box& b : boxes)
+        if (categories == 0 || b.value == static_cast<double>(c))
+          data += fmt::format("{:.9g} {:.9g} {:.9g} {:.9g} {:.9g} {:.9g} {:.9g}\n", b.x.low, b.y.low, b.x.low,
+                              b.x.high, b.y.low, b.y.high, b.value);
+      if (data.empty()) continue;
+      blocks += name + " << EOD\n" + data + "EOD\n";
+      if (categories > 0)
+        plot(fmt::format(
+            "{} using 1:2:3:4:5:6 with boxxyerror fillcolor rgb '{}' fillstyle solid noborder title {}", name,
+            kCategories[c % kCategories.size()], quoted(p.map->categories[c])));
+      else
+        plot(fmt::format(
+            "{} using 1:2:3:4:5:6:7 with boxxyerror fillcolor palette fillstyle solid noborder notitle",
+            name));
+    }
+    if (categories == 0) {
+      set += fmt::format(
+          "set palette defined (0 '#30224d', 1 '#31688e', 2 '#35b779', 3 '#fde725')\nset cblabel {} "
+          "noenhanced\n",
+          quoted(p.map->value_label));
+      if (p.map->log_value) set += "set logscale cb\nset format cb '10^{%T}'\n";
+    }
+    set += fmt::format("set xrange [{:.9g}:{:.9g}]\nset yrange [{:.9g}:{:.9g}]\nset grid front\n", x.low,
+                       x.high, y.low, y.high);
+  }
+
+  std::size_t colour = 0, dash = 0, id = 0;
+  for (const Series& s : p.series) {
+    for (const double v : s.x) x.take(v, p.log_x);
+    for (const double v : s.y) y.take(v, p.log_y);
+    if (!has_points(s, p)) continue;
+    const std::string name = fmt::format("$s{}_{}", index, id++);
+    blocks += block(name, s, p);
+    const std::string title = s.name.empty() ? "notitle" : "title " + quoted(s.name);
+    std::string look;
+    const std::size_t c = colour % kLines.size();
+    switch (s.style) {
+      case Style::limit:
+        look = fmt::format("lines dashtype {} lw 1.6 lc rgb '#444444'", kDashes[dash++ % kDashes.size()]);
+        break;
+      case Style::front:
+        look = "lines lw 8 lc rgb '#dcdcdc'";
+        break;
+      case Style::points:
+        look = fmt::format("points pt {} ps 0.7 lc rgb '{}'", kPoints[c], kLines[c]);
+        ++colour;
+        break;
+      case Style::line_points:
+        look = fmt::format("linespoints pt {} ps 0.8 lw 1.6 lc rgb '{}'", kPoints[c], kLines[c]);
+        ++colour;
+        break;
+      case Style::line:
+        look = fmt::format("lines lw 1.8 lc rgb '{}'", kLines[c]);
+        ++colour;
+        break;
+    }
+    plot(fmt::format("{} with {} {}", name, look, title));
+  }
+  for (const Mark& m : p.marks) {
+    if (!drawable(m.x, p.log_x) || !drawable(m.y, p.log_y)) continue;
+    x.take(m.x, p.log_x);
+    y.take(m.y, p.log_y);
+    const std::string name = fmt::format("$k{}_{}", index, id++);
+    blocks += fmt::format("{} << EOD\n{:.9g} {:.9g}\nEOD\n", name, m.x, m.y);
+    plot(fmt::format("{} with points pt 6 ps 2.2 lw 2.2 lc rgb '#000000' notitle", name));
+    if (!m.label.empty())
+      set +=
+          fmt::format("set label {} at {:.9g},{:.9g} left offset char 1.2,0.9 front noenhanced font ',11'\n",
+                      quoted(m.label), m.x, m.y);
+  }
+  set += axis("x", p.x_label, p.log_x, x.low, x.high) + axis("y", p.y_label, p.log_y, y.low, y.high);
+  if (plots.empty()) {  // the panel says so itself
+    set +=
+        "set label 'nothing could be drawn' at graph 0.5,0.5 center\nset xrange [0:1]\nset yrange "
+        "[0:1]\nunset logscale\n";
+    plots = "plot NaN notitle";
+  }
+  return blocks + set + plots + "\n";
+}
+
+}  // namespace
+
+std::string gnuplot_script(const Figure& figure, const fs::path& svg) {
+  const int panels = static_cast<int>(figure.panels.size());
+  const int columns = std::clamp(figure.columns, 1, std::max(panels, 1));
+  const int rows = (panels + columns - 1) / columns;
+  std::size_t most = 0;
+  for (const Panel& p : figure.panels)
+    most = std::max(most, p.series.size() + (p.map ? p.map->categories.size() : 0));
+  const int height = rows * (kPanelHeight + kKeyLine * static_cast<int>(most / 3));
+  std::string s = fmt::format(
+      "set terminal svg size {},{} enhanced font 'sans-serif,12' name '{}' background rgb 'white'\nset "
+      "output {}\n"
+      "set multiplot layout {},{}\n",
+      columns * kPanelWidth, height, figure.name, quoted(svg.string()), rows, columns);
+  for (int i = 0; i < panels; ++i) s += panel_script(figure.panels[static_cast<std::size_t>(i)], i);
+  return s + "unset multiplot\nset output\n";
+}
+
+tl::expected<void, std::string> draw(const Figure& figure, const fs::path& out) {
+  const fs::path svg = out / (figure.name + ".svg"), script = out / (figure.name + ".gp"),
+                 log = out / (figure.name + ".log");
+  std::error_code ec;
+  fs::remove(svg, ec);
+  fs::remove(log, ec);
+  if (figure.panels.empty()) return tl::unexpected(figure.name + ": a figure without panels");
+  if (tools::find_program("gnuplot").empty())
+    return tl::unexpected(std::string("gnuplot is not installed (package gnuplot-nox)"));
+  std::ofstream file(script);
+  file << gnuplot_script(figure, svg);
+  if (!file.flush()) return tl::unexpected(script.string() + ": cannot be written");
+  file.close();
+  auto gnuplot = tools::Child::start("gnuplot", {script.string()}, log.string());
+  if (!gnuplot) return tl::unexpected(gnuplot.error());
+  tools::Ended how;
+  const auto limit = std::chrono::steady_clock::now() + std::chrono::duration<double>(kPatience_s);
+  while (!gnuplot->ended(how)) {
+    if (std::chrono::steady_clock::now() > limit)
+      return tl::unexpected(
+          fmt::format("gnuplot: not ready with {} after {} s", script.string(), kPatience_s));
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  if (!how.exited || how.code != 0 || !fs::exists(svg, ec))
+    return tl::unexpected(
+        fmt::format("gnuplot {}: {}, {}", script.string(), how.text(), tools::last_line(log.string())));
+  fs::remove(script, ec);
+  fs::remove(log, ec);
+  return {};
+}
+
+}  // namespace punctum::report

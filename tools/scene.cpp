@@ -439,8 +439,10 @@ std::string override_document(std::string_view text) {
   return key + " = " + value + "\n";
 }
 
-// Two numbers that only follow from others.
+// Numbers that only follow from others.
 void settle(Scene& s) {
+  const auto& hand = s.sim->hand;
+  s.servo.device = {hand.mass_kg, hand.damping_Ns_m, hand.encoder_step_m, hand.force_max_N, hand.delay_ticks};
   s.servo.vision = s.vision.has_value();
   s.sim->position_scale = s.servo.mapping.position_scale;
   s.sim->cells = s.servo.cells;

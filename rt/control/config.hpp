@@ -52,6 +52,15 @@ struct VelocityParams {
   double smooth_s = 0.003;  // first-order low-pass behind it: one encoder count is no click; 0 = off
 };
 
+// The haptic device as the core knows it: what can be rendered follows from it.
+struct HandDevice {
+  double mass_kg = 0.075;
+  double damping_Ns_m = 0.1;
+  double encoder_step_m = 0.03e-3;
+  double force_max_N = 8.5;
+  int delay_ticks = 0;  // 0 .. 5: a force acts this many ticks after it is written
+};
+
 struct MappingParams {
   double position_scale = 500;    // k_p: hand metres per needle metre
   double force_scale = 1e5;       // k_f: hand newtons per needle newton
@@ -127,6 +136,7 @@ struct ServoConfig {
   int cells = 1;                  // to inject; 0 = until the time limit
   bool vision = true;             // observations are expected
 
+  HandDevice device;
   VelocityParams velocity;
   MappingParams mapping;
   LimitParams limits;

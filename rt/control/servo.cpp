@@ -25,13 +25,6 @@ constexpr int kCommandsPerTick = 8;
 }
 [[nodiscard]] bool is_unit(const hal::Vec3& v) noexcept { return std::abs(v.squaredNorm() - 1) < 1e-3; }
 
-// The window is meant in time: as many intervals more as the rate is higher.
-[[nodiscard]] VelocityParams at_rate(VelocityParams params, double rate_Hz) noexcept {
-  const double intervals = params.window * std::max(rate_Hz / 1000, 1.0);
-  params.window = static_cast<int>(std::min(intervals, static_cast<double>(Foaw::kMaxWindow)));
-  return params;
-}
-
 [[nodiscard]] Fault first_of(Fault a, Fault b) noexcept { return a != Fault::none ? a : b; }
 
 void copy(double (&to)[3], const hal::Vec3& from) noexcept {

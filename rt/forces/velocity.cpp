@@ -10,6 +10,12 @@ constexpr double kRoundingSlack = 1 + 1e-9;  // a sample exactly one encoder ste
 
 }  // namespace
 
+VelocityParams at_rate(VelocityParams params, double rate_Hz) noexcept {
+  const double intervals = params.window * std::max(rate_Hz / 1000, 1.0);
+  params.window = static_cast<int>(std::min(intervals, static_cast<double>(Foaw::kMaxWindow)));
+  return params;
+}
+
 Foaw::Foaw(const VelocityParams& params) noexcept
     : window_(std::clamp(params.window, 1, kMaxWindow)), d_m_(params.d_m * kRoundingSlack) {}
 

@@ -14,6 +14,9 @@
 
 namespace punctum::rt {
 
+// The window is meant in time: as many intervals more as the rate is above 1 kHz.
+[[nodiscard]] VelocityParams at_rate(VelocityParams params, double rate_Hz) noexcept;
+
 class Foaw {
  public:
   static constexpr int kMaxWindow = 64;

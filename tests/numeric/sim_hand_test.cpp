@@ -178,6 +178,20 @@ TEST(SimHand, GivesNoMoreForceThanItsMotorsCan) {
   EXPECT_NEAR(hand.state().work_J, 0.5 * 0.075 * std::pow(8.5 / 0.075 * 0.001, 2), 1e-12);
 }
 
+TEST(SimHand, GivesAForceSoManyTicksLateAsItsDelay) {
+  for (int delay = 0; delay <= kMaxDelayTicks; ++delay) {
+    HandParams p;
+    p.delay_ticks = delay;
+    SimHand hand(p, kNoArm);
+    for (int k = 0; k < 12; ++k) {
+      const double wanted = k + 1;  // written before step k: acts over step k + delay
+      ASSERT_EQ(hand.write_force(Vec3(0.1 * wanted, 0, 0)), hal::Status::ok);
+      hand.step(1'000'000 * (k + 1), 0.001, Vec3::Zero(), Vec3::Zero(), true, Failure::none);
+      EXPECT_EQ(hand.state().applied_N.x, k >= delay ? 0.1 * (wanted - delay) : 0.0) << delay << " ticks";
+    }
+  }
+}
+
 TEST(SimHand, GivesNoForceWithoutPower) {
   HandParams p;
   SimHand hand(p, kNoArm);

@@ -103,7 +103,8 @@ std::vector<Box> boxes_of(const Map& map, const std::map<double, Edges>& x,
 }
 
 std::string axis(const char* which, const std::string& label, bool log, double low, double high) {
-  std::string s = fmt::format("set {}label {} noenhanced\n", which, quoted(label));
+  std::string s = fmt::format("set {}label {} noenhanced{}\n", which, quoted(label),
+                              which[0] == 'x' ? " offset 0,0.4" : "");
   if (!log) return s + fmt::format("set format {} '%g'\n", which);
   s += fmt::format("set logscale {}\n", which);
   // Within one decade powers of ten alone say too little.
@@ -128,7 +129,7 @@ std::string panel_script(const Panel& p, int index) {
   std::string set =
       "reset\nset encoding utf8\nset grid lc rgb '#e4e4e4'\nset border lc rgb '#777777'\n"
       "set tics textcolor rgb '#222222'\n"
-      "set key outside below center horizontal Left reverse samplen 2.5 noenhanced font ',11'\n";
+      "set key outside below center horizontal Left reverse samplen 2.5 noenhanced font ',11' title ' '\n";
   set += fmt::format("set title {} noenhanced font ',13'\n", quoted(p.title));
 
   Range x, y;
@@ -167,6 +168,9 @@ std::string panel_script(const Panel& p, int index) {
                        x.high, y.low, y.high);
   }
 
+  // Over a scale of colours, which is dark in places.
+  const bool on_scale = p.map && p.map->categories.empty();
+  const char* const ink = on_scale ? "#ffffff" : "#000000";
   std::size_t colour = 0, dash = 0, id = 0;
   for (const Series& s : p.series) {
     for (const double v : s.x) x.take(v, p.log_x);
@@ -179,7 +183,8 @@ std::string panel_script(const Panel& p, int index) {
     const std::size_t c = colour % kLines.size();
     switch (s.style) {
       case Style::limit:
-        look = fmt::format("lines dashtype {} lw 1.6 lc rgb '#444444'", kDashes[dash++ % kDashes.size()]);
+        look = fmt::format("lines dashtype {} lw 1.6 lc rgb '{}'", kDashes[dash++ % kDashes.size()],
+                           on_scale ? "#b8b8b8" : "#444444");
         break;
       case Style::front:
         look = "lines lw 8 lc rgb '#dcdcdc'";
@@ -205,11 +210,12 @@ std::string panel_script(const Panel& p, int index) {
     y.take(m.y, p.log_y);
     const std::string name = fmt::format("$k{}_{}", index, id++);
     blocks += fmt::format("{} << EOD\n{:.9g} {:.9g}\nEOD\n", name, m.x, m.y);
-    plot(fmt::format("{} with points pt 6 ps 2.2 lw 2.2 lc rgb '#000000' notitle", name));
+    plot(fmt::format("{} with points pt 6 ps 2.2 lw 2.2 lc rgb '{}' notitle", name, ink));
     if (!m.label.empty())
-      set +=
-          fmt::format("set label {} at {:.9g},{:.9g} left offset char 1.2,0.9 front noenhanced font ',11'\n",
-                      quoted(m.label), m.x, m.y);
+      set += fmt::format(
+          "set label {} at {:.9g},{:.9g} left offset char 1.2,0.9 front noenhanced font ',11' textcolor rgb "
+          "'{}'\n",
+          quoted(m.label), m.x, m.y, ink);
   }
   set += axis("x", p.x_label, p.log_x, x.low, x.high) + axis("y", p.y_label, p.log_y, y.low, y.high);
   if (plots.empty()) {  // the panel says so itself
@@ -230,7 +236,7 @@ std::string gnuplot_script(const Figure& figure, const fs::path& svg) {
   std::size_t most = 0;
   for (const Panel& p : figure.panels)
     most = std::max(most, p.series.size() + (p.map ? p.map->categories.size() : 0));
-  const int height = rows * (kPanelHeight + kKeyLine * static_cast<int>(most / 3));
+  const int height = rows * (kPanelHeight + kKeyLine * static_cast<int>(most / 2));
   std::string s = fmt::format(
       "set terminal svg size {},{} enhanced font 'sans-serif,12' name '{}' background rgb 'white'\nset "
       "output {}\n"
@@ -263,9 +269,11 @@ tl::expected<void, std::string> draw(const Figure& figure, const fs::path& out) 
           fmt::format("gnuplot: not ready with {} after {} s", script.string(), kPatience_s));
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
-  if (!how.exited || how.code != 0 || !fs::exists(svg, ec))
+  if (!how.exited || how.code != 0 || !fs::exists(svg, ec)) {
+    fs::remove(svg, ec);
     return tl::unexpected(
         fmt::format("gnuplot {}: {}, {}", script.string(), how.text(), tools::last_line(log.string())));
+  }
   fs::remove(script, ec);
   fs::remove(log, ec);
   return {};

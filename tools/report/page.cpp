@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <fstream>
 #include <iterator>
+#include <numeric>
 
 #include "tools/report/output.hpp"
 
@@ -32,15 +33,19 @@ std::string table_html(const Table& t) {
   for (std::size_t i = 0; i < t.columns.size(); ++i)
     if (t.shown.empty() || std::find(t.shown.begin(), t.shown.end(), t.columns[i]) != t.shown.end())
       columns.push_back(i);
-  const std::size_t rows = t.rows.size() <= kShortTable ? t.rows.size() : kRowsOfLong;
+  std::vector<std::size_t> rows = t.shown_rows;
+  if (rows.empty() || t.rows.size() <= kShortTable) {
+    rows.resize(t.rows.size() <= kShortTable ? t.rows.size() : kRowsOfLong);
+    std::iota(rows.begin(), rows.end(), std::size_t{0});
+  }
   std::string what = t.name + ".csv";
-  if (rows < t.rows.size()) what += fmt::format(", the first {} of {} rows", rows, t.rows.size());
+  if (rows.size() < t.rows.size()) what += fmt::format(", {} of {} rows", rows.size(), t.rows.size());
   if (columns.size() < t.columns.size())
     what += fmt::format(", {} of {} columns", columns.size(), t.columns.size());
   std::string s = "<div class=\"wide\"><table><caption>" + escaped(what) + "</caption>\n<tr>";
   for (const std::size_t c : columns) s += "<th>" + escaped(t.columns[c]) + "</th>";
   s += "</tr>\n";
-  for (std::size_t r = 0; r < rows; ++r) {
+  for (const std::size_t r : rows) {
     s += "<tr>";
     for (const std::size_t c : columns) {
       const Cell& cell = t.rows[r][c];

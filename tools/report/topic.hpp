@@ -44,13 +44,14 @@ class Cell {
 };
 using Row = std::vector<Cell>;
 
-// Becomes NAME.csv, with where it was measured in its last columns. `shown`: the columns that index.html
-// shows (empty: all).
+// Becomes NAME.csv, with where it was measured in its last columns.
 struct Table {
   std::string name{};
   std::vector<std::string> columns{};  // unit in the name: t_s, force_N
   std::vector<Row> rows{};
+  // What index.html shows of it. Empty: all columns; all rows, or the first ones of many.
   std::vector<std::string> shown{};
+  std::vector<std::size_t> shown_rows{};
   void add(Row row);  // throws std::logic_error when it does not fit the columns
 };
 

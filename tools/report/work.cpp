@@ -85,9 +85,11 @@ Table work_table(const std::string& name, const std::string& error_column, std::
   t.columns.insert(t.columns.end(), {"on_front", "shipped"});
   t.shown = {"method", "knob", error_column, "median_ns", "p99_9_ns", "on_front", "shipped"};
   for (const Work& w : works) {
+    const bool good = better_than(w, works) == nullptr;
+    if (good || w.shipped) t.shown_rows.push_back(t.rows.size());
     Row row{w.method, w.knob, w.error};
     for (const auto& c : time_cells(w.time)) row.push_back(c);
-    row.emplace_back(better_than(w, works) == nullptr);
+    row.emplace_back(good);
     row.emplace_back(w.shipped);
     t.add(std::move(row));
   }
@@ -108,7 +110,11 @@ Panel work_precision(const std::string& title, const std::string& error_label, s
     fastest = std::min(fastest, std::max(w.time.median_ns, 0.1));
     slowest = std::max(slowest, w.time.median_ns);
   }
+  for (const Limit& l : limits)
+    if (l.error > 0) smallest = std::min(smallest, l.error);
   const double edge = std::isfinite(smallest) ? smallest / 10 : 1e-17;
+  if (std::any_of(works.begin(), works.end(), [](const Work& w) { return w.error == 0; }))
+    p.y_label += " (0: at the lower edge)";
   const auto x = [](const Work& w) { return std::max(w.time.median_ns, 0.1); };
   const auto y = [edge](const Work& w) { return w.error > 0 ? w.error : edge; };
 

@@ -4,8 +4,18 @@
 
 namespace punctum::report {
 
+#ifdef PUNCTUM_VISION
+Result run_vision(const Job&);
+Result run_surface(const Job&);
+#endif
+
 std::span<const Topic> topics() {
-  static const std::vector<Topic> list = {};
+  static const std::vector<Topic> list = {
+#ifdef PUNCTUM_VISION
+      {"vision", "contours, tip, dimple and force as seen in pictures whose truth is known", run_vision},
+      {"surface", "descriptions of the indented cell's surface", run_surface},
+#endif
+  };
   return list;
 }
 

@@ -192,7 +192,7 @@ void ObservationCsv::row(const vision::Result& r, const vision::VisionConfig& co
   row.number(r.noise, 2);
   for (const double us : {r.us.prepare, r.us.holder, r.us.needle, r.us.erase, r.us.start, r.us.outer,
                           r.us.inner, r.us.contact, r.us.measure}) {
-    row.number(us, 0);
+    row.number(when(us > 0, us), 0);  // empty: the stage did not run
   }
   if (with_truth_) {
     const TruthError none;

@@ -244,9 +244,7 @@ StartedMembranes tell_apart(const MainEdge& found, const ClearedPicture& picture
     return out;
   }
   const double mean = median_of(r1);
-  const SecondEdge in = find_second(r1, centre, main.polarity, false, picture, config);
   const SecondEdge beyond = find_second(r1, centre, main.polarity, true, picture, config);
-  const bool good_in = clear_enough(in, main.path.level, picture);
   const bool good_out = clear_enough(beyond, main.path.level, picture);
   const auto begin = [&centre](const auto& edge) {
     return begun(centre, edge.path.r, edge.polarity, edge.path.level);
@@ -256,6 +254,8 @@ StartedMembranes tell_apart(const MainEdge& found, const ClearedPicture& picture
     out.outer = good_out && beyond.path.level > 0.5 * main.path.level ? begin(beyond) : middle;
     return out;
   }
+  const SecondEdge in = find_second(r1, centre, main.polarity, false, picture, config);
+  const bool good_in = clear_enough(in, main.path.level, picture);
   // Two flanks of one dark line belong to one membrane.
   const auto flank = [&](const SecondEdge& x) {
     return main.polarity != Polarity::any && x.polarity != Polarity::any && x.polarity != main.polarity &&

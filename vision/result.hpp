@@ -13,17 +13,17 @@
 
 namespace punctum::vision {
 
-// Microseconds spent on one frame, stage by stage.
+// Microseconds spent on one frame, stage by stage; 0: the stage did not run.
 struct StageTimes {
   double prepare = 0;  // noise, smoothing, Sobel
   double holder = 0;
   double needle = 0;
   double erase = 0;  // polygons, impurities
-  double start = 0;  // Hough transform and first contours; 0 while following
+  double start = 0;  // Hough transform and first contours; not while following
   double outer = 0;
   double inner = 0;
-  double contact = 0;  // contact points, dilation, labelling, puncture
-  double measure = 0;  // w_d, a, R
+  double contact = 0;  // contact points, dilation, labelling; not far from the cell
+  double measure = 0;  // undeformed shape, R, gap
   double total = 0;
 };
 

@@ -73,7 +73,8 @@ struct Tracker::Impl {
   void follow_membranes(Stopwatch& watch);
   [[nodiscard]] Surroundings surroundings() const;
   void measure();
-  void classify_contact();
+  [[nodiscard]] std::optional<double> look_for_contact();
+  void classify_contact(const std::optional<double>& membrane_behind_tip);
   void decide_phase();
 };
 
@@ -107,25 +108,36 @@ const Result& Tracker::Impl::process(const hal::Frame& frame) {
   picture.take_gradient(area_to_search(starting));
   result.us.prepare = watch.lap_us();
 
-  locate_needle();
-  result.us.needle = watch.lap_us();
-  locate_holder();
-  result.us.holder = watch.lap_us();
+  if (config.needle) {
+    locate_needle();
+    result.us.needle = watch.lap_us();
+  }
+  picture.holder_face.reset();
+  if (config.holder) {
+    locate_holder();
+    result.us.holder = watch.lap_us();
+  }
 
   // At the start a needle inside the cell must not split it: what shines beside its walls is covered as well.
   clear_picture(kNeedleMargin_px + (starting ? 0.7 * result.needle.half_width : 0));
   result.us.erase = watch.lap_us();
 
   const bool found = !starting || start();
-  result.us.start = starting ? watch.lap_us() : 0;
+  if (starting) {
+    result.us.start = watch.lap_us();
+  }
   if (found) {
     follow_membranes(watch);
     measure();
     result.us.measure = watch.lap_us();
-    classify_contact();
-    result.us.contact = watch.lap_us();
-    const bool away = !result.gap_px || *result.gap_px > kUntouched_px;
-    if (result.needle.ok && !result.contact && away) {
+    const bool untouched = result.gap_px && *result.gap_px > kUntouched_px;
+    std::optional<double> membrane_behind_tip;
+    if (result.needle.ok && result.outer.ok && !untouched) {
+      membrane_behind_tip = look_for_contact();
+      result.us.contact = watch.lap_us();
+    }
+    classify_contact(membrane_behind_tip);
+    if (result.needle.ok && !result.contact && (untouched || !result.gap_px)) {
       needle.learn(picture.field, result.needle, picture.noise);
     }
   } else {
@@ -157,9 +169,6 @@ cv::Rect Tracker::Impl::area_to_search(bool starting) const {
 }
 
 void Tracker::Impl::locate_needle() {
-  if (!config.needle) {
-    return;
-  }
   if (!needle.started()) {
     (void)needle.start(picture.field, picture.noise);
   }
@@ -171,10 +180,6 @@ void Tracker::Impl::locate_needle() {
 }
 
 void Tracker::Impl::locate_holder() {
-  picture.holder_face.reset();
-  if (!config.holder) {
-    return;
-  }
   if (!holder_tube && picture.field.area.width == width && holder_tries++ % kHolderEvery == 0) {
     // It comes from the border opposite to the needle.
     const Side known = config.needle && needle.started() ? needle.side() : config.needle_from;
@@ -266,8 +271,8 @@ void Tracker::Impl::follow_membranes(Stopwatch& watch) {
     around_inner.outermost = false;
     around_inner.around = outer_seen ? &outer : nullptr;
     result.inner = follow(inner, picture, config, around_inner);
+    result.us.inner = watch.lap_us();
   }
-  result.us.inner = watch.lap_us();
 }
 
 // The undeformed membrane, and how far from it the tip is.
@@ -326,26 +331,29 @@ void Tracker::Impl::measure() {
       std::hypot(kTipNoise_px, 3 * result.outer.residual_px / std::sqrt(std::max(fitted, 1)));
 }
 
-void Tracker::Impl::classify_contact() {
-  const NeedleFix& n = result.needle;
+// In the picture: do needle and cell touch, and where is the membrane on the needle?
+std::optional<double> Tracker::Impl::look_for_contact() {
+  // The paper's test: needle and cell are two classes until they merge.
+  const Contour& contour = result.outer.contour;
+  result.merged = needle_merges_with_cell(picture, result.needle, contour, config.dilation_px);
+  result.contact = touches(result.gap_px, result.merged, was_contact);
+  const MembraneOnNeedle on_needle =
+      membrane_on_needle(picture, result.needle, contour, outer.polarity, outer.level);
+  result.points = on_needle.points;
+  return on_needle.behind_tip;
+}
+
+void Tracker::Impl::classify_contact(const std::optional<double>& membrane_behind_tip) {
   PunctureInput in;
   in.t_ns = result.exposure_ns;
+  in.contact = result.contact;
   in.gap_px = result.gap_px.value_or(0);
-  in.radius_px = n.half_width;
-  if (n.ok && result.outer.ok) {
-    // The paper's test: needle and cell are two classes until they merge.
-    const Contour& contour = result.outer.contour;
-    result.merged = needle_merges_with_cell(picture, n, contour, config.dilation_px);
-    result.contact = touches(result.gap_px, result.merged, was_contact);
-    const MembraneOnNeedle on_needle = membrane_on_needle(picture, n, contour, outer.polarity, outer.level);
-    result.points = on_needle.points;
-    in.contact = result.contact;
-    in.points = on_needle.behind_tip && result.entry;
-    if (in.points) {
-      in.tip_px = -in.gap_px;
-      in.membrane_px = in.tip_px - *on_needle.behind_tip;
-      in.depth_px = in.membrane_px;
-    }
+  in.radius_px = result.needle.half_width;
+  in.points = membrane_behind_tip && result.entry;
+  if (in.points) {
+    in.tip_px = -in.gap_px;
+    in.membrane_px = in.tip_px - *membrane_behind_tip;
+    in.depth_px = in.membrane_px;
   }
   result.punctured = puncture.update(in);
   result.membrane_velocity_px_s = puncture.membrane_velocity_px_s();
@@ -359,7 +367,7 @@ void Tracker::Impl::classify_contact() {
   result.wd_px = result.contact ? std::max(0.0, depth) : 0.0;
   if (*result.wd_px > kLeastDimple_px) {
     result.a_px = dimple_half_width(result.outer.contour, *undeformed.shape(), *result.entry, *result.wd_px,
-                                    n.half_width);
+                                    result.needle.half_width);
   }
 }
 

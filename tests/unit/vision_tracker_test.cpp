@@ -162,6 +162,40 @@ TEST(Tracker, FollowsAWholeInjectionAndSaysTheTruth) {
                                         Phase::withdrawal, Phase::clear}));
 }
 
+// A stage that did not run took no time at all.
+TEST(Tracker, WhatASceneDoesNotNeedIsNotLookedFor) {
+  const double surface = kCentre.x + kR;
+  VisionConfig everything, outer_only, no_holder;
+  outer_only.inner = false;
+  no_holder.holder.reset();
+  for (const VisionConfig& config : {everything, outer_only, no_holder}) {
+    Tracker tracker(config, kW, kH);
+    for (std::uint64_t n = 0; n < 4; ++n) {
+      const Result& r = tracker.process(frame_of(draw({surface - 4, 4, 2, 1}), n));
+      ASSERT_TRUE(r.outer.ok && r.needle.ok) << r.verdict;
+      EXPECT_EQ(r.us.holder > 0, config.holder.has_value());
+      EXPECT_EQ(r.us.inner > 0, config.inner);
+      EXPECT_EQ(!r.inner.contour.empty(), config.inner);
+      EXPECT_EQ(r.us.start > 0, n == 0);
+      EXPECT_GT(r.us.outer, 0);
+      EXPECT_GT(r.us.contact, 0);
+    }
+  }
+}
+
+TEST(Tracker, FarFromTheCellTheContactStagesDoNotRun) {
+  const double surface = kCentre.x + kR;
+  Tracker tracker(VisionConfig{}, kW, kH);
+  std::uint64_t n = 0;
+  for (const double gap : {26.0, 21.0, 16.0, 9.0, 4.0, 9.0, 16.0}) {
+    const Result& r = tracker.process(frame_of(draw({surface + gap, 0, 2, 1}), n++));
+    ASSERT_TRUE(r.outer.ok && r.gap_px) << r.verdict;
+    EXPECT_EQ(r.us.contact > 0, gap < 10) << gap;
+    EXPECT_EQ(r.points.point[0] || r.points.point[1], gap < 10) << gap;
+    EXPECT_FALSE(r.contact) << gap;
+  }
+}
+
 TEST(Tracker, WithdrawingWithoutAPunctureIsNone) {
   Tracker tracker({}, kW, kH);
   const double surface = kCentre.x + kR;

@@ -31,6 +31,7 @@ struct Chord {
   double depth = 0;            // from the entry to m, along b
   double half = 0;             // half length of the chord
   Vec3 normal = Vec3::Zero();  // inward, unit, at the entry
+  Vec3 push = Vec3::Zero();    // gradient of the depth along the normal: what a force upon it acts along
 };
 Chord chord(const Vec3& m, const Vec3& b, double R) noexcept {
   Chord c;
@@ -42,6 +43,7 @@ Chord chord(const Vec3& m, const Vec3& b, double R) noexcept {
   c.half = std::sqrt(rest);
   c.depth = along + c.half;
   c.normal = (c.half * b - across) / R;
+  c.push = c.normal - (c.depth / (c.half * R)) * across;  // of (along + half) half / R, the axis held
   return c;
 }
 
@@ -299,12 +301,12 @@ CellForce Cell::step(CellState& state, const TipMotion& motion, double dt_s) con
 
   if (!state.outer.punctured) {
     out.outer_N = full * outer_table_->force(outer_w) * outer_Eh_ * R_m_;
-    out.force_N -= out.outer_N * p.outer.normal;
+    out.force_N -= out.outer_N * p.outer.push;
   }
   if (params_.inner && !state.inner.punctured && p.inner.hit && p.inner_normal_depth > 0 &&
       p.inner_normal_depth >= state.inner.dimple_m) {
     out.inner_N = full * inner_table_->force(p.inner_normal_depth / R_inner_m_) * inner_Eh_ * R_inner_m_;
-    out.force_N -= out.inner_N * p.inner.normal;
+    out.force_N -= out.inner_N * p.inner.push;
   }
   out.membrane_N = -out.force_N.dot(p.axis);
   if (state.outer.punctured && dt_s > 0) {

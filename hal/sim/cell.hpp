@@ -1,8 +1,9 @@
 // The simulated cell: zona (outer) and inner membrane as concentric elastic spheres, held by suction.
 //
 // Quasi-static membranes from MembraneTruth, recoil integrated exactly, contact and punctures located inside
-// the step. Off-centre contact: the axisymmetric law acts along the local normal at the entry point, with the
-// depth's component along it; needle and normal differ by a few degrees. World frame, SI units. The
+// the step. Off-centre contact: the axisymmetric law with the depth's component along the local normal at the
+// entry point; the force is its gradient, so that an intact membrane gives back the work done on it. Needle
+// and normal differ by a few degrees. World frame, SI units. The
 // constructor solves the tables (allocates); everything else is real-time safe and deterministic.
 #pragma once
 

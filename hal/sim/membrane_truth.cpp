@@ -533,7 +533,6 @@ MembraneTruth::MembraneTruth(const MembraneShape& wanted, int intervals) : shape
   force_.y.push_back(0);
   pressure_.y.push_back(2 * T0 / (1 + shape_.prestrain));
   strain_.y.push_back(shape_.prestrain);
-  energy_.y.push_back(0);
   tip_tension_.y.push_back(T0);
   half_width_.y.push_back(0);  // replaced by the limit below
   rim_radius_.y.push_back(shape_.c_over_R);
@@ -560,7 +559,6 @@ MembraneTruth::MembraneTruth(const MembraneShape& wanted, int intervals) : shape
     force_.y.push_back(x.force);
     pressure_.y.push_back(x.pressure);
     strain_.y.push_back(std::max(x.strain, strain_.y.back()));
-    energy_.y.push_back(x.energy);
     tip_tension_.y.push_back(x.tip_tension);
     half_width_.y.push_back(x.half_width);
     rim_radius_.y.push_back(x.rim_radius);
@@ -571,9 +569,11 @@ MembraneTruth::MembraneTruth(const MembraneShape& wanted, int intervals) : shape
     half_width_.y[0] = half_width_.y[1] - (half_width_.y[2] - half_width_.y[1]) * w_[1] / (w_[2] - w_[1]);
   }
   for (Curve* curve :
-       {&force_, &pressure_, &strain_, &energy_, &tip_tension_, &half_width_, &rim_radius_, &rim_depth_}) {
+       {&force_, &pressure_, &strain_, &tip_tension_, &half_width_, &rim_radius_, &rim_depth_}) {
     curve->slope = monotone_slopes(w_, curve->y);
   }
+  work_.push_back(0);
+  for (std::size_t i = 0; i + 1 < w_.size(); ++i) work_.push_back(work_[i] + work_within(i, w_[i + 1]));
   // Slopes of the profile over depth: parabola through three depths.
   row_slopes_.resize(rows_.size());
   const std::size_t depths = w_.size();
@@ -610,7 +610,26 @@ double MembraneTruth::at(const Curve& curve, double w) const noexcept {
 double MembraneTruth::force(double w) const noexcept { return at(force_, w); }
 double MembraneTruth::pressure(double w) const noexcept { return at(pressure_, w); }
 double MembraneTruth::strain(double w) const noexcept { return at(strain_, w); }
-double MembraneTruth::energy(double w) const noexcept { return at(energy_, w); }
+
+// From w_[i] to w, no further than w_[i + 1]: the integral of the force's cubic there.
+double MembraneTruth::work_within(std::size_t i, double w) const noexcept {
+  const double h = w_[i + 1] - w_[i], s = (w - w_[i]) / h, s2 = s * s, s3 = s2 * s, s4 = s2 * s2;
+  const double left = s4 / 2 - s3 + s, right = s3 - s4 / 2;
+  const double left_slope = s4 / 4 - 2 * s3 / 3 + s2 / 2, right_slope = s4 / 4 - s3 / 3;
+  return h * (force_.y[i] * left + force_.y[i + 1] * right) +
+         h * h * (force_.slope[i] * left_slope + force_.slope[i + 1] * right_slope);
+}
+
+double MembraneTruth::energy(double w) const noexcept {
+  if (!(w > 0) || w_.size() < 2) return 0;
+  if (w >= w_.back()) {
+    const double past = w - w_.back();
+    return work_.back() + past * (force_.y.back() + 0.5 * force_.slope.back() * past);
+  }
+  const std::size_t i = interval(w);
+  return work_[i] + work_within(i, w);
+}
+
 double MembraneTruth::tip_tension(double w) const noexcept { return at(tip_tension_, w); }
 double MembraneTruth::half_width(double w) const noexcept { return at(half_width_, std::min(w, w_.back())); }
 

@@ -68,7 +68,7 @@ class MembraneTruth {
   [[nodiscard]] double force(double w) const noexcept;
   [[nodiscard]] double pressure(double w) const noexcept;
   [[nodiscard]] double strain(double w) const noexcept;
-  [[nodiscard]] double energy(double w) const noexcept;
+  [[nodiscard]] double energy(double w) const noexcept;  // the integral of force()
   [[nodiscard]] double tip_tension(double w) const noexcept;
   [[nodiscard]] double half_width(double w) const noexcept;  // a/R: where the depth has fallen to 1 % of w
   [[nodiscard]] double rim_radius(
@@ -87,10 +87,12 @@ class MembraneTruth {
   };
   [[nodiscard]] double at(const Curve& curve, double w) const noexcept;
   [[nodiscard]] std::size_t interval(double w) const noexcept;
+  [[nodiscard]] double work_within(std::size_t i, double w) const noexcept;
 
   MembraneShape shape_;
   std::vector<double> w_;
-  Curve force_, pressure_, strain_, energy_, tip_tension_, half_width_, rim_radius_, rim_depth_;
+  std::vector<double> work_;  // of the force, from 0 to each depth
+  Curve force_, pressure_, strain_, tip_tension_, half_width_, rim_radius_, rim_depth_;
   std::vector<std::array<double, 2>> rows_, row_slopes_;  // [depth][node]
 };
 

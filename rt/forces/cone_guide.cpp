@@ -1,5 +1,6 @@
 #include "rt/forces/cone_guide.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace punctum::rt {
@@ -70,6 +71,46 @@ Pull cone_pull(const ConeParams& params, double position_scale, const FixtureFra
   pull.force_N = -KkP * from_r / r * lateral + KkP * from_d * frame.axis;
   pull.energy_J = KkP * position_scale * f.value * phi;
   return pull;
+}
+
+// With t = 2 Phi/reach^2 in 0 .. 1, c = reach/d0 and unit vectors n (across the cone's surface), e (along the
+// axis), n.e = -sin(alpha) at most, the Hessian over K is
+//
+//   f Phi'' n n^T + d0 f' c C (n e^T + e n^T) + (d0^2 f'' c^2 t/2 - f c C sin(alpha) d0 s') e e^T
+//
+// and f Phi' cos(alpha)/r <= 1 round the axis, where C(t) = Phi'/reach <= sqrt(t) (1-t)^(3/2) and
+// -(4t-1)(1-t)^2 <= Phi'' <= (1-3t)(1-t)^2 as far as these are < 0, > 0 (psi^2 <= 2 Phi of the plain spring,
+// >= 3/2 of it behind its ramp). s' is the slope of the core's widening, in 0 .. d0/4 only.
+double cone_stiffness_bound_N_m(const ConeParams& params) noexcept {
+  if (params.method == ConeParams::Method::paper) return params.K_N_m;
+  struct Part {
+    double f_slope;  // largest |f'| d0, and |f''| d0^2
+    double f_bend;
+    double widening;  // largest s' d0
+  };
+  constexpr Part kParts[] = {{0.444, 2.0, 1.875 / kCoreBlend}, {0.811, 2.0, 0}};  // 0 < d < d0/4; elsewhere
+  constexpr int kSteps = 512;  // of sqrt(t), in which everything is smooth
+  const double c = params.reach_m / params.d0_m;
+  const double sin_alpha = std::sin(params.alpha_rad);
+  double largest = 1;
+  for (const Part& part : kParts) {
+    // No factor changes faster with sqrt(t) than this: what a maximum between two steps may be missed by.
+    const double steepest =
+        2.5 + c * c * part.f_bend + c * (part.widening * sin_alpha + part.f_slope * (1 + sin_alpha));
+    for (int i = 0; i <= kSteps; ++i) {
+      const double root = static_cast<double>(i) / kSteps;
+      const double t = root * root;
+      const double C = c * root * (1 - t) * std::sqrt(1 - t);
+      const double across = (1 - t) * (1 - t) * std::max({1 - 3 * t, 4 * t - 1, 0.0});
+      const double along = c * c * t / 2 * part.f_bend + C * sin_alpha * part.widening;
+      // Largest eigenvalue of across n n^T + along e e^T.
+      const double half = (across - along) / 2;
+      const double both =
+          (across + along) / 2 + std::sqrt(half * half + across * along * sin_alpha * sin_alpha);
+      largest = std::max(largest, both + C * part.f_slope * (1 + sin_alpha) + steepest / (2 * kSteps));
+    }
+  }
+  return params.K_N_m * largest;
 }
 
 hal::Vec3 ConeGuide::step(const hal::Vec3& tip_m, const FixtureFrame& target, bool on, double dt_s) noexcept {

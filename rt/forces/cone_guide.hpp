@@ -35,10 +35,15 @@ struct Pull {
 [[nodiscard]] Pull cone_pull(const ConeParams& params, double position_scale, const FixtureFrame& frame,
                              const hal::Vec3& tip_m) noexcept;
 
+// N/m at the hand: no eigenvalue of the standing field's Hessian is larger in magnitude. Grows as
+// (reach/d0)^2 once the attraction reaches further than it decays. Of `paper`, which has no Hessian: K, the
+// largest eigenvalue of its Jacobian. Not for the tick.
+[[nodiscard]] double cone_stiffness_bound_N_m(const ConeParams& params) noexcept;
+
 class ConeGuide {
  public:
   ConeGuide(const ConeParams& params, double position_scale) noexcept
-      : params_(params), scale_(position_scale) {}
+      : params_(params), scale_(position_scale), stiffness_bound_N_m_(cone_stiffness_bound_N_m(params)) {}
 
   // One tick: the frame follows `target` and the gain follows `on`, both ramped over ramp_s. The frame is
   // taken over at once while the gain is zero.
@@ -49,10 +54,13 @@ class ConeGuide {
   [[nodiscard]] double injected_energy_J() const noexcept { return injected_J_; }  // signed, cumulative
   [[nodiscard]] const FixtureFrame& frame() const noexcept { return frame_; }
   [[nodiscard]] double gain() const noexcept { return ramp_.gain(); }
+  // Upper bound now, at the hand, of the Hessian's eigenvalues in magnitude.
+  [[nodiscard]] double stiffness_N_m() const noexcept { return ramp_.gain() * stiffness_bound_N_m_; }
 
  private:
   ConeParams params_;
   double scale_;
+  double stiffness_bound_N_m_;
   FixtureFrame frame_;
   Ramp ramp_;
   double stored_J_ = 0;

@@ -28,6 +28,10 @@ class WithdrawalAxis {
   [[nodiscard]] double stored_energy_J() const noexcept { return stored_J_; }
   [[nodiscard]] double injected_energy_J() const noexcept { return injected_J_; }  // signed, cumulative
   [[nodiscard]] const FixtureFrame& frame() const noexcept { return frame_; }
+  // Upper bound now, at the hand, of the well's Hessian: K psi' and K psi/r are at most K.
+  [[nodiscard]] double stiffness_N_m() const noexcept { return ramp_.gain() * params_.K_N_m; }
+  // Of the one-way damper, now.
+  [[nodiscard]] double B_Ns_m() const noexcept { return one_way_.gain() * params_.B_inward_Ns_m; }
 
  private:
   AxisParams params_;

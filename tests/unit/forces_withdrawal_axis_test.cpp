@@ -1,6 +1,7 @@
 // The withdrawal axis and the viscous damping.
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <random>
 
@@ -35,6 +36,35 @@ TEST(WithdrawalAxis, force_is_the_gradient_of_its_well_and_free_along_the_axis) 
     // Moved along the axis nothing changes.
     EXPECT_LT((axis_pull(params, kScale, kLine, tip + 30e-6 * kLine.axis).force_N - force).norm(), 1e-12);
   }
+}
+
+TEST(WithdrawalAxis, no_eigenvalue_of_its_hessian_exceeds_the_stiffness_it_gives) {
+  const AxisParams params;
+  WithdrawalAxis axis(params, kScale);
+  EXPECT_EQ(axis.stiffness_N_m(), 0);
+  for (int k = 0; k < 1000; ++k) (void)axis.step(kLine.entry_m, Vec3::Zero(), kLine, true, false, 1e-3);
+  std::mt19937_64 random(9);
+  std::normal_distribution<double> n;
+  const double h = 1e-10;
+  double largest = 0;
+  double smallest = 0;
+  for (int i = 0; i < 100'000; ++i) {
+    const double size = std::pow(10, -9 + 5.0 * (i % 1000) / 1000);  // 1 nm .. 0.1 mm
+    const Vec3 tip = kLine.entry_m + size * Vec3(n(random), n(random), n(random));
+    Eigen::Matrix3d hessian;
+    for (int k = 0; k < 3; ++k) {
+      hessian.col(k) = -(axis_pull(params, kScale, kLine, tip + Vec3::Unit(k) * h).force_N -
+                         axis_pull(params, kScale, kLine, tip - Vec3::Unit(k) * h).force_N) /
+                       (2 * h * kScale);
+    }
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(0.5 * (hessian + hessian.transpose()),
+                                                               Eigen::EigenvaluesOnly);
+    largest = std::max(largest, eigen.eigenvalues().maxCoeff());
+    smallest = std::min(smallest, eigen.eigenvalues().minCoeff());
+  }
+  EXPECT_LE(largest, axis.stiffness_N_m() * (1 + 1e-6));
+  EXPECT_GT(largest, 0.99 * axis.stiffness_N_m());
+  EXPECT_GT(smallest, -1e-4 * axis.stiffness_N_m());  // a well
 }
 
 TEST(WithdrawalAxis, is_smooth_on_the_axis_itself) {

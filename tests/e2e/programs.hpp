@@ -38,7 +38,8 @@ inline std::string read_all(const fs::path& file) {
 // A program that runs; its words go to a file.
 class Running {
  public:
-  Running(const std::vector<std::string>& args, fs::path output) : output_(std::move(output)) {
+  Running(const std::vector<std::string>& args, fs::path output, const char* name = "punctum")
+      : output_(std::move(output)) {
     pid_ = fork();
     if (pid_ == 0) {
       const int out = open(output_.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
@@ -46,7 +47,7 @@ class Running {
       dup2(out, 2);
       const int null = open("/dev/null", O_RDONLY);
       dup2(null, 0);
-      const std::string program = std::string(PUNCTUM_BIN_DIR) + "/punctum";
+      const std::string program = std::string(PUNCTUM_BIN_DIR) + "/" + name;
       std::vector<char*> argv{const_cast<char*>(program.c_str())};
       for (const auto& a : args) argv.push_back(const_cast<char*>(a.c_str()));
       argv.push_back(nullptr);

@@ -71,14 +71,25 @@ int main_or_throw(int argc, char** argv) {
     names += ", " + std::string(t.name);
     about += fmt::format("  {:<12}{}\n", t.name, t.about);
   }
+  const auto evaluates =
+      std::find_if(topics().begin(), topics().end(), [](const Topic& t) { return t.evaluate != nullptr; });
   CLI::App app{about};
   app.failure_message([](const CLI::App*, const CLI::Error& e) { return std::string(e.what()) + "\n"; });
   std::vector<std::string> wanted;
-  std::string folder;
+  std::string folder, input, output;
   bool quick = false;
   app.add_option("TOPIC", wanted, "one or more of: " + names)->required();
   app.add_option("--out", folder, "folder of tables, figures and index.html (default: reports/report-DATE)");
   app.add_flag("--quick", quick, "fewer points and cells, all together within a minute");
+  CLI::Option* in = nullptr;
+  if (evaluates != topics().end()) {
+    in = app.add_option("--input", input,
+                        std::string(evaluates->name) + " only: a CSV file of rows to evaluate");
+    auto* to =
+        app.add_option("--output", output, "where they go with their result appended; nothing else is done");
+    in->needs(to);
+    to->needs(in);
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -90,6 +101,11 @@ int main_or_throw(int argc, char** argv) {
     if (w != "all" &&
         std::none_of(topics().begin(), topics().end(), [&w](const Topic& t) { return t.name == w; }))
       return bad(fmt::format("TOPIC: {}: there is no such topic, allowed: {}", w, names));
+  if (in != nullptr && in->count() > 0) {
+    if (wanted != std::vector{std::string(evaluates->name)})
+      return bad(fmt::format("--input: allowed with the one topic {}", evaluates->name));
+    return evaluates->evaluate(input, output);
+  }
   const fs::path out = fs::absolute(
       folder.empty() ? fmt::format("reports/report-{:%Y%m%d-%H%M%S}", fmt::localtime(std::time(nullptr)))
                      : folder);

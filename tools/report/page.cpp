@@ -22,8 +22,8 @@ h1 { font-size: 1.7rem; margin-bottom: .2rem; } h2 { font-size: 1.35rem; margin:
 .failed { background: #fdeeee; border-left: 4px solid #c0392b; padding: .6rem .9rem; }
 figure { margin: 1.2rem 0; } figure svg { max-width: 100%; height: auto; } figcaption { color: #555; font-size: .9rem; }
 .wide { overflow-x: auto; margin: 1rem 0; } table { border-collapse: collapse; font-size: .85rem; }
-caption { text-align: left; color: #555; padding-bottom: .3rem; } th, td { padding: .2rem .7rem; text-align: left; border-bottom: 1px solid #e6e6e6; vertical-align: top; }
-th { font-weight: 600; background: #f7f7f7; } td.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+caption { text-align: left; color: #555; padding-bottom: .3rem; } th, td { padding: .2rem .7rem; text-align: left; border-bottom: 1px solid #e6e6e6; white-space: nowrap; }
+th { font-weight: 600; background: #f7f7f7; } td.number { text-align: right; font-variant-numeric: tabular-nums; }
 dl { display: grid; grid-template-columns: max-content 1fr; gap: .1rem 1rem; font-size: .85rem; color: #555; } dt { font-weight: 600; } dd { margin: 0; overflow-wrap: anywhere; }
 nav a { margin-right: 1rem; }
 )";

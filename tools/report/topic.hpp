@@ -244,6 +244,8 @@ struct Topic {
   std::string_view name;
   std::string_view about;  // for --help and index.html: what is compared
   Result (*run)(const Job&);
+  // --input FILE --output FILE: the rows of a file, evaluated. 0, or 2 with one line on stderr.
+  int (*evaluate)(const std::string& input, const std::string& output) = nullptr;
 };
 [[nodiscard]] std::span<const Topic> topics();
 

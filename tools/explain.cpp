@@ -77,8 +77,13 @@ std::string explain(const Scene& s) {
   if (s.servo.force_sensor) devices += ", force sensor";
   line("  read devices          " + devices);
   if (s.vision) line("  newest observation    from vision, compared with the pose at its exposure");
-  line(fmt::format("  velocity              FOAW, window {}, +-{:g} mm", s.servo.velocity.window,
-                   s.servo.velocity.d_m * 1e3));
+  const rt::VelocityParams& v = s.servo.velocity;
+  line("  velocity              " +
+       (v.method == rt::VelocityParams::Method::kalman
+            ? fmt::format("Kalman filter, jerk {:g} m/s^3/sqrt(Hz), encoder step {:g} mm", v.jerk_m_s3_rtHz,
+                          v.d_m * 1e3)
+            : fmt::format("FOAW, window {} at 1 kHz, +-{:g} mm", v.window, v.d_m * 1e3)) +
+       (v.smooth_s > 0 ? fmt::format(", low-pass {:g} ms", v.smooth_s * 1e3) : ""));
   if (s.servo.phases)
     line("  phase                 free > contact > indentation > puncture > injection > withdrawal > clear");
   std::string effects;

@@ -152,7 +152,10 @@ std::vector<Table> make_tables() {
 
   t.push_back({"velocity", Kind::settings, always, keep, [](Scene& s) {
                  auto& v = s.servo.velocity;
-                 return std::vector<Key>{whole("window", v.window, 2, 64), milli("d_mm", v.d_m, 1e-5, 1),
+                 return std::vector<Key>{choice("method", v.method, {"kalman", "foaw"}),
+                                         milli("d_mm", v.d_m, 1e-5, 1),
+                                         real("jerk_m_s3_rtHz", v.jerk_m_s3_rtHz, 0.01, 1000),
+                                         whole("window", v.window, 2, 64),
                                          milli("smooth_ms", v.smooth_s, 0, 100)};
                }});
 

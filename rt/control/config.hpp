@@ -45,11 +45,14 @@ struct DampingParams {
   double ramp_s = 0.035;  // 20 .. 50 ms
 };
 
-// FOAW (Janabi-Sharifi 2000): longest window whose best-fit line stays within +-d of all samples.
+// How the hand's velocity is made of its positions; at the hand.
 struct VelocityParams {
-  int window = 16;          // intervals between samples at most, at 1 kHz; grows with the rate, up to 64
-  double d_m = 0.03e-3;     // encoder step
-  double smooth_s = 0.003;  // first-order low-pass behind it: one encoder count is no click; 0 = off
+  enum class Method : std::uint8_t { kalman, foaw };
+  Method method = Method::kalman;
+  double d_m = 0.03e-3;       // encoder step
+  double jerk_m_s3_rtHz = 5;  // kalman: of the hand, root of its spectral density; more follows faster
+  int window = 16;            // foaw: intervals between samples at most, at 1 kHz; grows with the rate, up to 64
+  double smooth_s = 0;        // first-order low-pass behind it; 0 = off
 };
 
 // The haptic device as the core knows it: what can be rendered follows from it.

@@ -38,11 +38,15 @@ Servo::Servo(const ServoConfig& config, const Devices& devices, Station& station
       devices_(devices),
       station_(station),
       degraded_(degraded),
-      foaw_(at_rate(config.velocity, config.rate_Hz)),
       mapping_(config.mapping),
       stage_limits_(config.limits, config.mapping),
       latch_(config.estop),
       following_(config.stage_timeout_s) {
+  if (config.velocity.method == VelocityParams::Method::foaw) {
+    foaw_.emplace(at_rate(config.velocity, config.rate_Hz));
+  } else {
+    kalman_.emplace(config.velocity, 1 / config.rate_Hz);
+  }
   if (config.membrane) membrane_.emplace(*config.membrane);
   if (config.cone) cone_.emplace(*config.cone, config.mapping.position_scale);
   if (config.axis) axis_.emplace(*config.axis, config.mapping.position_scale);
@@ -347,10 +351,11 @@ void Servo::take_newest_observation() noexcept {
 }
 
 void Servo::estimate_velocity() noexcept {
-  if (hand_fresh_) foaw_.step(hand_.position_m, between_hand_s_);
+  if (hand_fresh_ && kalman_) estimated_m_s_ = kalman_->step(hand_.position_m, between_hand_s_);
+  if (hand_fresh_ && foaw_) estimated_m_s_ = foaw_->step(hand_.position_m, between_hand_s_);
   const double tau_s = config_.velocity.smooth_s;
   const double part = tau_s > 0 ? 1 - std::exp(-dt_s_ / tau_s) : 1.0;
-  hand_velocity_m_s_ += part * (foaw_.velocity() - hand_velocity_m_s_);
+  hand_velocity_m_s_ += part * (estimated_m_s_ - hand_velocity_m_s_);
 }
 
 void Servo::advance_phase() noexcept {

@@ -127,7 +127,8 @@ class Servo {
   std::optional<Phases> phases_;
   std::optional<LocalMembraneModel> model_;
 
-  Foaw foaw_;
+  std::optional<Kalman> kalman_;
+  std::optional<Foaw> foaw_;
   MasterToStage mapping_;
   StageLimits stage_limits_;
   SafetyLatch latch_;
@@ -186,7 +187,8 @@ class Servo {
   Ramp presence_;  // of every force: from the start, after a reset, to the end
   Ramp coupling_;  // of the forces that belong to the needle: off while the clutch is pressed
   double fixture_gain_ = 0;
-  hal::Vec3 hand_velocity_m_s_ = hal::Vec3::Zero();  // FOAW and its low-pass, device frame
+  hal::Vec3 estimated_m_s_ = hal::Vec3::Zero();      // velocity of the hand, device frame
+  hal::Vec3 hand_velocity_m_s_ = hal::Vec3::Zero();  // and behind its low-pass
   double depth_m_ = 0;
   double outward_m_s_ = 0;  // of the tip, low-passed
   hal::Vec3 tip_before_m_ = hal::Vec3::Zero();

@@ -1,10 +1,6 @@
-// Velocity of the hand from quantised positions: first-order adaptive windowing, best fit (Janabi-Sharifi
-// 2000).
-//
-// Per axis: the longest window, grown sample by sample, whose least-squares slope, drawn as a line through
-// the newest sample, leaves every sample of the window within +-d. Slow motion gets a long window (little
-// noise), fast motion a short one (little delay). Sample times are the real ones, so a late tick does no
-// harm.
+// Velocity of the hand from its quantised positions. Sample times are the real ones, so a late tick does no
+// harm; a position that is not finite, or no time passed, repeats the last velocity.
+// In double for the servo, in float for comparison.
 #pragma once
 
 #include <array>
@@ -17,29 +13,89 @@ namespace punctum::rt {
 // The window is meant in time: as many intervals more as the rate is above 1 kHz.
 [[nodiscard]] VelocityParams at_rate(VelocityParams params, double rate_Hz) noexcept;
 
-class Foaw {
+// What the difference between a sample and its prediction adds: to position (1), velocity (1/s), acceleration
+// (1/s^2).
+template <class Real>
+struct BasicKalmanGains {
+  Real position = 1, velocity = 0, acceleration = 0;
+};
+using KalmanGains = BasicKalmanGains<double>;
+
+// Where the gains of the Kalman filter settle, samples T_s apart: the hand's jerk is white noise of density
+// jerk^2, the encoder's rounding noise of variance d^2/12. For start-up: runs the covariance until it stands.
+[[nodiscard]] KalmanGains settled_gains(const VelocityParams& params, double T_s) noexcept;
+
+// Kalman filter of a hand with nearly constant acceleration, at its settled gains: a third-order Butterworth
+// filter of omega = (12 jerk^2/(d^2 T))^(1/6) which predicts over the real time between samples and does not
+// lag behind constant acceleration. A late sample gets the gains of the same filter sampled that slowly;
+// after a gap of kGap_s the mean velocity over it begins anew.
+template <class Real>
+class BasicKalman {
+ public:
+  using Vector = Eigen::Matrix<Real, 3, 1>;
+
+  static constexpr Real kGap_s = static_cast<Real>(0.05);
+
+  BasicKalman(const VelocityParams& params, double T_s) noexcept;
+
+  // A new sample, dt_s after the one before. Returns the velocity, 0 for the first.
+  Vector step(const Vector& position_m, Real dt_s) noexcept;
+  void reset() noexcept {
+    begun_ = false;
+    velocity_.setZero();
+    acceleration_.setZero();
+  }
+  [[nodiscard]] const Vector& velocity() const noexcept { return velocity_; }
+
+ private:
+  [[nodiscard]] BasicKalmanGains<Real> late_gains(Real dt_s) const noexcept;
+
+  BasicKalmanGains<Real> settled_;
+  Real late_s_;  // an interval longer than this is a late sample
+  Real omega_;   // of the Butterworth filter, rad/s
+  bool begun_ = false;
+  Vector position_ = Vector::Zero();
+  Vector velocity_ = Vector::Zero();
+  Vector acceleration_ = Vector::Zero();
+};
+
+// First-order adaptive windowing, best fit (Janabi-Sharifi 2000). Per axis: the longest window, grown sample
+// by sample, whose least-squares slope, drawn as a line through the newest sample, leaves every sample of the
+// window within +-d. Slow motion gets a long window (little noise), fast motion a short one (little delay).
+template <class Real>
+class BasicFoaw {
  public:
   static constexpr int kMaxWindow = 64;
+  using Vector = Eigen::Matrix<Real, 3, 1>;
 
-  explicit Foaw(const VelocityParams& params) noexcept;
+  explicit BasicFoaw(const VelocityParams& params) noexcept;
 
-  // A new sample, dt_s after the one before. Returns the velocity, 0 for the first. dt_s <= 0 repeats the
-  // last.
-  hal::Vec3 step(const hal::Vec3& position_m, double dt_s) noexcept;
+  // A new sample, dt_s after the one before. Returns the velocity, 0 for the first.
+  Vector step(const Vector& position_m, Real dt_s) noexcept;
   void reset() noexcept {
     count_ = 0;
     velocity_.setZero();
   }
-  [[nodiscard]] const hal::Vec3& velocity() const noexcept { return velocity_; }
+  [[nodiscard]] const Vector& velocity() const noexcept { return velocity_; }
 
  private:
+  struct Sample {
+    Vector position_m = Vector::Zero();
+    Real since_s = 0;  // the sample before
+  };
   int window_;  // intervals at most
-  double d_m_;
+  Real d_m_;
   int newest_ = 0;
   int count_ = 0;
-  std::array<double, kMaxWindow + 1> step_s_{};  // from the sample before to this one
-  std::array<std::array<double, kMaxWindow + 1>, 3> x_{};
-  hal::Vec3 velocity_ = hal::Vec3::Zero();
+  std::array<Sample, kMaxWindow + 1> samples_{};
+  Vector velocity_ = Vector::Zero();
 };
+
+extern template class BasicKalman<double>;
+extern template class BasicKalman<float>;
+extern template class BasicFoaw<double>;
+extern template class BasicFoaw<float>;
+using Kalman = BasicKalman<double>;
+using Foaw = BasicFoaw<double>;
 
 }  // namespace punctum::rt

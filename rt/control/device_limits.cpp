@@ -6,15 +6,32 @@
 #include <limits>
 #include <numbers>
 
+#include "rt/forces/velocity.hpp"
+
 namespace punctum::rt {
 namespace {
 
 using std::numbers::pi;
+using Complex = std::complex<double>;
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
-// Slope of the best-fit line through n + 1 samples, at theta = omega T: V = j S(theta)/T e^(-j n theta/2),
+// As in the library, without its treatment of infinities and of negative radii.
+[[nodiscard]] Complex polar(double r, double angle) noexcept {
+  return {r * std::cos(angle), r * std::sin(angle)};
+}
+[[nodiscard]] Complex times(const Complex& p, const Complex& q) noexcept {
+  return {p.real() * q.real() - p.imag() * q.imag(), p.real() * q.imag() + p.imag() * q.real()};
+}
+[[nodiscard]] Complex over(const Complex& p, const Complex& q) noexcept {
+  return times(p, std::conj(q)) / (q.real() * q.real() + q.imag() * q.imag());
+}
+[[nodiscard]] Complex minus_one(double theta) noexcept {  // e^(j theta) - 1
+  return polar(2 * std::sin(0.5 * theta), 0.5 * (theta + pi));
+}
+
+// Slope of the best-fit line through n + 1 samples, at theta = omega T and T = 1: j S e^(-j n theta/2),
 // S = sum of 12 (n/2 - i) sin((n/2 - i) theta) / (n (n+1) (n+2)).
-[[nodiscard]] double window_gain(int n, double theta) noexcept {
+[[nodiscard]] Complex best_fit_slope(int n, double theta) noexcept {
   double sum = 0;
   const double half = 0.5 * n;
   if ((n + 1) * theta < 2) {
@@ -25,114 +42,124 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
     const double s = std::sin(0.5 * theta);
     sum = (0.5 * std::sin(u * theta) * std::cos(0.5 * theta) - u * std::cos(u * theta) * s) / (s * s);
   }
-  return 12.0 * sum / (static_cast<double>(n) * (n + 1) * (n + 2));
+  return polar(12.0 * sum / (static_cast<double>(n) * (n + 1) * (n + 2)), 0.5 * pi - half * theta);
 }
 
-// y += part (u - y): p / (1 - (1-p) e^(-j theta)).
-struct LowPass {
-  double left;  // 1 - p
+// From position to estimated velocity, at T = 1.
+class VelocityResponse {
+ public:
+  VelocityResponse(const VelocityParams& params, double T_s) noexcept
+      : kalman_(params.method == VelocityParams::Method::kalman),
+        windows_(kalman_ ? 1 : at_rate(params, 1 / T_s).window),
+        left_(params.smooth_s > 0 ? std::exp(-T_s / params.smooth_s) : 0.0) {
+    if (!kalman_) return;
+    const KalmanGains g = settled_gains(params, T_s);
+    gain_ = {g.position, g.velocity * T_s, g.acceleration * T_s * T_s};
+  }
 
-  LowPass(double tau_s, double T_s) noexcept : left(tau_s > 0 ? std::exp(-T_s / tau_s) : 0.0) {}
-  [[nodiscard]] double lag(double theta) const noexcept {
-    return std::atan2(left * std::sin(theta), 1 - left * std::cos(theta));
+  // The limits are the worst over `windows` kinds of response, n = 1 .. windows.
+  [[nodiscard]] int windows() const noexcept { return windows_; }
+
+  [[nodiscard]] Complex at(double theta, int n) const noexcept {
+    const Complex slope = kalman_ ? of_kalman(theta) : best_fit_slope(n, theta);
+    // y += (1 - left) (u - y): (1 - left) / (1 - left e^(-j theta)).
+    return left_ > 0 ? over((1 - left_) * slope, 1.0 - left_ * polar(1, -theta)) : slope;
   }
-  [[nodiscard]] double gain(double theta) const noexcept {
-    const double s = std::sin(0.5 * theta);
-    return (1 - left) / std::sqrt((1 - left) * (1 - left) + 4 * left * s * s);
+
+ private:
+  // With w = 1/z, D = 1 - w and the innovation e: D a = g2 e, D v = w a + g1 e, D x = w v + w a/2 + g0 e,
+  // y = e + w (x + v + a/2). Here times D^3 throughout.
+  [[nodiscard]] Complex of_kalman(double theta) const noexcept {
+    const Complex w = polar(1, -theta);
+    const Complex D = times(minus_one(theta), w);
+    const Complex D2 = times(D, D);
+    const Complex v = gain_.acceleration * w + gain_.velocity * D;                                 // D^2 v/e
+    const Complex half_a = 0.5 * gain_.acceleration * D2;                                          // D^3 a/2
+    const Complex x = times(w, v) + 0.5 * gain_.acceleration * times(w, D) + gain_.position * D2;  // D^3 x
+    return over(times(D, v), times(D, D2) + times(w, x + times(D, v) + half_a));
   }
+
+  bool kalman_;
+  int windows_;
+  double left_;
+  KalmanGains gain_;
 };
 
-// A zero of f between a and b, where its sign differs.
-template <class F>
-[[nodiscard]] double zero_between(double a, double b, F f) noexcept {
-  const bool below = f(a) < 0;
-  for (int i = 0; i < 60; ++i) {
-    const double middle = 0.5 * (a + b);
-    ((f(middle) < 0) == below ? a : b) = middle;
-  }
-  return 0.5 * (a + b);
-}
-
-// B T / m at which z = e^(j theta) solves 1 + B V z^-d P = 0, P = T^2 (z+1) / (2 m (z-1)^2):
-// 1/B = T^2/(4m) cos(theta/2)/sin^2(theta/2) S/T |H| e^(j(pi/2 - phi)), real where the phase
-// phi = theta (d + (n+1)/2) + lag is pi/2 + k pi. phi rises with theta: its lag falls by 1/2 at most.
-[[nodiscard]] double largest_damping(int n, int d, const LowPass& H) noexcept {
-  double least = kInfinite;
-  const double slope = d + 0.5 * (n + 1);
-  for (int k = 0; 0.5 + k < slope; ++k) {
-    const double wanted = pi * (0.5 + k);
-    const double theta = zero_between(0, pi, [&](double t) { return slope * t + H.lag(t) - wanted; });
-    const double s = std::sin(0.5 * theta);
-    const double inverse = std::cos(0.5 * theta) / (4 * s * s) * window_gain(n, theta) * H.gain(theta);
-    const double B = (k % 2 == 0 ? 1 : -1) / inverse;
-    if (B > 0) least = std::min(least, B);
-  }
-  return least;
-}
-
-// A handle of mass 1 at T = 1: a = b T/m, B and K in units of m/T and m/T^2.
+// A handle of mass 1 at T = 1, whose force acts delay ticks late; a = b T/m.
 class Handle {
  public:
-  using Complex = std::complex<double>;
-
-  Handle(double a, int d) noexcept : delay_(d) {
+  Handle(double a, int delay) noexcept : delay_(delay) {
     phi1_ = a > 1e-8 ? -std::expm1(-a) / a : 1 - a / 2;
     phi2_ = a > 1e-2 ? (1 - phi1_) / a : 0.5 - a / 6 + a * a / 24 - a * a * a / 120;
     left_ = a * phi1_;
   }
-
-  // K(theta) = -z^d / P - B V: where it is real, z = e^(j theta) is a pole with that K.
-  [[nodiscard]] Complex stiffness(double theta, double B, int n, const LowPass& H) const noexcept {
-    const Complex step = polar(2 * std::sin(0.5 * theta), 0.5 * (theta + pi));  // z - 1
-    const Complex dynamic = over(times(step, step + left_), phi2_ * (step + left_) + phi1_ * phi1_);
-    const Complex velocity =
-        polar(B * window_gain(n, theta) * H.gain(theta), 0.5 * pi - 0.5 * n * theta - H.lag(theta));
-    return -times(polar(1, delay_ * theta), dynamic) - velocity;
+  // -z^d / P, P from force to position, at z = e^(j theta); infinite at theta = pi without damping.
+  [[nodiscard]] Complex dynamic(double theta) const noexcept {
+    const Complex step = minus_one(theta);
+    const Complex inverse = over(times(step, step + left_), phi2_ * (step + left_) + phi1_ * phi1_);
+    return -times(polar(1, delay_ * theta), inverse);
+  }
+  // -P / z^d.
+  [[nodiscard]] Complex compliance(double theta) const noexcept {
+    const Complex step = minus_one(theta);
+    const Complex P = over(phi2_ * (step + left_) + phi1_ * phi1_, times(step, step + left_));
+    return -times(polar(1, -delay_ * theta), P);
   }
 
  private:
-  // As in the library, without its treatment of infinities and of negative radii.
-  [[nodiscard]] static Complex polar(double r, double angle) noexcept {
-    return {r * std::cos(angle), r * std::sin(angle)};
-  }
-  [[nodiscard]] static Complex times(Complex p, Complex q) noexcept {
-    return {p.real() * q.real() - p.imag() * q.imag(), p.real() * q.imag() + p.imag() * q.real()};
-  }
-  [[nodiscard]] static Complex over(Complex p, Complex q) noexcept {
-    return times(p, std::conj(q)) / (q.real() * q.real() + q.imag() * q.imag());
-  }
-
   int delay_;
   double phi1_;  // (1 - e^-a)/a
   double phi2_;  // (1 - phi1)/a
   double left_;  // 1 - e^-a
 };
 
-constexpr double kFirstTheta = 1e-7;  // below: K under 1e-14 m/T^2
-constexpr int kPerDecade = 24;
-constexpr int kPerTurn = 24;  // samples of each half-wave of the phase
-
-[[nodiscard]] double largest_stiffness(const Handle& handle, double B, int n, int d,
-                                       const LowPass& H) noexcept {
-  double least = kInfinite;
-  const auto imaginary = [&](double t) { return handle.stiffness(t, B, n, H).imag(); };
-  const double widest = pi / (kPerTurn * (n + d + 2));
-  const double ratio = std::pow(10.0, 1.0 / kPerDecade);
-  double from = kFirstTheta;
-  bool below = imaginary(from) < 0;
-  if (!below) return 0;  // nothing resists: b + B <= 0
+// Calls visit(value) wherever curve(theta) is real for 0 < theta <= pi. `waves`: half-turns of its phase.
+template <class Curve, class Visit>
+void visit_real_values(int waves, Curve curve, Visit visit) noexcept {
+  constexpr double kFirst = 1e-7;
+  constexpr double kRatio = 1.1;  // near 0, then evenly
+  constexpr int kPerWave = 24;
+  const double widest = pi / (kPerWave * waves);
+  double from = kFirst;
+  bool below = curve(from).imag() < 0;
   while (from < pi) {
-    const double to = std::min({from * ratio, from + widest, pi});
-    const bool now_below = imaginary(to) < 0;
-    if (now_below != below) {
-      const double K = handle.stiffness(zero_between(from, to, imaginary), B, n, H).real();
-      if (K > 0) least = std::min(least, K);
+    const double to = std::min({from * kRatio, from + widest, pi});
+    const bool next_below = curve(to).imag() < 0;
+    if (next_below != below) {
+      double a = from;
+      double b = to;
+      for (int i = 0; i < 60; ++i) {
+        const double middle = 0.5 * (a + b);
+        ((curve(middle).imag() < 0) == below ? a : b) = middle;
+      }
+      visit(curve(0.5 * (a + b)).real());
     }
-    below = now_below;
+    below = next_below;
     from = to;
   }
-  const double K = handle.stiffness(pi, B, n, H).real();  // z = -1 is real itself
-  return K > 0 ? std::min(least, K) : least;
+  visit(curve(pi).real());
+}
+
+// B for which z = e^(j theta) solves 1 + B V P/z^d = 0, largest 1/B.
+[[nodiscard]] double largest_damping(int delay, const VelocityResponse& V, int n) noexcept {
+  const Handle bare(0, delay);
+  double inverse = 0;
+  visit_real_values(
+      n + delay + 2, [&](double t) { return times(bare.compliance(t), V.at(t, n)); },
+      [&](double value) { inverse = std::max(inverse, value); });
+  return inverse > 0 ? 1 / inverse : kInfinite;
+}
+
+// K for which z = e^(j theta) solves 1 + (K + B V) P/z^d = 0.
+[[nodiscard]] double largest_stiffness(const Handle& handle, int delay, double B, const VelocityResponse& V,
+                                       int n) noexcept {
+  double least = kInfinite;
+  visit_real_values(
+      n + delay + 2, [&](double t) { return handle.dynamic(t) - B * V.at(t, n); },
+      [&](double K) {
+        if (K > 0) least = std::min(least, K);
+      });
+  return least;
 }
 
 }  // namespace
@@ -142,23 +169,23 @@ double passive_stiffness_N_m(const HandDevice& device, double T_s) noexcept {
 }
 
 double stable_damping_Ns_m(const HandDevice& device, double T_s, const VelocityParams& velocity) noexcept {
-  const LowPass H(velocity.smooth_s, T_s);
+  const VelocityResponse V(velocity, T_s);
   double least = kInfinite;
-  for (int n = 1; n <= velocity.window; ++n)
-    least = std::min(least, largest_damping(n, device.delay_ticks, H));
+  for (int n = 1; n <= V.windows(); ++n) least = std::min(least, largest_damping(device.delay_ticks, V, n));
   return least * device.mass_kg / T_s;
 }
 
 double stable_stiffness_N_m(const HandDevice& device, double T_s, const VelocityParams& velocity,
                             double B_Ns_m) noexcept {
-  if (!(B_Ns_m < stable_damping_Ns_m(device, T_s, velocity))) return 0;
-  const LowPass H(velocity.smooth_s, T_s);
+  const bool damped = B_Ns_m > 0;
+  if (damped && !(B_Ns_m < stable_damping_Ns_m(device, T_s, velocity))) return 0;
+  if (!damped && !(device.damping_Ns_m > 0)) return 0;
+  const VelocityResponse V(velocity, T_s);
   const double unit = device.mass_kg / T_s;
   const Handle handle(device.damping_Ns_m / unit, device.delay_ticks);
   double least = kInfinite;
-  const int windows = B_Ns_m > 0 ? velocity.window : 1;
-  for (int n = 1; n <= windows; ++n)
-    least = std::min(least, largest_stiffness(handle, B_Ns_m / unit, n, device.delay_ticks, H));
+  for (int n = 1; n <= (damped ? V.windows() : 1); ++n)
+    least = std::min(least, largest_stiffness(handle, device.delay_ticks, B_Ns_m / unit, V, n));
   return least * unit / T_s;
 }
 

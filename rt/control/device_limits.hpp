@@ -2,10 +2,10 @@
 // mass stable, nobody at the handle, and the stiffness that keeps it passive.
 //
 // The handle is m x'' + b x' = f with f held over a period and applied delay_ticks periods late; its velocity
-// is the slope of the best-fit line through window + 1 samples behind a first-order low-pass. The limits are
-// those of the exact sampled system, worst over every window from 1 to `window` (FOAW picks any of them);
-// quantisation, friction and saturation are left out. Bounded time, no allocation; meant for start-up: up to
-// some milliseconds.
+// is estimated as VelocityParams says. The limits are those of the exact sampled system: where a pole reaches
+// the unit circle; with FOAW, which picks any window up to its longest, the worst over all of them.
+// Quantisation, friction and saturation are left out. Bounded time, no allocation; for start-up: up to some
+// milliseconds.
 #pragma once
 
 #include "rt/control/config.hpp"
@@ -15,8 +15,7 @@ namespace punctum::rt {
 // K < b / (T/2 + delay): passive against whatever holds the handle (Colgate & Schenkel for B = 0).
 [[nodiscard]] double passive_stiffness_N_m(const HandDevice& device, double T_s) noexcept;
 
-// The largest B at the handle; device.damping_Ns_m counts as 0 (which is on the safe side). `velocity` as it
-// runs at this rate, see at_rate().
+// The largest B at the handle; device.damping_Ns_m counts as 0, which is on the safe side.
 [[nodiscard]] double stable_damping_Ns_m(const HandDevice& device, double T_s,
                                          const VelocityParams& velocity) noexcept;
 

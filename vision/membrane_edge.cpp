@@ -177,11 +177,9 @@ EdgePath closed_path(const GradientField& field, const EdgeBand& band, Polarity 
       cost[k] = static_cast<float>(1 - std::clamp(static_cast<double>(s[k]) / saturation, -0.3, 1.0));
     }
   }
-  if (band.anchor) {
-    const int i = band.anchor->first;
+  for (const auto& [i, r] : band.anchors) {
     for (int j = 0; j < m; ++j) {
-      const double d =
-          band.middle[static_cast<std::size_t>(i)] + (j - half) * band.step - band.anchor->second;
+      const double d = band.middle[static_cast<std::size_t>(i)] + (j - half) * band.step - r;
       cost[id(i, j)] = static_cast<float>(std::min(40.0, 4 * d * d));
     }
   }
@@ -298,10 +296,13 @@ EdgePath closed_path(const GradientField& field, const EdgeBand& band, Polarity 
   out.visible = static_cast<double>(visible) / n;
   out.support = visible > 0 ? static_cast<double>(seen) / visible : 0;
   out.mean_strength = visible > 0 ? out.mean_strength / visible : 0;
-  if (band.anchor) {
-    const std::size_t a = static_cast<std::size_t>(band.anchor->first);
-    out.raw[a] = band.anchor->second;
-    weight[a] = 4;
+  constexpr double kAnchored = 4;  // weight
+  std::vector<std::uint8_t> anchored(static_cast<std::size_t>(n), 0);
+  for (const auto& [i, r] : band.anchors) {
+    const std::size_t a = static_cast<std::size_t>(i);
+    anchored[a] = 1;
+    out.raw[a] = r;
+    weight[a] = kAnchored;
   }
   // Long arcs that nothing is seen of: drawn a little to the line between what is seen on either side, or
   // noise at their ends would bend them far out.
@@ -329,7 +330,7 @@ EdgePath closed_path(const GradientField& field, const EdgeBand& band, Polarity 
     }
     for (int k = 0; k < run; ++k) {
       const std::size_t a = static_cast<std::size_t>((i + 1 + k) % n);
-      if (!band.anchor || static_cast<int>(a) != band.anchor->first) {
+      if (!anchored[a]) {
         const double t = (k + 1.0) / (run + 1.0);
         out.raw[a] = (1 - t) * left + t * right;
         weight[a] = std::max(weight[a], 0.01);
@@ -347,9 +348,9 @@ EdgePath closed_path(const GradientField& field, const EdgeBand& band, Polarity 
     const double curvature = std::abs(band.middle[b] - 2 * band.middle[a] + band.middle[f]) / (9 * arc * arc);
     stiff[a] = 30 * std::pow(n / 256.0, 4) / (1 + std::pow(curvature * 100, 2));
   }
-  if (band.anchor) {
+  for (const auto& anchor : band.anchors) {
     for (int d = -n / 16; d <= n / 16; ++d) {
-      std::size_t a = static_cast<std::size_t>((band.anchor->first + d + n) % n);
+      const std::size_t a = static_cast<std::size_t>((anchor.first + d + n) % n);
       stiff[a] = std::min(stiff[a], 0.3);
     }
   }
@@ -374,8 +375,8 @@ EdgePath closed_path(const GradientField& field, const EdgeBand& band, Polarity 
       const double t = (out.raw[a] - out.r[a]) / limit;
       w[a] = std::abs(t) < 1 ? weight[a] * std::pow(1 - t * t, 2) : 0;
     }
-    if (band.anchor) {
-      w[static_cast<std::size_t>(band.anchor->first)] = 4;
+    for (const auto& anchor : band.anchors) {
+      w[static_cast<std::size_t>(anchor.first)] = kAnchored;
     }
   }
   for (int i = 0; i < n && !band.upper.empty(); ++i) {

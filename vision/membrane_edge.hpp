@@ -6,7 +6,7 @@
 #pragma once
 
 #include <functional>
-#include <optional>
+#include <utility>
 #include <vector>
 
 #include "vision/gradient.hpp"
@@ -31,8 +31,8 @@ struct EdgeBand {
   std::vector<std::uint8_t> hidden;  // 1 = this whole ray tells nothing; or empty
   // 0 = a pixel that belongs to something else (pipette, impurity, outside): neutral, no edge and no cost.
   std::function<double(const Point&)> visible;
-  // A place the contour is known to pass (the needle's tip while it pushes): angle index and radius.
-  std::optional<std::pair<int, double>> anchor;
+  // Places the contour is known to pass (the needle's end face while it pushes): angle index and radius.
+  std::vector<std::pair<int, double>> anchors;
 };
 
 struct EdgePath {

@@ -93,6 +93,7 @@ struct Search {
   }
   [[nodiscard]] EdgePath path_free() const;
   [[nodiscard]] EdgePath path_pushed() const;
+  [[nodiscard]] std::vector<std::pair<int, double>> end_face() const;
   [[nodiscard]] double mean_beside_needle(const std::vector<double>& per_angle) const;
 
  private:
@@ -191,6 +192,22 @@ EdgePath Search::path_free() const {
   return path_in(free);
 }
 
+// Where the needle is met: the membrane lies flat against its end face, or once pierced at the tip at most.
+std::vector<std::pair<int, double>> Search::end_face() const {
+  const NeedleFix& n = surroundings.needle;
+  const double ahead = (n.tip - band.centre).dot(n.axis);
+  std::vector<std::pair<int, double>> face;
+  for (int i = 0; i < angles && ahead < 0 && !surroundings.punctured; ++i) {
+    const Point ray = on_ray(Point(0, 0), i, angles, 1);
+    const double towards = ray.dot(n.axis);
+    if (towards < -0.5 &&
+        std::abs((ahead / towards * ray + band.centre - n.tip).cross(n.axis)) < n.half_width) {
+      face.emplace_back(i, ahead / towards);
+    }
+  }
+  return face.empty() ? std::vector{std::make_pair(needle->tip_index, needle->tip_r)} : face;
+}
+
 // It lies on the tip, and the dimple goes on with the needle.
 EdgePath Search::path_pushed() const {
   EdgeBand pushed = band;
@@ -201,7 +218,7 @@ EdgePath Search::path_pushed() const {
     const double u = angle_between(polar_angle(i, angles), polar_angle(tip, angles)) * usual_r / dimple_px;
     pushed.middle[static_cast<std::size_t>(i)] += move / (1 + u * u);
   }
-  pushed.anchor = std::make_pair(tip, needle->tip_r);
+  pushed.anchors = end_face();
   pushed.slope = 3;
   pushed.stiffness = 0.1;
   return path_in(pushed);
@@ -228,7 +245,7 @@ struct EdgeFound {
 
 EdgeFound pushed_or_free(const Search& s) {
   const auto tip_inside = [&] {
-    return s.needle->tip_r < s.m.rest.r[static_cast<std::size_t>(s.needle->tip_index)] - 1.0;
+    return s.needle->tip_r < s.rested[static_cast<std::size_t>(s.needle->tip_index)] - 1.0;
   };
   if (!s.needle || s.rested.empty() || !tip_inside()) {
     return {s.path_in(s.band)};
@@ -238,16 +255,18 @@ EdgeFound pushed_or_free(const Search& s) {
   if (free.r.empty() || pushed.r.empty()) {
     return {std::move(pushed)};
   }
-  std::vector<double> seen, apart;
+  std::vector<double> seen, apart, off_rest;
   for (std::size_t k = 0; k < free.r.size(); ++k) {
     seen.push_back(std::clamp(static_cast<double>(free.strength[k]) / s.saturation, 0.0, 1.0));
     apart.push_back(std::max(0.0, free.r[k] - pushed.r[k]));
+    off_rest.push_back(std::abs(free.r[k] - s.rested[k]));
   }
-  const double free_seen = s.mean_beside_needle(seen);
-  // Where an edge lies further out than the dimple and is as well seen, the dimple is another membrane's.
+  const double free_seen = s.mean_beside_needle(seen), between = s.mean_beside_needle(apart);
+  // Where an edge lies further out than the dimple and is as well seen, the dimple is another membrane's; but
+  // what lies nearer to the dimple than to the rest outline is the dimple's own wall.
   const bool is_free = s.surroundings.punctured && s.surroundings.outermost
                            ? free_seen > 0.4
-                           : s.mean_beside_needle(apart) > 1.5 && free_seen > 0.7;
+                           : between > 1.5 && between > s.mean_beside_needle(off_rest) && free_seen > 0.7;
   return {is_free ? std::move(free) : std::move(pushed), is_free};
 }
 

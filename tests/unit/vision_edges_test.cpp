@@ -144,11 +144,17 @@ TEST(ClosedPath, KeepsAnAnchorAndUpperLimits) {
   band.half_width = 10;
   band.slope = 3;
   band.stiffness = 0.1;
-  band.anchor = std::make_pair(0, 52.0);
+  band.anchors = {{0, 52.0}};
   EdgePath p = closed_path(field_of(m), band, Polarity::brighter_out, 1, 4);
   EXPECT_NEAR(p.r[0], 52, 1.0);
   EXPECT_NEAR(p.r[128], 60, 0.2);
-  band.anchor.reset();
+  band.anchors = {{254, 52.0}, {255, 52.0}, {0, 52.0}, {1, 52.0}, {2, 52.0}};  // a flat end face
+  p = closed_path(field_of(m), band, Polarity::brighter_out, 1, 4);
+  for (const std::size_t i : {254, 255, 0, 1, 2}) {
+    EXPECT_NEAR(p.r[i], 52, 0.5);
+  }
+  EXPECT_NEAR(p.r[128], 60, 0.2);
+  band.anchors.clear();
   band.upper.assign(256, 1e9);
   band.upper[10] = 57;
   p = closed_path(field_of(m), band, Polarity::brighter_out, 1, 4);

@@ -80,6 +80,39 @@ struct Box {
   double value = 0;
 };
 
+// Boxes end to end, one row per name.
+std::string bars_script(const Bars& bars, int index, std::string& blocks, std::string& set) {
+  constexpr std::array<const char*, 14> kParts = {"#b8b8b8", "#0072b2", "#d55e00", "#009e73", "#cc79a7",
+                                                  "#e69f00", "#56b4e9", "#7a4a1e", "#222222", "#8c8c00",
+                                                  "#5b3f9e", "#9fd7a8", "#f2b8a0", "#4d7c8a"};
+  std::string plots;
+  std::vector<double> ends(bars.names.size(), 0.0);
+  const auto row = [&bars](std::size_t i) { return static_cast<double>(bars.names.size() - i); };
+  for (std::size_t k = 0; k < bars.parts.size(); ++k) {
+    const Series& part = bars.parts[k];
+    const std::string name = fmt::format("$b{}_{}", index, k);
+    blocks += name + " << EOD\n";
+    for (std::size_t i = 0; i < std::min(ends.size(), part.y.size()); ++i) {
+      if (!std::isfinite(part.y[i])) continue;
+      blocks += fmt::format("{:.9g} {} {:.9g} {:.9g} {} {}\n", ends[i], row(i), ends[i], ends[i] + part.y[i],
+                            row(i) - 0.36, row(i) + 0.36);
+      ends[i] += part.y[i];
+    }
+    blocks += "EOD\n";
+    plots += fmt::format(
+        "{}{} using 1:2:3:4:5:6 with boxxyerror fillcolor rgb '{}' fillstyle solid noborder title {}",
+        plots.empty() ? "" : ", \\\n  ", name, kParts[k % kParts.size()], quoted(part.name));
+  }
+  std::string tics;
+  for (std::size_t i = 0; i < ends.size(); ++i)
+    tics += fmt::format("{}{} {}", tics.empty() ? "" : ", ", quoted(bars.names[i]), row(i));
+  const double longest = ends.empty() ? 0 : *std::max_element(ends.begin(), ends.end());
+  set += fmt::format(
+      "set ytics ({}) noenhanced scale 0\nset grid noytics\nset yrange [0.4:{}]\nset xrange [0:{:.9g}]\n",
+      tics, static_cast<double>(ends.size()) + 0.6, longest > 0 ? 1.05 * longest : 1.0);
+  return plots;
+}
+
 // One box per cell; neighbours of one category in a row become one.
 std::vector<Box> boxes_of(const Map& map, const std::map<double, Edges>& x,
                           const std::map<double, Edges>& y) {
@@ -168,6 +201,8 @@ std::string panel_script(const Panel& p, int index) {
                        x.high, y.low, y.high);
   }
 
+  if (p.bars && !p.bars->parts.empty()) plot(bars_script(*p.bars, index, blocks, set));
+
   // Over a scale of colours, which is dark in places.
   const bool on_scale = p.map && p.map->categories.empty();
   const char* const ink = on_scale ? "#ffffff" : "#000000";
@@ -235,7 +270,8 @@ std::string gnuplot_script(const Figure& figure, const fs::path& svg) {
   const int rows = (panels + columns - 1) / columns;
   std::size_t most = 0;
   for (const Panel& p : figure.panels)
-    most = std::max(most, p.series.size() + (p.map ? p.map->categories.size() : 0));
+    most = std::max(
+        most, p.series.size() + (p.map ? p.map->categories.size() : 0) + (p.bars ? p.bars->parts.size() : 0));
   const int height = rows * (kPanelHeight + kKeyLine * static_cast<int>(most / 2));
   std::string s = fmt::format(
       "set terminal svg size {},{} enhanced font 'sans-serif,12' name '{}' background rgb 'white'\nset "

@@ -86,12 +86,19 @@ struct Map {
   bool log_value = false;
 };
 
+// Lying bars, one per name, from the top; parts[k].y[i] is how much part k adds to bar i.
+struct Bars {
+  std::vector<std::string> names{};
+  std::vector<Series> parts{};
+};
+
 struct Panel {
   std::string title{}, x_label{}, y_label{};
   bool log_x = false, log_y = false;
   std::vector<Series> series{};  // drawn over the map, where there is one
   std::vector<Mark> marks{};
   std::optional<Map> map{};
+  std::optional<Bars> bars{};
 };
 
 // Becomes NAME.svg. `note`: one sentence under it in index.html.

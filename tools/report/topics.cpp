@@ -4,6 +4,7 @@
 
 namespace punctum::report {
 
+Result run_velocity(const Job&);
 #ifdef PUNCTUM_VISION
 Result run_vision(const Job&);
 Result run_surface(const Job&);
@@ -11,6 +12,7 @@ Result run_surface(const Job&);
 
 std::span<const Topic> topics() {
   static const std::vector<Topic> list = {
+      {"velocity", "the hand's velocity from its quantised positions: error, lag and noise", run_velocity},
 #ifdef PUNCTUM_VISION
       {"vision", "contours, tip, dimple and force as seen in pictures whose truth is known", run_vision},
       {"surface", "descriptions of the indented cell's surface", run_surface},

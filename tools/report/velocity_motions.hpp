@@ -21,6 +21,7 @@ enum class Motion : std::uint8_t {
   hold,       // still between two counts, the encoder flickers
   reach,      // 0.1 m with a peak of 0.3 m/s
   impact,     // 0.1 m/s into a wall of 800 N/m that the device renders, and back; 75 g
+  grip,       // held fast while the device pushes with 1 N, on and off
   slow_sine,  // 5 mm at 1 Hz
   fast_sine,  // 5 mm at 4 Hz
 };
@@ -31,7 +32,8 @@ struct NamedMotion {
 inline constexpr std::array kMotions{
     NamedMotion{Motion::approach, "approach"}, NamedMotion{Motion::tremor, "tremor"},
     NamedMotion{Motion::work, "work"},         NamedMotion{Motion::hold, "hold"},
-    NamedMotion{Motion::reach, "reach"},       NamedMotion{Motion::impact, "impact"}};
+    NamedMotion{Motion::reach, "reach"},       NamedMotion{Motion::impact, "impact"},
+    NamedMotion{Motion::grip, "grip"}};
 
 struct HandTruth {
   double position_m = 0, velocity_m_s = 0, force_N = 0;
@@ -80,6 +82,8 @@ class HandMotion {
         return stroke(t - start_s_, 0.1, 0.3);
       case Motion::impact:
         return bounce(t - start_s_);
+      case Motion::grip:
+        return {start_m_, 0, std::fmod(t, 0.5) < 0.25 ? 0.0 : 1.0};
       case Motion::slow_sine:
         return sine(t, 1);
       case Motion::fast_sine:

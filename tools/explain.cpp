@@ -89,8 +89,9 @@ std::string explain(const Scene& s) {
   std::string effects;
   const auto effect = [&effects](const std::string& e) { effects += (effects.empty() ? "" : ", ") + e; };
   if (const auto& m = s.servo.membrane)
-    effect(fmt::format("membrane (E {:g} kPa, h {:g} um, c {:g} um)", m->E_Pa * 1e-3, m->h_m * 1e6,
-                       m->c_m * 1e6));
+    effect(fmt::format("membrane ({}, E {:g} kPa, h {:g} um, c {:g} um)",
+                       m->law == rt::MembraneParams::Law::paper ? "paper" : "large deflection",
+                       m->E_Pa * 1e-3, m->h_m * 1e6, m->c_m * 1e6));
   if (const auto& c = s.servo.cone)
     effect(fmt::format("cone guide ({}, {:g} N/m)",
                        c->method == rt::ConeParams::Method::paper ? "paper" : "potential", c->K_N_m));

@@ -404,9 +404,11 @@ std::vector<Table> make_tables() {
       "membrane", [](Scene & s) -> auto& { return s.servo.membrane; },
       [](Scene& s) {
         auto& m = *s.servo.membrane;
-        return std::vector<Key>{kilo("E_kPa", m.E_Pa, 0.1, 1e5), real("nu", m.nu, 0, 0.5),
+        return std::vector<Key>{choice("law", m.law, {"large_deflection", "paper"}),
+                                kilo("E_kPa", m.E_Pa, 0.1, 1e5), real("nu", m.nu, 0, 0.5),
                                 micro("h_um", m.h_m, 0.05, 100), micro("c_um", m.c_m, 0.2, 50),
-                                micro("R_um", m.R_m, 5, 2000)};
+                                micro("R_um", m.R_m, 5, 2000), real("prestrain", m.prestrain, 0.002, 1),
+                                micro("seat_um", m.seat_m, 1, 2000)};
       }));
 
   t.push_back(thing(

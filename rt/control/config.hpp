@@ -9,13 +9,17 @@ namespace punctum::rt {
 
 using hal::Vec3;
 
-// Eq. 5 and 4 (Sun & Nelson 2003) with the paper's values.
+// With the values of the paper (Sun & Nelson 2003).
 struct MembraneParams {
-  double E_Pa = 35.3e3;  // elastic modulus
-  double nu = 0.5;       // Poisson ratio
-  double h_m = 4.6e-6;   // thickness
-  double c_m = 3.8e-6;   // pipette radius
-  double R_m = 60e-6;    // undeformed cell, until vision knows better
+  enum class Law : std::uint8_t { large_deflection, paper };
+  Law law = Law::large_deflection;
+  double E_Pa = 35.3e3;    // elastic modulus
+  double nu = 0.5;         // Poisson ratio
+  double h_m = 4.6e-6;     // thickness
+  double c_m = 3.8e-6;     // pipette radius
+  double R_m = 60e-6;      // undeformed cell, until vision knows better
+  double prestrain = 0.2;  // large deflection: of the undeformed membrane, by turgor
+  double seat_m = 29.5e-6;  // large deflection: radius of the patch that rests in the holding pipette or dish
 };
 
 // Cone-shaped attractive guide, eq. 6 and fig. 13.
@@ -103,9 +107,9 @@ struct LocalModelParams {
   double stale_after_s = 0.30;   // age from which the rendered force fades
   double fade_s = 0.15;
   double return_s = 0.4;  // the force returns over this once vision is back
-  // Eq. 5 wants the width of the dimple itself: a = c + dimple_scale sqrt(2 R w_d) follows the simulated
-  // cell's force within 0.3 uN. Vision's 1 % width spans a whole sagging cell; a rate above 0 lets it correct
-  // the scale.
+  // The paper's law wants the width of the dimple itself: a = c + dimple_scale sqrt(2 R w_d) follows the
+  // simulated cell's force within 0.4 uN. Vision's 1 % width spans a whole sagging cell; a rate above 0 lets
+  // it correct the scale.
   double dimple_scale = 0.6;
   double dimple_scale_rate_1_s = 0;
   double dimple_min_m = 2e-6;  // w_d from which a dimple's width is believed

@@ -450,7 +450,7 @@ void Servo::render_membrane(double gain) noexcept {
   const double k_p = config_.mapping.position_scale;
   stored_J_ += scale * membrane_->stored_energy_J() * k_p;
   injected_J_ += force_N * model_moved_m_ * k_p;
-  if (w > 0 && !membrane_->state().small_slope) alarms_ |= alarm_model_invalid;
+  if (w > 0 && !membrane_->state().shallow) alarms_ |= alarm_model_invalid;
 }
 
 // ---- limits and safety ----

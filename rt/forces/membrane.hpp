@@ -1,5 +1,7 @@
-// The force of the indented membrane: eq. 5 and eq. 4 of the paper (Sun & Nelson 2003). All at the needle,
-// SI.
+// The force of the indented membrane. All at the needle, SI. Pure functions of their arguments, real-time
+// safe.
+//
+// Two laws. The paper's, eq. 5 and eq. 4 (Sun & Nelson 2003), of a dimple of radius a:
 //
 //   F = 2 pi E h w^3 / (a^2 (1-nu)) f(zeta),  zeta = c/a,  f = N / ((1-zeta^2) D^3)
 //   N = 3 - 4 zeta^2 + zeta^4 + 2 ln zeta^2,  D = 1 - zeta^2 + ln zeta^2
@@ -7,11 +9,16 @@
 // (the printed eq. 5 has w^2 and lost a fraction bar). Evaluated in a form whose terms are all positive, so
 // that nothing cancels near zeta = 1. It is a small-slope, thin-film law: against exact slopes it
 // over-predicts by 5 % at a depth of 2-3 um, by a quarter and more beyond 4 um, and h > c is outside its
-// assumptions: see `valid`. Pure functions of their arguments; real-time safe.
+// assumptions: see `valid`. And the corrected one, large_deflection.hpp, which needs no width of the dimple.
+//
+// Finite arguments give finite results: what would overflow, or lies outside the geometry (a <= c), gives the
+// largest finite number. An argument that is not finite gives a force that is not a number.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "hal/devices.hpp"
 #include "rt/control/config.hpp"
@@ -28,12 +35,14 @@ struct MembraneShape {
 };
 
 // c > 0, reach = a - c > 0, in the same unit. Pass the difference itself: a - c of rounded numbers is what
-// limits the result near zeta = 1.
+// limits the result near zeta = 1. A reach below 1e-70 a (float: 1e-9 a) counts as that.
 template <class Real>
 [[nodiscard]] MembraneShape<Real> membrane_shape(Real c, Real reach) noexcept {
   const Real a = c + reach;
-  const Real zeta = c / a;
-  const Real s = (reach / a) * (1 + zeta) / (1 + zeta * zeta);
+  constexpr Real least = std::numeric_limits<Real>::digits > 24 ? Real(1e-70) : Real(1e-9);
+  const Real zeta = std::max(c / a, std::numeric_limits<Real>::min());
+  const Real narrow = std::max(reach / a, least);
+  const Real s = narrow * (1 + zeta) / (1 + zeta * zeta);
   const Real q = 1 + s;
   Real T;  // (atanh s - s)/s^3
   if (s <= Real(0.5)) {
@@ -54,55 +63,74 @@ template <class Real>
   const Real s2 = s * s;
   const Real f = q * q * (1 + q * q * T) / (4 * s2 * s2 * p * p * p);
   const Real half_D = s2 * p / q;
-  const Real u = (reach / a) * (1 + zeta);  // 1 - zeta^2
+  const Real u = narrow * (1 + zeta);  // 1 - zeta^2
   return {f, half_D, 2 * zeta * zeta / u + u / half_D * (3 - 1 / (2 * f * half_D * half_D))};
 }
 
-// Eq. 5 for a dimple of depth w and radius a, both measured. 0 for w <= 0; a > c is required.
+// 2 pi E h w^3 f / (a^2 (1-nu)), f of membrane_shape; no partial product overflows or is lost.
+template <class Real>
+[[nodiscard]] Real eq5(Real E_Pa, Real nu, Real h_m, Real wd_m, Real a_m, Real f) noexcept {
+  int exponent = 0;
+  const auto mantissa = [&exponent](Real x, int power) {
+    int e = 0;
+    const Real m = std::frexp(x, &e);
+    exponent += power * e;
+    return m;
+  };
+  const Real w = mantissa(wd_m, 3);
+  const Real a = mantissa(a_m, -2);
+  const Real stiffness = mantissa(E_Pa, 1) * mantissa(h_m, 1) /
+                         mantissa(std::max(1 - nu, std::numeric_limits<Real>::epsilon()), -1);
+  const Real shape = mantissa(f, 1);
+  const Real slope = w / a;
+  const Real F = Real(2 * 3.14159265358979323846L) * stiffness * shape * (w * slope * slope);
+  return std::clamp(std::ldexp(F, exponent), Real(0), std::numeric_limits<Real>::max());
+}
+
+// Eq. 5 for a dimple of depth w and radius a, both measured. 0 for w <= 0.
 template <class Real>
 [[nodiscard]] Real membrane_force(Real E_Pa, Real nu, Real h_m, Real c_m, Real wd_m, Real a_m) noexcept {
-  if (!(wd_m > 0)) return 0;
-  const Real f = membrane_shape(c_m, a_m - c_m).f;
-  const Real slope = wd_m / a_m;
-  return Real(2 * 3.14159265358979323846L) * E_Pa * h_m * wd_m * (slope * slope) / (1 - nu) * f;
+  if (wd_m <= 0) return 0;
+  if (a_m <= c_m || c_m < 0) return std::numeric_limits<Real>::max();
+  return eq5(E_Pa, nu, h_m, wd_m, a_m, membrane_shape(c_m, a_m - c_m).f);
 }
 
-// One evaluation of the law at the needle.
+// One evaluation of a law at the needle.
 struct MembraneState {
   double force_N = 0;
-  double a_m = 0;         // half-width of the dimple
-  double sigma_d_Pa = 0;  // membrane stress at the rim, eq. 4
-  double pressure_Pa =
-      0;             // inner pressure, eq. 4: F = pi c^2 p + 2 pi c h sigma_d sin(theta), p = F/(pi a^2)
-  double slope = 0;  // tan(theta) at the rim
+  double a_m = 0;            // where the membrane is level: F = pi a^2 p (eq. 4), the dimple's edge
+  double sigma_d_Pa = 0;     // membrane stress at the pipette's rim, eq. 4
+  double pressure_Pa = 0;    // eq. 4: F = pi c^2 p + 2 pi c h sigma_d sin(theta)
+  double slope = 0;          // tan(theta) at the rim; < 0 while the pressed sphere still bulges there
+  double pull_N = 0;         // outwards round the whole rim, 2 pi c h sigma_d cos(theta)
   double stiffness_N_m = 0;  // dF/dw as it is rendered
-  bool valid = false;        // small slope, thin film (h <= c), dimple smaller than the cell
-  bool small_slope = true;   // the part of it that changes as the needle advances
+  double energy_J = 0;       // in the dimple: the integral of F dw from contact at today's R and scale
+  bool valid = false;        // all of the law's assumptions hold
+  bool shallow = true;       // the part of it that changes as the needle advances
 };
 
-// Slope at the rim up to which the law is within some 6 % of exact slopes.
+// Slope at the rim up to which the paper's law is within some 6 % of exact slopes.
 inline constexpr double kMembraneSlopeMax = 0.7;
 
-// Width of the dimple where only its depth is known: a = c + scale sqrt(2 R w), which makes F ~ w at contact
-// (an exponent of 3/4 or more would give a force that does not vanish there). scale is observed by vision.
-[[nodiscard]] inline double dimple_reach(double R_m, double wd_m, double scale) noexcept {
-  return wd_m > 0 ? scale * std::sqrt(2 * R_m * wd_m) : 0;
-}
+// The paper's law where only the depth is known: a = c + scale sqrt(2 R w), which makes F ~ w at contact (an
+// exponent of 3/4 or more would give a force that does not vanish there). scale may be observed by vision.
+[[nodiscard]] double dimple_reach(double R_m, double wd_m, double scale) noexcept;
 
-// Exactly 0 for wd_m <= 0. R_m, scale > 0.
+// By params.law; `scale` is for the paper's. Exactly 0 for wd_m <= 0. R_m, scale > 0. Paper: valid = small
+// slope, thin film (h <= c), dimple smaller than the cell; large deflection: within its calibration.
 [[nodiscard]] MembraneState membrane_law(const MembraneParams& params, double wd_m, double R_m,
                                          double scale) noexcept;
 
 // The force as vectors at points of the pipette's rim, spread evenly round the axis: each has its share of
-// the axial force and the outward pull of the membrane that leaves the rim at angle theta. Their sum is -F b.
+// the axial force and of the outward pull of the membrane. Their sum is -F b.
 inline constexpr int kRimPoints = 4;
 using RimForces = std::array<hal::Vec3, kRimPoints>;
 [[nodiscard]] RimForces rim_forces(const MembraneState& state, double force_N,
                                    const hal::Vec3& axis) noexcept;
 
 // The law as it is rendered: follows the depth until the membrane is punctured, then falls monotonically to
-// zero within release_s from what it was and stays there, whatever the depth does: the energy in the dimple
-// (F w / 4) is dropped, never given back. rearm() for a fresh membrane.
+// zero from what it was and stays there, whatever the depth does: the energy in the dimple is dropped, never
+// given back. rearm() for a fresh membrane.
 class Membrane {
  public:
   explicit Membrane(const MembraneParams& params) noexcept : params_(params) {}
@@ -112,16 +140,15 @@ class Membrane {
 
   [[nodiscard]] const MembraneState& state() const noexcept { return state_; }  // force_N as rendered
   [[nodiscard]] bool punctured() const noexcept { return punctured_; }
-  [[nodiscard]] double stored_energy_J() const noexcept { return stored_J_; }    // in the dimple, F w / 4
+  [[nodiscard]] double stored_energy_J() const noexcept { return state_.energy_J; }
   [[nodiscard]] double dropped_energy_J() const noexcept { return dropped_J_; }  // at the last puncture
 
  private:
   MembraneParams params_;
   MembraneState state_;
   bool punctured_ = false;
-  double force_at_puncture_N_ = 0;
+  MembraneState at_puncture_;
   double since_puncture_s_ = 0;
-  double stored_J_ = 0;
   double dropped_J_ = 0;
 };
 

@@ -347,8 +347,9 @@ TEST(Servo, does_not_call_a_cell_done_that_got_nothing) {
   }
 }
 
-TEST(Servo, renders_the_membrane_law_of_the_depth_it_reports_within_a_percent_at_rest) {
+TEST(Servo, renders_the_papers_law_of_the_depth_it_reports_within_a_percent_at_rest) {
   ServoConfig config = icsi();
+  config.membrane->law = MembraneParams::Law::paper;
   config.local_model->dimple_scale_rate_1_s = 0.5;
   Bench b(config);
   b.to_indentation();
@@ -361,17 +362,40 @@ TEST(Servo, renders_the_membrane_law_of_the_depth_it_reports_within_a_percent_at
   EXPECT_NEAR(s.membrane_N / (1e5 * force), 1, 0.01);
   EXPECT_GT(s.force_N[0], 0);  // pushes the hand back, to the right
   EXPECT_NEAR(s.pressure_Pa, s.tip_force_N / (3.14159265 * s.a_m * s.a_m), 1e-6 * s.pressure_Pa);
+  EXPECT_NE(s.alarms & alarm_model_invalid, 0U);  // too steep for it
+}
+
+TEST(Servo, renders_the_corrected_law_of_the_depth_it_reports_at_rest) {
+  Bench b(icsi());
+  b.to_indentation();
+  b.run(3);
+  const TelemetrySample& s = b.sample();
+  EXPECT_NEAR(s.wd_m, -b.gap(), 20e-9);
+  // F / (E h R w) = 0.715 at w/R = 0.125 and 0.720 at 0.375: membrane_truth_reference.py, of c/R = 0.0625.
+  const double force = 0.717 * 35.3e3 * 4.6e-6 * -b.gap();
+  EXPECT_NEAR(s.membrane_N / (1e5 * force), 1, 0.05);
+  EXPECT_GT(s.force_N[0], 0);
+  EXPECT_EQ(s.alarms & alarm_model_invalid, 0U);
+}
+
+TEST(Servo, stops_when_the_membrane_law_gives_no_number) {
+  ServoConfig config = icsi();
+  config.membrane->E_Pa = std::numeric_limits<double>::quiet_NaN();
+  Bench b(config);
+  b.run(2);
+  EXPECT_EQ(b.sample().fault, Fault::not_finite);
+  for (const double f : b.sample().force_N) EXPECT_EQ(f, 0);
 }
 
 TEST(Servo, holds_still_in_contact_without_a_limit_cycle) {
-  // Down to a stiff, narrow dimple: at the hand k_f/k_p dF/dw of the order of the arm's own stiffness.
+  // Of a stiff membrane: at the hand k_f/k_p dF/dw of the order of the arm's own stiffness.
   for (const double rate : {1000.0, 8000.0}) {
     ServoConfig config = icsi();
+    config.membrane->E_Pa *= 5;
     config.rate_Hz = rate;
     config.limits.tip_force_soft_N = 1;
     config.limits.tip_force_hard_N = 1;
     Bench b(config);
-    b.dimple = 0.33;
     b.puncture_at = 1;
     b.to_indentation();
     b.move(0, 15e-6);
@@ -843,7 +867,7 @@ TEST(Servo, does_not_follow_a_hand_whose_readings_stood_still_and_are_suddenly_e
 
 TEST(Servo, fades_the_force_on_a_handle_that_a_changing_force_does_not_move) {
   ServoConfig config = icsi();
-  config.local_model->dimple_scale = 0.45;
+  config.membrane->E_Pa *= 3;
   Bench b(config);
   b.to_indentation();
   b.run(1);

@@ -1,0 +1,94 @@
+#include "rt/forces/large_deflection.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace punctum::rt {
+namespace {
+
+// (1-nu) F/w, (1-nu) p, (1-nu) T.
+struct Coefficients {
+  double stiffness, pressure, tension;
+};
+constexpr std::array<Coefficients, kDeflectionTerms> kCoefficients{{
+#include "rt/forces/large_deflection_coefficients.inc"
+}};
+
+// From the box to -1 .. 1, by a function that is even over it.
+template <class Function>
+[[nodiscard]] double mapped(double x, double low, double high, Function even) noexcept {
+  const double from = even(low);
+  return 2 * (even(std::clamp(x, low, high)) - from) / (even(high) - from) - 1;
+}
+
+[[nodiscard]] bool between(double x, double low, double high) noexcept { return x >= low && x <= high; }
+
+constexpr double kDeepest = 1e100;  // over R; farther counts as this
+
+}  // namespace
+
+std::array<DeflectionTerm, kDeflectionTerms> deflection_terms(const DeflectionInput& at) noexcept {
+  const DeflectionInput& low = kDeflectionMin;
+  const DeflectionInput& high = kDeflectionMax;
+  const auto log = [](double x) { return std::log(x); };
+  const auto root = [](double x) { return std::sqrt(x); };
+  const auto itself = [](double x) { return x; };
+  const double u[] = {mapped(at.c, low.c, high.c, log),
+                      mapped(at.prestrain, low.prestrain, high.prestrain, root),
+                      mapped(at.seat, low.seat, high.seat, itself), mapped(at.nu, low.nu, high.nu, itself)};
+  const auto& [top, c_top, prestrain_top, seat_top, nu_top] = kDeflectionDegrees;
+  std::array<DeflectionTerm, kDeflectionTerms> terms;
+  std::size_t i = 0;
+  double of_c = 1;
+  for (int b = 0; b <= c_top; ++b, of_c *= u[0]) {
+    double of_prestrain = of_c;
+    for (int c = 0; c <= prestrain_top && b + c <= kDeflectionDegree; ++c, of_prestrain *= u[1]) {
+      double of_seat = of_prestrain;
+      for (int d = 0; d <= seat_top && b + c + d <= kDeflectionDegree; ++d, of_seat *= u[2]) {
+        double value = of_seat;
+        for (int e = 0; e <= nu_top && b + c + d + e <= kDeflectionDegree; ++e, value *= u[3]) {
+          for (int a = 0; a <= top && a + b + c + d + e <= kDeflectionDegree; ++a) terms[i++] = {a, value};
+        }
+      }
+    }
+  }
+  return terms;
+}
+
+Deflection large_deflection(const DeflectionInput& at) noexcept {
+  const DeflectionInput& low = kDeflectionMin;
+  const DeflectionInput& high = kDeflectionMax;
+  constexpr std::size_t kPowers = kDeflectionDegrees[0] + 1;
+  std::array<double, kPowers> G{};
+  std::array<double, kPowers> p{};
+  std::array<double, kPowers> T{};
+  const auto terms = deflection_terms(at);
+  for (std::size_t i = 0; i < kDeflectionTerms; ++i) {
+    const auto power = static_cast<std::size_t>(terms[i].w_power);
+    G[power] += kCoefficients[i].stiffness * terms[i].value;
+    p[power] += kCoefficients[i].pressure * terms[i].value;
+    T[power] += kCoefficients[i].tension * terms[i].value;
+  }
+
+  const double w = std::min(at.w, high.w);
+  const double t = std::sqrt(w / high.w);
+  const double by_nu = 1 / std::clamp(1 - at.nu, 0.1, 2.0);
+  Deflection out;
+  double t_a = by_nu;
+  for (std::size_t a = 0; a < kPowers; ++a, t_a *= t) {
+    const double half = 0.5 * static_cast<double>(a);
+    out.force += G[a] * t_a * w;
+    out.stiffness += G[a] * t_a * (1 + half);
+    out.energy += G[a] * t_a * w * w / (2 + half);
+    out.pressure += p[a] * t_a;
+    out.tension += T[a] * t_a;
+  }
+  const double beyond = std::min(at.w, kDeepest) - w;
+  out.energy += beyond * (out.force + 0.5 * beyond * out.stiffness);
+  out.force += beyond * out.stiffness;
+  out.calibrated = at.w <= high.w && between(at.c, low.c, high.c) && between(at.seat, low.seat, high.seat) &&
+                   between(at.nu, low.nu, high.nu) && between(at.prestrain, low.prestrain, high.prestrain);
+  return out;
+}
+
+}  // namespace punctum::rt

@@ -21,6 +21,11 @@ namespace fs = std::filesystem;
 using namespace punctum::report;
 
 constexpr int kTopicFailed = 1, kBadInput = 2;
+#ifdef PUNCTUM_VISION
+constexpr const char* kLeftOut = "";
+#else
+constexpr const char* kLeftOut = "vision and surface are left out: built without OpenCV\n";
+#endif
 
 int bad(const std::string& text) {
   fmt::print(stderr, "{}\n", text);
@@ -71,6 +76,7 @@ int main_or_throw(int argc, char** argv) {
     names += ", " + std::string(t.name);
     about += fmt::format("  {:<12}{}\n", t.name, t.about);
   }
+  about += kLeftOut;
   const auto evaluates =
       std::find_if(topics().begin(), topics().end(), [](const Topic& t) { return t.evaluate != nullptr; });
   CLI::App app{about};
@@ -100,7 +106,7 @@ int main_or_throw(int argc, char** argv) {
   for (const std::string& w : wanted)
     if (w != "all" &&
         std::none_of(topics().begin(), topics().end(), [&w](const Topic& t) { return t.name == w; }))
-      return bad(fmt::format("TOPIC: {}: there is no such topic, allowed: {}", w, names));
+      return bad(fmt::format("{}TOPIC: {}: there is no such topic, allowed: {}", kLeftOut, w, names));
   if (in != nullptr && in->count() > 0) {
     if (wanted != std::vector{std::string(evaluates->name)})
       return bad(fmt::format("--input: allowed with the one topic {}", evaluates->name));
@@ -111,6 +117,7 @@ int main_or_throw(int argc, char** argv) {
                      : folder);
   if (const auto wrong = prepare(out); !wrong.empty()) return bad(wrong);
 
+  if (all) fmt::print("{}", kLeftOut);
   const Provenance from = provenance();
   std::vector<Finished> finished;
   for (const Topic& t : topics())

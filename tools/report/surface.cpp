@@ -224,7 +224,7 @@ const std::vector<SurfaceMethod>& surface_methods() {
   static const std::vector<double> few{8, 16, 32, 64, 128, 256};
   static const std::vector<SurfaceMethod> rows = {
       {"undeformed sphere", "", {0}, [](const DeformedCell& d, double) { return sphere(d.R_um); }},
-      {"sphere with eq. 4, a from w_d",
+      {"sphere with eq. 4 (a from w_d)",
        "",
        {0},
        [](const DeformedCell& d, double) {
@@ -232,7 +232,7 @@ const std::vector<SurfaceMethod>& surface_methods() {
          return dimpled_sphere(d.R_um, d.c_um, d.wd_um,
                                d.c_um + rt::dimple_reach(d.R_um, d.wd_um, shipped.dimple_scale));
        }},
-      {"sphere with eq. 4, a as seen",
+      {"sphere with eq. 4 (true a)",
        "",
        {0},
        [](const DeformedCell& d, double) { return dimpled_sphere(d.R_um, d.c_um, d.wd_um, d.a_um); }},
@@ -242,7 +242,7 @@ const std::vector<SurfaceMethod>& surface_methods() {
        [](const DeformedCell& d, double nodes) {
          return polygon(equally_spaced(closed_contour(d), static_cast<int>(nodes)));
        }},
-      {"polygon, equal angles",
+      {"polygon at equal angles",
        "{} nodes",
        {32, 64, 128, 256, 512},
        [](const DeformedCell& d, double nodes) {
@@ -254,7 +254,7 @@ const std::vector<SurfaceMethod>& surface_methods() {
        [](const DeformedCell& d, double nodes) {
          return spline(equally_spaced(closed_contour(d), static_cast<int>(nodes)));
        }},
-      {"periodic spline, contour as seen", "{} nodes", few,
+      {"periodic spline as seen", "{} nodes", few,
        [](const DeformedCell& d, double nodes) {
          return d.seen.empty() ? Surface() : spline(equally_spaced(d.seen, static_cast<int>(nodes)));
        }},
@@ -365,8 +365,10 @@ Result run_surface(const Job& job) {
               e.max_um,
               w.time.median_ns / (kSide * kSide)};
       for (const auto& c : time_cells(w.time)) row.push_back(c);
-      row.emplace_back(better_than(w, works[d]) == nullptr);
+      const bool front = better_than(w, works[d]) == nullptr;
+      row.emplace_back(front);
       row.emplace_back(w.shipped);
+      if (d + 1 == cells.size() && (front || w.shipped)) table.shown_rows.push_back(table.rows.size());
       table.add(std::move(row));
     }
   }
@@ -413,7 +415,7 @@ Result run_surface(const Job& job) {
   double seen_best = std::numeric_limits<double>::infinity();
   std::string enough;  // nodes of the true contour that err less than seeing does
   for (const Work& w : works.back()) {
-    if (w.method == "periodic spline, contour as seen") seen_best = std::min(seen_best, w.error);
+    if (w.method == "periodic spline as seen") seen_best = std::min(seen_best, w.error);
   }
   for (const Work& w : works.back()) {
     if (w.method == "periodic spline" && w.error < seen_best && enough.empty()) enough = w.knob;
@@ -424,8 +426,8 @@ Result run_surface(const Job& job) {
       "w_d and {:.2f} um with a as seen; what the tracker sees is good to {:.2f} um, so a spline needs no "
       "more "
       "than {}; of the whole surface, {}.",
-      deepest.wd_um, find("undeformed sphere", ""), find("sphere with eq. 4, a from w_d", ""),
-      find("sphere with eq. 4, a as seen", ""), seen_best, enough.empty() ? "nothing tried" : enough,
+      deepest.wd_um, find("undeformed sphere", ""), find("sphere with eq. 4 (a from w_d)", ""),
+      find("sphere with eq. 4 (true a)", ""), seen_best, enough.empty() ? "nothing tried" : enough,
       front_sentence(works.back()));
   return out;
 }

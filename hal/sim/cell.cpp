@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "hal/sim/noise.hpp"
 
@@ -17,7 +18,7 @@ constexpr double kFriction = 0.4;            // zona on the glass of the holding
 constexpr double kStick_N = 0.05e-6;         // holds without suction
 constexpr double kAdhesion_N = 60e-6;        // of a cell without a holding pipette, on its dish
 constexpr double kLeak_s = 1.5;              // time constant of a ripped cell
-constexpr int kBisections = 48;              // of the step, to locate an event
+constexpr int kTrials = 80;                  // at most, to locate an event
 constexpr int kEventsPerStep = 8;
 
 Vec3 vec(const double (&a)[3]) noexcept { return {a[0], a[1], a[2]}; }
@@ -102,6 +103,18 @@ Vec3 Cell::holder_mouth_m() const noexcept {
   return params_.centre_m + Vec3(-params_.R_m, holder_ ? holder_->drop_m : 0, 0);
 }
 
+double TipMotion::time_at(double way) const noexcept {
+  const double length = (tip_end_m - tip_begin_m).norm();
+  if (!(lag_s > 0 && knee_m > 0 && length > 0 && left_m > length)) return way;
+  // In lags, from left_m to `left`.
+  const auto lags = [this](double left) {
+    return (std::max(left_m, knee_m) - std::max(left, knee_m)) / knee_m +
+           std::log(std::min(left_m, knee_m) / std::min(left, knee_m));
+  };
+  const double part = lags(left_m - way * length) / lags(left_m - length);
+  return std::isfinite(part) ? std::clamp(part, 0.0, 1.0) : way;
+}
+
 Cell::Pose Cell::pose(const CellState& state, const TipMotion& motion, double s) const noexcept {
   Pose p;
   p.tip = motion.tip_begin_m + s * (motion.tip_end_m - motion.tip_begin_m);
@@ -184,46 +197,70 @@ CellForce Cell::step(CellState& state, const TipMotion& motion, double dt_s) con
     put(state.hole_m, vec(state.hole_m) + moved);
   }
 
-  const auto holds = [&](Event event, const Pose& p) {
-    const bool inside = p.outer.hit && p.outer.depth > 0;
+  // How far past an event a pose is: it has happened where this is positive.
+  const auto past = [&](Event event, const Pose& p) {
+    constexpr double never = -std::numeric_limits<double>::infinity();
+    if (event == Event::leave) return !state.contact ? never : p.outer.hit ? -p.outer.depth : -never;
+    if (!p.outer.hit) return never;
+    if (event == Event::touch) return state.contact ? never : p.outer.depth;
+    if (!(p.outer.depth > 0)) return never;
     switch (event) {
-      case Event::touch:
-        return !state.contact && inside;
-      case Event::leave:
-        return state.contact && !inside;
       case Event::outer_gives:
-        return inside && !state.outer.punctured && state.attached && p.normal_depth >= outer_puncture_m_;
+        return state.outer.punctured || !state.attached ? never : p.normal_depth - outer_puncture_m_;
       case Event::inner_gives:
-        return params_.inner && inside && p.inner.hit && state.outer.punctured && !state.inner.punctured &&
-               state.attached && p.inner_normal_depth >= inner_puncture_m_;
+        return !params_.inner || !p.inner.hit || !state.outer.punctured || state.inner.punctured ||
+                       !state.attached
+                   ? never
+                   : p.inner_normal_depth - inner_puncture_m_;
       case Event::far_wall:
-        return inside && !state.far_wall_pierced && state.attached &&
-               p.outer.depth >= 2 * p.outer.half + params_.far_wall_strain_margin_m;
+        return state.far_wall_pierced || !state.attached
+                   ? never
+                   : p.outer.depth - 2 * p.outer.half - params_.far_wall_strain_margin_m;
       case Event::rip:
-        return inside && state.outer.punctured && !state.torn && p.sideways >= params_.tear_lateral_m;
-      case Event::none:
-        break;
+        return !state.outer.punctured || state.torn ? never : p.sideways - params_.tear_lateral_m;
+      default:
+        return never;
     }
-    return false;
+  };
+  // Where on the way from `before` on an event that has happened at the end did: Illinois, and halves.
+  const auto locate = [&](Event event, double before, double past_end) {
+    double past_before = past(event, pose(state, motion, before));
+    if (past_before > 0) return before;
+    double after = 1, past_after = past_end;
+    int side = 0;
+    constexpr double fine = std::numeric_limits<double>::epsilon();
+    for (int i = 0; i < kTrials && after - before > 2 * fine; ++i) {
+      const double secant = before + (after - before) * past_before / (past_before - past_after);
+      const double trial = std::isfinite(secant) && i % 3 != 2
+                               ? std::clamp(secant, before + fine, after - fine)
+                               : before + (after - before) / 2;
+      const double there = past(event, pose(state, motion, trial));
+      if (there == 0) return trial;
+      if (there > 0) {
+        after = trial;
+        past_after = there;
+        if (side == 1) past_before /= 2;
+        side = 1;
+      } else {
+        before = trial;
+        past_before = there;
+        if (side == -1) past_after /= 2;
+        side = -1;
+      }
+    }
+    return after;
   };
 
-  double at = 0;
+  double at = 0, time = 0;  // parts of the way and of the time
   for (int handled = 0; handled < kEventsPerStep; ++handled) {
     const Pose end = pose(state, motion, 1);
     Event first = Event::none;
     double first_at = 1;
     for (const Event event :
          {Event::touch, Event::outer_gives, Event::inner_gives, Event::far_wall, Event::rip, Event::leave}) {
-      if (!holds(event, end)) continue;
-      double before = at, after = 1;
-      if (holds(event, pose(state, motion, at))) {
-        after = at;
-      } else {
-        for (int i = 0; i < kBisections; ++i) {
-          const double middle = 0.5 * (before + after);
-          (holds(event, pose(state, motion, middle)) ? after : before) = middle;
-        }
-      }
+      const double past_end = past(event, end);
+      if (!(past_end > 0)) continue;
+      const double after = locate(event, at, past_end);
       if (first == Event::none || after < first_at) {
         first = event;
         first_at = after;
@@ -231,9 +268,11 @@ CellForce Cell::step(CellState& state, const TipMotion& motion, double dt_s) con
     }
     if (first == Event::none) break;
     const Pose p = pose(state, motion, first_at);
-    relax(state, p, (first_at - at) * dt_s);
     at = first_at;
-    const double now_s = state.time_s + at * dt_s;
+    const double time_now = motion.time_at(at);
+    relax(state, p, (time_now - time) * dt_s);
+    time = time_now;
+    const double now_s = state.time_s + time * dt_s;
     const auto give_way = [&](MembraneState& membrane, const Chord& c) {
       membrane.punctured = true;
       membrane.puncture_time_s = now_s;
@@ -266,7 +305,7 @@ CellForce Cell::step(CellState& state, const TipMotion& motion, double dt_s) con
     }
   }
   const Pose p = pose(state, motion, 1);
-  relax(state, p, (1 - at) * dt_s);
+  relax(state, p, (1 - time) * dt_s);
   state.time_s += dt_s;
   if (state.torn || state.far_wall_pierced) state.leak = 1 - (1 - state.leak) * std::exp(-dt_s / kLeak_s);
 
@@ -274,8 +313,9 @@ CellForce Cell::step(CellState& state, const TipMotion& motion, double dt_s) con
   out.contact = state.contact;
   out.aims_at_cell = p.outer.hit;
   const double full = 1 - state.leak;
-  const double outer_w = state.outer.dimple_m / R_m_;
-  out.pressure_Pa = full * outer_table_->pressure(state.outer.punctured ? 0 : outer_w) * outer_Eh_ / R_m_;
+  const MembraneTruth::Reading outer = outer_table_->read(state.outer.dimple_m / R_m_);
+  const double pressure = state.outer.punctured ? outer_table_->pressure(0) : outer.pressure;
+  out.pressure_Pa = full * pressure * outer_Eh_ / R_m_;
   if (!p.outer.hit) return out;
 
   out.depth_m = p.outer.depth;
@@ -284,9 +324,9 @@ CellForce Cell::step(CellState& state, const TipMotion& motion, double dt_s) con
   put(state.entry_m, out.entry_m);
   if (state.outer.dimple_m > 0) {
     out.wd_m = state.outer.dimple_m / std::max(0.5, vec(state.outer.axis_m).dot(p.axis));
-    out.a_m = outer_table_->half_width(outer_w) * R_m_;
-    out.rim_m = outer_table_->rim_radius(outer_w) * R_m_;
-    out.rim_depth_m = outer_table_->rim_depth(outer_w) * R_m_;
+    out.a_m = outer.half_width * R_m_;
+    out.rim_m = outer.rim_radius * R_m_;
+    out.rim_depth_m = outer.rim_depth * R_m_;
   }
   if (state.inner.dimple_m > 0) {
     out.inner_wd_m = state.inner.dimple_m / std::max(0.5, vec(state.inner.axis_m).dot(p.axis));
@@ -294,13 +334,13 @@ CellForce Cell::step(CellState& state, const TipMotion& motion, double dt_s) con
   if (!(p.outer.depth > 0)) return out;
 
   if (!state.outer.punctured) {
-    out.strain = outer_table_->strain(outer_w);
-    out.tension_N_m = outer_table_->tip_tension(outer_w) * outer_Eh_;
+    out.strain = outer.strain;
+    out.tension_N_m = outer.tip_tension * outer_Eh_;
   }
   if (!state.attached) return out;  // a loose cell gives way
 
   if (!state.outer.punctured) {
-    out.outer_N = full * outer_table_->force(outer_w) * outer_Eh_ * R_m_;
+    out.outer_N = full * outer.force * outer_Eh_ * R_m_;
     out.force_N -= out.outer_N * p.outer.push;
   }
   if (params_.inner && !state.inner.punctured && p.inner.hit && p.inner_normal_depth > 0 &&

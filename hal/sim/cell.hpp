@@ -51,13 +51,21 @@ struct CellState {
 };
 static_assert(std::is_trivially_copyable_v<CellState>);
 
-// The needle over one step; both are interpolated linearly in between.
+// The needle over one step: straight on from one tip and axis to the other.
 struct TipMotion {
   Vec3 tip_begin_m = Vec3::Zero();
   Vec3 tip_end_m = Vec3::Zero();
   Vec3 axis_begin = -Vec3::UnitX();  // unit, out of the tip
   Vec3 axis_end = -Vec3::UnitX();
   double vacuum_Pa = -1;  // of the holding pipette now; negative = its nominal value
+  // Of a drive that nears its set-point: what was left to go at the beginning, and what is left where its
+  // speed is no longer limited and it goes on as a first-order lag. No lag: constant speed.
+  double left_m = 0;
+  double knee_m = 0;
+  double lag_s = 0;
+
+  // Part of the step's time at which this part of the way is done, 0 .. 1.
+  [[nodiscard]] double time_at(double way) const noexcept;
 };
 
 // At the end of the step.

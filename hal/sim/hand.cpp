@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace punctum::sim {
@@ -18,6 +19,7 @@ class Slide {
     if (!with_spring_) {
       rate_ = c / m;
       g_ = g0 / m;
+      a0_ = std::abs(g_) + rate_ * std::abs(v0);
       return;
     }
     // Particular solution A + u t; y = x - A - u t obeys y'' + 2 alpha y' + w2 y = 0.
@@ -29,6 +31,8 @@ class Slide {
     y0_ = x0 - A_;
     P_ = v0 - u;
     Q_ = -(w2_ * y0_ + alpha_ * P_);
+    a0_ = Q_ - alpha_ * P_;
+    a1_ = P_ * D_ - alpha_ * Q_;
   }
 
   [[nodiscard]] HandAxis at(double t) const noexcept {
@@ -44,6 +48,8 @@ class Slide {
 
   // First time in (0, end] at which sign * velocity becomes negative, or end.
   [[nodiscard]] double stops_at(double sign, double end) const noexcept {
+    // It cannot change by more than this: the acceleration is a0 C + a1 S with |C| <= 1 and |S| <= t.
+    if (sign * v0_ > end * (std::abs(a0_) + end * std::abs(a1_))) return end;
     // Between the zeros of the acceleration the velocity is monotone.
     double from = 0;
     for (int k = 0; k < kMaxPieces && from < end; ++k) {
@@ -77,43 +83,48 @@ class Slide {
   [[nodiscard]] double next_turn(double from) const noexcept {
     constexpr double never = 1e300;
     if (!with_spring_) return never;
-    const double a0 = Q_ - alpha_ * P_;
-    const double a1 = P_ * D_ - alpha_ * Q_;
     const double after = from * (1 + 1e-12) + 1e-15;
     if (D_ < 0) {
       if (root_ <= 0) return never;
-      double turn = std::atan2(-a0, a1 / root_) / root_;
+      double turn = std::atan2(-a0_, a1_ / root_) / root_;
       const double half_turn = std::numbers::pi / root_;
       turn += half_turn * std::ceil((after - turn) / half_turn);
       return turn > from ? turn : turn + half_turn;
     }
     double turn = never;
     if (root_ > 0) {
-      const double tanh_turn = -a0 * root_ / a1;
-      if (a1 != 0 && tanh_turn > 0 && tanh_turn < 1) turn = std::atanh(tanh_turn) / root_;
-    } else if (a1 != 0) {
-      turn = -a0 / a1;
+      const double tanh_turn = -a0_ * root_ / a1_;
+      if (a1_ != 0 && tanh_turn > 0 && tanh_turn < 1) turn = std::atanh(tanh_turn) / root_;
+    } else if (a1_ != 0) {
+      turn = -a0_ / a1_;
     }
     return turn > after ? turn : never;
   }
 
-  // The velocity changes sign between from and to, where it is monotone: bisection, then secant inside it.
+  // The velocity changes sign between from and to, where it is monotone: Illinois, and halves. Ends on the
+  // side where it still moves.
   [[nodiscard]] double root(double sign, double from, double to) const noexcept {
     double a = from;
     double b = to;
     double va = std::max(0.0, sign * at(a).v_m_s);
     double vb = sign * at(b).v_m_s;
-    for (int i = 0; i < 100 && b - a > 1e-16 + 4e-16 * b; ++i) {
-      double t = i % 3 == 2 ? a + (b - a) / 2 : a + (b - a) * va / (va - vb);
-      if (!(t > a && t < b)) t = a + (b - a) / 2;
+    const double fine = 1e-17 + std::numeric_limits<double>::epsilon() * b;
+    int side = 0;
+    for (int i = 0; i < 100 && b - a > 2 * fine; ++i) {
+      const double secant = a + (b - a) * va / (va - vb);
+      const double t = va > 0 && i % 3 != 2 ? std::clamp(secant, a + fine, b - fine) : a + (b - a) / 2;
       const double v = sign * at(t).v_m_s;
-      if (v >= 0) {
+      if (v == 0) return t;
+      if (v > 0) {
         a = t;
         va = v;
-        if (v == 0) break;
+        if (side == 1) vb /= 2;
+        side = 1;
       } else {
         b = t;
         vb = v;
+        if (side == -1) va /= 2;
+        side = -1;
       }
     }
     return a;
@@ -123,6 +134,7 @@ class Slide {
   bool with_spring_;
   double rate_ = 0, g_ = 0;
   double alpha_ = 0, w2_ = 0, D_ = 0, root_ = 0, A_ = 0, y0_ = 0, P_ = 0, Q_ = 0;
+  double a0_ = 0, a1_ = 0;  // acceleration a0 C + a1 S; without a spring a0 bounds it
 };
 
 }  // namespace

@@ -607,6 +607,18 @@ double MembraneTruth::at(const Curve& curve, double w) const noexcept {
   return cubic(curve.y[i], curve.slope[i], curve.y[i + 1], curve.slope[i + 1]);
 }
 
+MembraneTruth::Reading MembraneTruth::read(double w) const noexcept {
+  if (!(w > 0) || w >= w_.back()) {
+    return {force(w), pressure(w), strain(w), tip_tension(w), half_width(w), rim_radius(w), rim_depth(w)};
+  }
+  const std::size_t i = interval(w);
+  const double h = w_[i + 1] - w_[i];
+  const Hermite cubic(h, (w - w_[i]) / h);
+  const auto of = [&](const Curve& c) { return cubic(c.y[i], c.slope[i], c.y[i + 1], c.slope[i + 1]); };
+  return {of(force_),      of(pressure_),   of(strain_),   of(tip_tension_),
+          of(half_width_), of(rim_radius_), of(rim_depth_)};
+}
+
 double MembraneTruth::force(double w) const noexcept { return at(force_, w); }
 double MembraneTruth::pressure(double w) const noexcept { return at(pressure_, w); }
 double MembraneTruth::strain(double w) const noexcept { return at(strain_, w); }

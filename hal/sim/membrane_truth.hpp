@@ -63,6 +63,11 @@ class MembraneTruth {
     return w_.back();
   }  // < kDepthMax: the solver stopped there
 
+  struct Reading {
+    double force, pressure, strain, tip_tension, half_width, rim_radius, rim_depth;
+  };
+  [[nodiscard]] Reading read(double w) const noexcept;  // all of the following in one search
+
   // Argument: depth w over R; 0 or less gives the undeformed sphere. Monotone cubic (PCHIP) between table
   // points.
   [[nodiscard]] double force(double w) const noexcept;

@@ -123,6 +123,11 @@ void World::touch(const StagePlantState& before, double dt_s) noexcept {
   motion.axis_begin = before.axis;
   motion.axis_end = stage_.state().axis;
   if (vacuum_) motion.vacuum_Pa = vacuum_->state().pressure_Pa;
+  if (stage_.state().braking == 0) {
+    motion.left_m = (stage_.state().set_point_m.vec() - before.tip_m.vec()).norm();
+    motion.knee_m = config_.stage.velocity_max_m_s * config_.stage.lag_s;
+    motion.lag_s = config_.stage.lag_s;
+  }
   CellState& s = snapshot_.cell;
   s.time_s = seconds(t_ns_);
   const CellForce f = cell_->step(s, motion, dt_s);

@@ -4,6 +4,7 @@
 
 namespace punctum::report {
 
+Result run_integrators(const Job&);
 Result run_velocity(const Job&);
 #ifdef PUNCTUM_VISION
 Result run_vision(const Job&);
@@ -12,6 +13,7 @@ Result run_surface(const Job&);
 
 std::span<const Topic> topics() {
   static const std::vector<Topic> list = {
+      {"integrators", "ways to step the plant through contact, friction and puncture", run_integrators},
       {"velocity", "the hand's velocity from its quantised positions: error, lag and noise", run_velocity},
 #ifdef PUNCTUM_VISION
       {"vision", "contours, tip, dimple and force as seen in pictures whose truth is known", run_vision},

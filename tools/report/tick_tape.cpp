@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <deque>
@@ -155,8 +156,9 @@ struct OnItsWay {
 
 std::vector<TickTold> record_ticks(const tools::Scene& scene, double seconds) {
   if (scene.recorded) {
-    const auto icsi = tools::load_scene("icsi");
+    auto icsi = tools::load_scene("icsi");
     if (!icsi) throw std::runtime_error(icsi.error());
+    icsi->sim->person = scene.sim->person;
     return record_ticks(*icsi, seconds);
   }
   const double period_s = 1 / scene.servo.rate_Hz;

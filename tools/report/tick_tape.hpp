@@ -32,7 +32,7 @@ struct TickTold {
 static_assert(std::is_trivially_copyable_v<TickTold>);
 
 // The run of a simulated scene in virtual time, seen by an observer that reads the truth, until its task is
-// done, at most `seconds`. A scene whose pictures are recorded is told the run of `icsi`.
+// done, at most `seconds`. A scene whose pictures are recorded is told its person's run of `icsi`.
 [[nodiscard]] std::vector<TickTold> record_ticks(const tools::Scene& scene, double seconds);
 
 // A servo for this scene goes through the tape once. The devices of the scene are there and only copy.

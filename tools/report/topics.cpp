@@ -10,6 +10,7 @@ Result run_velocity(const Job&);
 Result run_vision(const Job&);
 Result run_surface(const Job&);
 #endif
+Result run_scenes(const Job&);
 
 std::span<const Topic> topics() {
   static const std::vector<Topic> list = {
@@ -19,6 +20,8 @@ std::span<const Topic> topics() {
       {"vision", "contours, tip, dimple and force as seen in pictures whose truth is known", run_vision},
       {"surface", "descriptions of the indented cell's surface", run_surface},
 #endif
+      {"scenes", "what each built-in scene costs: processes, libraries, instructions, stages of vision",
+       run_scenes},
   };
   return list;
 }

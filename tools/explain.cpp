@@ -41,6 +41,9 @@ constexpr Saving kSavings[] = {
     {"cone", "no cone guide"},
     {"axis", "no withdrawal axis"},
     {"damping", "no viscous damping"},
+    {"repulsive", "no region is kept free"},
+    {"friction", "no dry friction"},
+    {"vibration", "no burst marks contact and puncture"},
 };
 
 }  // namespace
@@ -98,6 +101,13 @@ std::string explain(const Scene& s) {
   if (const auto& a = s.servo.axis) effect(fmt::format("withdrawal axis ({:g} N/m)", a->K_N_m));
   if (const auto& d = s.servo.damping)
     effect(fmt::format("damping ({:g} outside, {:g} Ns/m inside)", d->B1_Ns_m, d->B2_Ns_m));
+  if (const auto& r = s.servo.repulsive)
+    effect(fmt::format("repulsive region (radius {:g} um, {:g} N/m)", r->radius_m * 1e6, r->K_N_m));
+  if (const auto& f = s.servo.friction)
+    effect(fmt::format("friction ({:g} N, {:g} N/m before it slides)", f->F_c_N, f->K_N_m));
+  if (const auto& cue = s.servo.vibration)
+    effect(fmt::format("vibration at contact and puncture ({:g} Hz, {:g} N)", cue->frequency_Hz,
+                       cue->amplitude_N));
   line("  force effects         " + (effects.empty() ? std::string("none") : effects));
   line(fmt::format(
       "  limits                hand {:g} N, stage {:g} um/s, depth {:g} um, far wall {:g} um, tip {:g} uN",

@@ -18,7 +18,7 @@ constexpr const char* kColumns =
     "injector_open,sensor_N,vacuum_Pa,"
     "true_tip_x_m,true_tip_y_m,true_tip_z_m,true_force_N,true_gap_m,true_wd_m,true_a_m,true_contact,true_"
     "punctured,"
-    "true_lost\n";
+    "true_lost,repulsive_N,friction_N,vibration_N\n";
 
 // A core in virtual time may be as fast as this: the caller has more to do than to drain.
 constexpr std::uint64_t kAtOnce = 4096;
@@ -122,19 +122,21 @@ void Recorder::row(const rt::TelemetrySample& s, const sim::Snapshot* world) {
   count(s.injector_open);
   put(s.sensor_N), put(s.vacuum_Pa);
   if (world == nullptr) {
-    fmt::format_to(std::back_inserter(out), ",,,,,,,,,\n");
+    fmt::format_to(std::back_inserter(out), ",,,,,,,,,,");
   } else {
     const hal::Vec3 tip = world->stage.tip_m;
     put(tip.x()), put(tip.y()), put(tip.z());
     if (world->has_cell != 0) {
       const sim::Truth t = sim::truth_of(sim_, *world);
       put(t.axial_force_N), put(t.gap_m), put(t.wd_m), put(t.a_m);
-      fmt::format_to(std::back_inserter(out), FMT_COMPILE("{:d},{:d},{:d}\n"), t.contact, t.punctured,
+      fmt::format_to(std::back_inserter(out), FMT_COMPILE("{:d},{:d},{:d},"), t.contact, t.punctured,
                      t.lost);
     } else {
-      fmt::format_to(std::back_inserter(out), ",,,,,,\n");
+      fmt::format_to(std::back_inserter(out), ",,,,,,,");
     }
   }
+  put(s.repulsive_N), put(s.friction_N);
+  fmt::format_to(std::back_inserter(out), FMT_COMPILE("{:.9g}\n"), s.vibration_N);
   if (std::fwrite(out.data(), 1, out.size(), file_.get()) != out.size()) failed_ = true;
   ++rows_;
 }

@@ -441,6 +441,31 @@ std::vector<Table> make_tables() {
         return std::vector<Key>{real("B1_Ns_m", d.B1_Ns_m, 0, 100), real("B2_Ns_m", d.B2_Ns_m, 0, 100),
                                 milli("ramp_ms", d.ramp_s, 1, 1000)};
       }));
+
+  t.push_back(thing(
+      "repulsive", [](Scene & s) -> auto& { return s.servo.repulsive; },
+      [](Scene& s) {
+        auto& r = *s.servo.repulsive;
+        return std::vector<Key>{triple_um("offset_um", r.offset_m, -2000, 2000),
+                                micro("radius_um", r.radius_m, 0.5, 2000), real("K_N_m", r.K_N_m, 0, 3000),
+                                real("ramp_s", r.ramp_s, 0.001, 5)};
+      }));
+
+  t.push_back(thing(
+      "friction", [](Scene & s) -> auto& { return s.servo.friction; },
+      [](Scene& s) {
+        auto& f = *s.servo.friction;
+        return std::vector<Key>{real("F_c_N", f.F_c_N, 0, 10), real("K_N_m", f.K_N_m, 1, 3000)};
+      }));
+
+  t.push_back(thing(
+      "vibration", [](Scene & s) -> auto& { return s.servo.vibration; },
+      [](Scene& s) {
+        auto& v = *s.servo.vibration;
+        return std::vector<Key>{
+            real("frequency_hz", v.frequency_Hz, 5, 2000), real("amplitude_N", v.amplitude_N, 0, 5),
+            milli("decay_ms", v.decay_s, 1, 1000), micro("energy_uJ", v.energy_J, 0, 1e5)};
+      }));
   return t;
 }
 

@@ -49,6 +49,28 @@ struct DampingParams {
   double ramp_s = 0.035;  // 20 .. 50 ms
 };
 
+// A hill of potential that keeps the needle away from a place in the cell.
+struct RepulsiveParams {
+  Vec3 offset_m{0, -40e-6, 0};  // of its centre from the cell's, world frame, needle scale
+  double radius_m = 15e-6;      // needle scale
+  double K_N_m = 150;           // at the hand, its largest stiffness
+  double ramp_s = 0.2;          // moving or switching
+};
+
+// Dry friction at the hand.
+struct FrictionParams {
+  double F_c_N = 0.1;  // at which it slides
+  double K_N_m = 100;  // of the bristle, until then
+};
+
+// A burst that marks contact and puncture.
+struct VibrationParams {
+  double frequency_Hz = 150;
+  double amplitude_N = 0.15;
+  double decay_s = 0.03;
+  double energy_J = 50e-6;  // of one burst: it ends once it has given more
+};
+
 // How the hand's velocity is made of its positions; at the hand.
 struct VelocityParams {
   enum class Method : std::uint8_t { kalman, foaw };
@@ -154,6 +176,9 @@ struct ServoConfig {
   std::optional<ConeParams> cone;
   std::optional<AxisParams> axis;
   std::optional<DampingParams> damping;
+  std::optional<RepulsiveParams> repulsive;
+  std::optional<FrictionParams> friction;
+  std::optional<VibrationParams> vibration;
   std::optional<InjectorParams> injector;
   std::optional<VacuumParams> vacuum;
   bool force_sensor = false;

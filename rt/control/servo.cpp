@@ -51,6 +51,9 @@ Servo::Servo(const ServoConfig& config, const Devices& devices, Station& station
   if (config.cone) cone_.emplace(*config.cone, config.mapping.position_scale);
   if (config.axis) axis_.emplace(*config.axis, config.mapping.position_scale);
   if (config.damping) damping_.emplace(*config.damping);
+  if (config.repulsive) repulsive_.emplace(*config.repulsive, config.mapping.position_scale);
+  if (config.friction) friction_.emplace(*config.friction);
+  if (config.vibration) vibration_.emplace(*config.vibration, config.device.delay_ticks);
   if (config.phases) phases_.emplace(*config.phases);
   if (config.vision && config.local_model) {
     const MembraneParams membrane = config.membrane.value_or(MembraneParams{});
@@ -424,13 +427,33 @@ hal::Vec3 Servo::sum_force_effects() noexcept {
     energy_J += axis_->stored_energy_J();
     injected_J += axis_->injected_energy_J() - so_far_J;
   }
+  if (repulsive_) {
+    const double so_far_J = repulsive_->injected_energy_J();
+    hal::Vec3 centre_m = hal::Vec3::Zero();
+    if (known) centre_m = model_->membrane().entry_m + model_->R_m() * model_->membrane().axis;
+    repulsive_N_ = fixture_gain_ * repulsive_->step(tip, centre_m, known, dt_s_);
+    energy_J += repulsive_->stored_energy_J();
+    injected_J += repulsive_->injected_energy_J() - so_far_J;
+  }
   // d(gU) at a standing hand: what the fixtures and the gain did between the last tick and this one.
   stored_J_ = fixture_gain_ * energy_J;
   injected_J_ += fixture_gain_ * energy_J - gain_before * (energy_J - injected_J);
 
   render_membrane(fixture_gain_);
+  const hal::Vec3 hand_m = world_from_hand(hand_.position_m);
+  if (friction_) {
+    friction_N_ = friction_->step(hand_m, presence_.gain() > 0);
+    stored_J_ += friction_->stored_energy_J();
+  }
+  if (vibration_) {
+    const double so_far_J = vibration_->injected_energy_J();
+    const bool begins = phases_ && (phases_->entered(Phase::contact) || phases_->entered(Phase::puncture));
+    vibration_N_ = vibration_->step(hand_m, approach_, begins, presence_.gain(), dt_s_);
+    injected_J_ += vibration_->injected_energy_J() - so_far_J;
+  }
   if (damping_) damping_N_ = damping_->step(velocity, inside(), dt_s_);
-  return presence_.gain() * (membrane_N_ + cone_N_ + axis_N_ + damping_N_);
+  return presence_.gain() *
+         (membrane_N_ + cone_N_ + axis_N_ + damping_N_ + repulsive_N_ + friction_N_ + vibration_N_);
 }
 
 void Servo::render_membrane(double gain) noexcept {
@@ -580,6 +603,9 @@ void Servo::publish(const TickInfo& now) noexcept {
   s.cone_N = presence * cone_N_.norm();
   s.axis_N = presence * axis_N_.norm();
   s.damping_N = presence * damping_N_.norm();
+  s.repulsive_N = presence * repulsive_N_.norm();
+  s.friction_N = presence * friction_N_.norm();
+  s.vibration_N = presence * vibration_N_.norm();
   s.guard_N = 0;
 
   if (model_ && model_->membrane().known) {

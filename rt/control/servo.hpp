@@ -19,8 +19,11 @@
 #include "rt/control/safety_latch.hpp"
 #include "rt/forces/cone_guide.hpp"
 #include "rt/forces/damping.hpp"
+#include "rt/forces/friction.hpp"
 #include "rt/forces/membrane.hpp"
+#include "rt/forces/repulsive_region.hpp"
 #include "rt/forces/velocity.hpp"
+#include "rt/forces/vibration.hpp"
 #include "rt/forces/withdrawal_axis.hpp"
 #include "rt/station/observation.hpp"
 #include "rt/station/telemetry.hpp"
@@ -124,6 +127,9 @@ class Servo {
   std::optional<ConeGuide> cone_;
   std::optional<WithdrawalAxis> axis_;
   std::optional<Damping> damping_;
+  std::optional<RepulsiveRegion> repulsive_;
+  std::optional<Friction> friction_;
+  std::optional<Vibration> vibration_;
   std::optional<Phases> phases_;
   std::optional<LocalMembraneModel> model_;
 
@@ -213,6 +219,9 @@ class Servo {
   hal::Vec3 cone_N_ = hal::Vec3::Zero();
   hal::Vec3 axis_N_ = hal::Vec3::Zero();
   hal::Vec3 damping_N_ = hal::Vec3::Zero();
+  hal::Vec3 repulsive_N_ = hal::Vec3::Zero();
+  hal::Vec3 friction_N_ = hal::Vec3::Zero();
+  hal::Vec3 vibration_N_ = hal::Vec3::Zero();
   RimForces rim_{};
   hal::Vec3 hand_force_N_ = hal::Vec3::Zero();  // device frame, what goes out
   hal::Vec3 live_force_N_ = hal::Vec3::Zero();  // limited, before the latch

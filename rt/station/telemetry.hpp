@@ -96,13 +96,16 @@ struct TelemetrySample {
   double obs_age_s = 0;  // age of the newest observation; -1 if none yet
   double sensor_N = 0;   // force sensor, 0 if there is none
   double vacuum_Pa = 0;
-  double stored_energy_J = 0;    // in the fixtures, at the hand
-  double injected_energy_J = 0;  // by moving or switching fixtures, cumulative
+  double stored_energy_J = 0;    // in the effects, at the hand
+  double injected_energy_J = 0;  // by moving or switching fixtures and by vibration, cumulative
   double obs_gap_m = 0;          // newest observation's gap, for comparison
   std::uint64_t observations = 0;
   std::uint64_t stale_ticks = 0;  // ticks on which the newest observation was too old
   std::uint8_t injector_open = 0;
   std::uint8_t pad[7] = {};
+  double repulsive_N = 0;  // more parts, as above
+  double friction_N = 0;
+  double vibration_N = 0;
 };
 
 }  // namespace punctum::rt

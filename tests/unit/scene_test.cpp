@@ -41,7 +41,8 @@ const std::vector<Broken>& broken() {
   static const std::string all_tables =
       "scene, servo, haptic, operator, stage, needle, estop, velocity, mapping, limits, cell, holder, "
       "vacuum, "
-      "injector, force_sensor, camera, vision, phases, local_model, membrane, cone, axis, damping, failure, "
+      "injector, force_sensor, camera, vision, phases, local_model, membrane, cone, axis, damping, "
+      "repulsive, friction, vibration, failure, "
       "estop_press";
   static const std::vector<Broken> list = {
       {"nothing at all", "",

@@ -31,7 +31,8 @@ namespace {
 using namespace punctum;
 
 constexpr int kDone = 0, kNotDone = 1, kBadInput = 2, kFault = 3;
-constexpr double kGrace_s = 2;  // after the time limit, for the forces to fade and the stage to rest
+constexpr double kWayOut_s = 10;  // after the time limit, to draw a needle out of the cell
+constexpr double kGrace_s = 2;    // after that, for the forces to fade and the stage to rest
 constexpr std::int64_t kStartAhead_ns = 800'000'000;
 constexpr std::int64_t kSetUp_ns = 200'000'000;  // for rights, memory and the servo
 
@@ -87,7 +88,9 @@ class Core {
     if (limit_ns_ > 0 && t_ns >= limit_ns_) {
       limit_reached_ = true;
       servo_->request_end();
-      if (t_ns >= limit_ns_ + static_cast<std::int64_t>(kGrace_s * 1e9)) return rt::After::end;
+      const double past_s = 1e-9 * static_cast<double>(t_ns - limit_ns_);
+      if (past_s >= kWayOut_s) servo_->request_end_here();
+      if (past_s >= kWayOut_s + kGrace_s) return rt::After::end;
     }
     rt::TickInfo now;
     now.tick = tick.index;

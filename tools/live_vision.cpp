@@ -25,6 +25,7 @@
 #include "rt/station/station.hpp"
 #include "tools/observation_csv.hpp"
 #include "tools/scene.hpp"
+#include "tools/truth_observer.hpp"
 #include "vision/overlay.hpp"
 #include "vision/tracker.hpp"
 
@@ -49,47 +50,6 @@ extern "C" void on_stop(int) {
 int bad(const std::string& text) {
   fmt::print(stderr, "{}\n", text);
   return kBadInput;
-}
-
-// The simulated world's own knowledge in place of a picture.
-rt::Observation observe_truth(const sim::Truth& t, const hal::Frame& frame,
-                              const std::optional<sim::Truth>& before) {
-  rt::Observation o;
-  o.frame = frame.sequence;
-  o.exposure_ns = frame.exposure_ns;
-  o.flags = rt::Observation::tip_ok;
-  const auto put = [](const sim::Vec3& v, double(&out)[3]) {
-    out[0] = v.x();
-    out[1] = v.y();
-    out[2] = v.z();
-  };
-  put(t.tip_m, o.tip_m);
-  put(t.axis, o.axis);
-  if (t.holder_mouth_m) {
-    o.flags |= rt::Observation::holder_ok;
-    put(*t.holder_mouth_m, o.holder_m);
-    o.holder_score = 1;
-  }
-  if (!t.cell) {
-    return o;
-  }
-  o.flags |= rt::Observation::outer_ok | (t.R_inner_m > 0 ? rt::Observation::inner_ok : 0U) |
-             (t.contact ? rt::Observation::contact : 0U) |
-             (t.zona_punctured ? rt::Observation::punctured : 0U);
-  put(t.centre_m, o.centre_m);
-  o.R_m = t.R_m;
-  o.R_inner_m = t.R_inner_m;
-  put(t.entry_m, o.entry_m);
-  o.gap_m = t.gap_m;
-  o.wd_m = t.wd_m;
-  o.a_m = t.wd_m > 0 ? t.a_m : 0;
-  if (before && before->cell && t.t_s > before->t_s) {
-    o.membrane_velocity_m_s = (t.wd_m - before->wd_m) / (t.t_s - before->t_s);
-  }
-  put(t.tip_m, o.contact_point_m[0]);
-  put(t.tip_m, o.contact_point_m[1]);
-  o.noise_m = 1e-9;
-  return o;
 }
 
 // What was seen against what is so.
@@ -312,7 +272,7 @@ int live(const LiveOptions& options) {
     const vision::Result* seen = nullptr;
     rt::Observation observation;
     if (truth_only) {
-      observation = observe_truth(sim_camera->truth(), frame, truth_before);
+      observation = observe_truth(sim_camera->truth(), frame.sequence, frame.exposure_ns, truth_before);
       truth_before = sim_camera->truth();
     } else {
       seen = &tracker.process(frame);

@@ -171,6 +171,16 @@ std::optional<Problem> check_together(const Scene& s) {
                    fmt::format("is more than the stage can do, allowed: at most "
                                "stage.velocity_max_um_s = {:g}",
                                um(sim.stage.velocity_max_m_s))};
+  // The drive's own lag at full speed is no fault of its.
+  const double lags_m = limits.stage_velocity_m_s * sim.stage.lag_s;
+  if (lags_m > limits.following_error_m)
+    return Problem{"limits.following_error_um",
+                   fmt::format("the stage lags further behind at full speed, allowed: at least "
+                               "stage_velocity_um_s * stage.lag_ms = {:g}",
+                               um(lags_m))};
+  if (servo.membrane && servo.membrane->c_m * 4 > servo.membrane->R_m)
+    return Problem{"membrane.c_um", fmt::format("is too thick for the cell, allowed: at most R_um / 4 = {:g}",
+                                                um(servo.membrane->R_m / 4))};
   for (int i = 0; i < 3; ++i) {
     const auto& m = servo.mapping;
     if (m.workspace_min_m[i] >= m.workspace_max_m[i])

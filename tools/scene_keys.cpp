@@ -235,7 +235,8 @@ std::vector<Table> make_tables() {
       [](Scene& s) {
         auto& v = *s.servo.vacuum;
         return std::vector<Key>{real("min_Pa", v.min_Pa, 0, 50'000),
-                                milli("window_ms", v.window_s, 1, 10'000)};
+                                milli("window_ms", v.window_s, 1, 10'000),
+                                real("still_s", v.still_s, 0, 1000)};
       }));
 
   t.push_back({"injector", Kind::thing,

@@ -345,14 +345,16 @@ Outcome Run::judge(const Ended& ended) const {
   const auto& core = (*station_)->core;
   const auto fault = static_cast<rt::Fault>(core.fault.load());
   if (fault != rt::Fault::none && fault != rt::Fault::command_stop) return Outcome::fault;
+  const auto phase = static_cast<rt::Phase>(core.phase.load());
+  const bool left = phase == rt::Phase::clear;
+  const bool outside = left || phase == rt::Phase::free;
   if (stopped_by_user_ || fault == rt::Fault::command_stop)
-    return scene_.has_task() || vision_over_ ? Outcome::stopped : Outcome::done;
+    return scene_.has_task() || vision_over_ || !outside ? Outcome::stopped : Outcome::done;
   const Measures& m = recorder_->measures();
   if (m.cells_lost > 0 && scene_.has_task()) return Outcome::cell_lost;
   // The core knows that it opened the gate; the simulated world, whether anything came out.
   if (m.cells_without > 0 && scene_.has_task()) return Outcome::not_injected;
   if (core.task_finished.load() != 0 || !scene_.has_task()) return Outcome::done;
-  const bool left = static_cast<rt::Phase>(core.phase.load()) == rt::Phase::clear;
   return left && !stopped_by_user_ &&
                  core.exit_reason.load() != static_cast<std::uint64_t>(rt::ExitReason::time_limit)
              ? Outcome::not_injected

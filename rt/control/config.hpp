@@ -145,6 +145,7 @@ struct InjectorParams {
 struct VacuumParams {
   double min_Pa = 200;
   double window_s = 0.1;
+  double still_s = 1;  // the same digits for longer: the gauge hangs, alarm; 0 = off
 };
 
 struct EstopParams {

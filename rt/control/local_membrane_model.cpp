@@ -31,6 +31,8 @@ void correct(double& value, double& left, double most) noexcept {
 }  // namespace
 
 void PoseHistory::push(const TipPose& pose) noexcept {
+  // A clock that jumped back: what was kept has no order with what comes.
+  if (size_ > 0 && pose.t_ns <= poses_[(next_ + kSize - 1) % kSize].t_ns) size_ = 0;
   poses_[next_] = pose;
   next_ = (next_ + 1) % kSize;
   size_ = std::min(size_ + 1, kSize);

@@ -27,7 +27,7 @@ struct TipPose {
 class PoseHistory {
  public:
   static constexpr std::size_t kSize = 8192;
-  void push(const TipPose& pose) noexcept;  // t_ns must rise
+  void push(const TipPose& pose) noexcept;  // t_ns rises; where it does not, the history begins anew
   // Interpolated; false if t_ns is older than the history or newer than its newest pose.
   [[nodiscard]] bool at(std::int64_t t_ns, TipPose& out) const noexcept;
   [[nodiscard]] std::size_t size() const noexcept { return size_; }

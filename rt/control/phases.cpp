@@ -60,9 +60,10 @@ Phase Phases::step(const PhaseInput& in, double dt_s) noexcept {
       break;
     case Phase::puncture:
     case Phase::injection: {
-      deepest_m_ = std::max(deepest_m_, w);
-      const bool moves_back =
-          in.outward_m_s > params_.withdrawal_speed_m_s && deepest_m_ - w > params_.withdrawal_back_m;
+      // By the encoders: what vision corrects meanwhile is no way back.
+      deepest_m_ = std::max(deepest_m_, in.inward_m);
+      const bool moves_back = in.outward_m_s > params_.withdrawal_speed_m_s &&
+                              deepest_m_ - in.inward_m > params_.withdrawal_back_m;
       if (moves_back || w < -params_.contact_off_m) {
         go(Phase::withdrawal);
       } else if (phase_ == Phase::puncture && in.inject) {
@@ -76,7 +77,7 @@ Phase Phases::step(const PhaseInput& in, double dt_s) noexcept {
     case Phase::clear:
       break;
   }
-  if (entered(Phase::puncture)) deepest_m_ = w;
+  if (entered(Phase::puncture)) deepest_m_ = in.inward_m;
   return phase_;
 }
 

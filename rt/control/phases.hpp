@@ -15,7 +15,8 @@ namespace punctum::rt {
 struct PhaseInput {
   bool membrane_known = false;  // the local model has been placed by vision
   double depth_m = 0;           // of the tip past the undeformed membrane, along the axis; < 0 outside
-  double outward_m_s = 0;       // speed of the tip out of the cell, low-passed
+  double inward_m = 0;     // way of the tip along the axis by the stage's encoders; only differences count
+  double outward_m_s = 0;  // its speed the other way, low-passed
   bool vision_contact = false;  // of the newest usable observation
   bool vision_punctured = false;
   bool inject = false;     // button
@@ -44,7 +45,7 @@ class Phases {
   Phase phase_ = Phase::free;
   bool changed_ = false;
   double in_phase_s_ = 0;
-  double deepest_m_ = 0;
+  double deepest_m_ = 0;       // inward_m
   bool next_cell_was_ = true;  // a button held from the start is no edge
   std::uint32_t cell_ = 0;
 };

@@ -10,9 +10,13 @@ namespace punctum::rt {
 namespace {
 
 constexpr double kLongestStep_s = 0.02;  // what one late tick may advance ramps and filters by
-constexpr double kFallSilent_s = 0.02;   // e-stop chain without data for longer: estop_lost
-constexpr double kDecouple_s = 0.05;     // forces fade over this when the clutch is pressed or the run ends
-constexpr double kOutwardTau_s = 0.03;   // low-pass of the tip's speed
+constexpr double kShortestStep =
+    0.1;  // of the nominal period: no two ticks are nearer, whatever the clock says
+constexpr double kLongestStageStep =
+    2;                                  // of it: a late tick moves the set-point no further, it makes no leap
+constexpr double kFallSilent_s = 0.02;  // e-stop chain without data for longer: estop_lost
+constexpr double kDecouple_s = 0.05;    // forces fade over this when the clutch is pressed or the run ends
+constexpr double kOutwardTau_s = 0.03;  // low-pass of the tip's speed
 constexpr double kSensorTau_s = 0.005;
 constexpr double kSensorTimeout_s = 0.1;
 constexpr double kSoftHysteresis = 0.9;    // of the soft tip-force limit
@@ -92,7 +96,8 @@ Outcome Servo::outcome() const noexcept {
 void Servo::begin(const TickInfo& now) noexcept {
   if (ticks_++ == 0) first_release_ns_ = now.release_ns;
   const bool sane = std::isfinite(now.period_s) && now.period_s > 0;
-  elapsed_s_ = sane ? now.period_s : 1 / config_.rate_Hz;
+  const double nominal_s = 1 / config_.rate_Hz;
+  elapsed_s_ = sane ? std::max(now.period_s, kShortestStep * nominal_s) : nominal_s;
   dt_s_ = std::min(elapsed_s_, kLongestStep_s);
   now_ns_ = now.start_ns;
   alarms_ = degraded_ ? alarm_degraded : 0U;
@@ -211,10 +216,12 @@ Fault Servo::read_vacuum() noexcept {
   double pressure_Pa = 0;
   const bool read = devices_.vacuum->read(pressure_Pa) == hal::Status::ok && std::isfinite(pressure_Pa);
   if (read) {
+    const bool same = pressure_Pa == vacuum_Pa_;
+    vacuum_still_s_ = same ? vacuum_still_s_ + elapsed_s_ : 0;
     vacuum_Pa_ = pressure_Pa;
-  } else {
-    alarms_ |= alarm_sensor;
   }
+  const double still_s = config_.vacuum->still_s;
+  if (!read || (still_s > 0 && vacuum_still_s_ > still_s)) alarms_ |= alarm_sensor;
   const bool holds = read && pressure_Pa >= config_.vacuum->min_Pa;
   vacuum_low_s_ = holds ? 0 : vacuum_low_s_ + elapsed_s_;
   const bool between_cells = phase() == Phase::clear;
@@ -316,6 +323,11 @@ void Servo::follow_hand() noexcept {
 
 bool Servo::sighted() const noexcept { return !model_ || !model_->stale(); }
 
+bool Servo::ending() const noexcept {
+  const bool outside = phase() == Phase::free || phase() == Phase::clear;
+  return task_over_ || end_here_requested_ || (end_requested_ && outside);
+}
+
 bool Servo::inside() const noexcept {
   return phases_ ? phases_->inside() : model_ && model_->puncture_seen();
 }
@@ -367,6 +379,7 @@ void Servo::advance_phase() noexcept {
   if (model_) {
     in.membrane_known = model_->membrane().known;
     in.depth_m = depth_m_;
+    in.inward_m = approach_.dot(tip_before_m_);
     in.outward_m_s = outward_m_s_;
     in.vision_contact = model_->contact_seen();
     in.vision_punctured = model_->puncture_seen();
@@ -398,6 +411,7 @@ hal::Vec3 Servo::sum_force_effects() noexcept {
   const bool running = latch_.stage() == StopStage::running;
   const bool holding = running && mapping_.anchored() && (!devices_.stage || stage_.enabled);
   const double return_s = config_.mapping.coupling_s;
+  presence_before_ = presence_.gain();
   presence_.step(holding && !ending() && !hand_watch_.stuck(), return_s, running ? kDecouple_s : 0, dt_s_);
   coupling_.step(holding && !button(hal::kButtonClutch), return_s, kDecouple_s, dt_s_);
 
@@ -465,8 +479,11 @@ void Servo::render_membrane(double gain) noexcept {
 
   const double scale = gain * config_.mapping.force_scale * force_scale_;
   double force_N = scale * membrane_->state().force_N;
-  // After the puncture the hand's force only ever falls, even while the gain returns.
-  if (membrane_->punctured()) force_N = std::min(force_N, membrane_N_.norm());
+  // After the puncture the hand's force only ever falls, even while gain and presence return.
+  if (membrane_->punctured()) {
+    const double before_N = membrane_N_.norm() * std::min(presence_before_, presence_.gain());
+    force_N = presence_.gain() > 0 ? std::min(force_N, before_N / presence_.gain()) : 0;
+  }
   membrane_N_ = -force_N * approach_;
   rim_ = rim_forces(membrane_->state(), force_N, approach_);
 
@@ -526,7 +543,7 @@ StageConstraint Servo::constraint() const noexcept {
   StageConstraint c;
   if (model_) c.membrane = model_->membrane();
   c.membrane.axis = approach_;
-  c.withdrawal_only = !sighted();
+  c.withdrawal_only = !sighted() || end_requested_;
   c.no_deeper = tip_force_soft_;
   return c;
 }
@@ -534,7 +551,8 @@ StageConstraint Servo::constraint() const noexcept {
 void Servo::choose_stage_set_point() noexcept {
   if (!devices_.stage || !mapping_.anchored()) return;
   if (latch_.stage() != StopStage::running || !stage_.enabled) return;
-  stage_limits_.step(mapping_.filter(dt_s_), constraint(), dt_s_);
+  const double longest_s = kLongestStageStep / config_.rate_Hz;
+  stage_limits_.step(mapping_.filter(dt_s_), constraint(), std::min(dt_s_, longest_s));
   alarms_ |= stage_limits_.alarms();
 }
 
@@ -558,9 +576,10 @@ void Servo::write_devices() noexcept {
   }
 
   if (hal::Injector* injector = devices_.injector) {
-    // A button that is still down from before a stop opens nothing.
-    inject_released_ = !stop_.gate_shut && (inject_released_ || !button(hal::kButtonInject));
-    const bool wanted = !stop_.gate_shut && !ending() && inject_released_ && config_.injector &&
+    // Nobody injects unseen. A button that is still down from before a stop or a loss of sight opens nothing.
+    const bool may = !stop_.gate_shut && sighted();
+    inject_released_ = may && (inject_released_ || !button(hal::kButtonInject));
+    const bool wanted = may && !ending() && !end_requested_ && inject_released_ && config_.injector &&
                         phase() == Phase::injection && button(hal::kButtonInject) && hand_fresh_;
     gate_open_ = wanted && injected_s_ + elapsed_s_ <= config_.injector->max_open_s + kRounding_s;
     if (gate_open_) injected_s_ += elapsed_s_;

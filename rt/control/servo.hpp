@@ -67,9 +67,11 @@ class Servo {
   void tick(const TickInfo& now) noexcept;
 
   // A stop (latched fault command_stop) or an orderly end, as by the command queue; for signals of the
-  // process.
+  // process and its time limit. An end that finds the needle in the cell waits until it is drawn back, the
+  // only way that is open then; request_end_here waits no longer: the force fades, the needle stays.
   void request_stop() noexcept { stop_requested_ = true; }
   void request_end() noexcept { end_requested_ = true; }
+  void request_end_here() noexcept { end_here_requested_ = true; }
 
   // The run is over and everything is at rest: leave the loop. A latched fault that a reset could still
   // clear does not finish the run.
@@ -110,7 +112,7 @@ class Servo {
   [[nodiscard]] StageConstraint constraint() const noexcept;
   [[nodiscard]] bool inside() const noexcept;   // latched puncture
   [[nodiscard]] bool sighted() const noexcept;  // vision is not needed, or not stale
-  [[nodiscard]] bool ending() const noexcept { return task_over_ || end_requested_; }
+  [[nodiscard]] bool ending() const noexcept;   // the task is over, or an end was asked for and may be
   // Every cell was entered and left, and got its substance where there is an injector.
   [[nodiscard]] bool task_done() const noexcept { return task_over_ && cells_injected_ == cells_done_; }
   [[nodiscard]] bool button(std::uint32_t b) const noexcept { return (hand_.buttons & b) != 0; }
@@ -171,6 +173,7 @@ class Servo {
   double differing_s_ = 0;  // the two contacts
   double vacuum_Pa_ = 0;
   double vacuum_low_s_ = 0;
+  double vacuum_still_s_ = 0;
   double sensor_N_ = 0;
   double sensor_filtered_N_ = 0;
   double since_sensor_s_ = 0;
@@ -182,6 +185,7 @@ class Servo {
   // State of the loop.
   bool stop_requested_ = false;
   bool end_requested_ = false;
+  bool end_here_requested_ = false;
   bool task_over_ = false;
   Fault write_fault_ = Fault::none;  // found while writing, latched on the next tick
   std::uint32_t cells_done_ = 0;
@@ -191,6 +195,7 @@ class Servo {
   double force_scale_wanted_ = 1;  // command force_scale, 0 .. 1
   double force_scale_ = 1;
   Ramp presence_;  // of every force: from the start, after a reset, to the end
+  double presence_before_ = 0;
   Ramp coupling_;  // of the forces that belong to the needle: off while the clutch is pressed
   double fixture_gain_ = 0;
   hal::Vec3 estimated_m_s_ = hal::Vec3::Zero();      // velocity of the hand, device frame
@@ -205,7 +210,7 @@ class Servo {
   bool injected_ = false;                     // the injector said it was
   std::uint32_t injected_cell_ = 0;           // the cell it counts for
   bool gate_open_ = false;
-  bool inject_released_ = false;  // the button was up since the start or the last stop
+  bool inject_released_ = false;  // the button was up since the start, the last stop, the last loss of sight
   bool tip_force_soft_ = false;
   bool was_sighted_ = false;
   int until_command_ = 0;  // ticks until the next stage set-point

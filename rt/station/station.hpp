@@ -20,7 +20,7 @@ struct Command {
   enum Kind : std::uint64_t {
     none,
     stop,         // latched safe stop (Fault::command_stop); value unused
-    end,          // end the task at a safe point; value unused
+    end,          // end the task where that is safe: at once outside, inside when drawn back; value unused
     force_scale,  // value: 0 .. 1 of the scene's force scale
   };
   std::uint64_t kind = none;

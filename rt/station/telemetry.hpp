@@ -44,7 +44,7 @@ inline constexpr int kFaults = 15;
 
 // Conditions that do not stop the station but must be seen. Bits; they go when their cause goes.
 enum Alarm : std::uint32_t {
-  alarm_vision_stale = 1U << 0,    // force fades, only withdrawal is accepted
+  alarm_vision_stale = 1U << 0,    // force fades, only withdrawal is accepted, the gate is shut
   alarm_force_limited = 1U << 1,   // the hand's force is at its limit
   alarm_depth_limited = 1U << 2,   // penetration or far-wall limit holds the needle
   alarm_travel_limited = 1U << 3,  // workspace, velocity or acceleration limit holds the needle

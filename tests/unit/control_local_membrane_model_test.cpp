@@ -262,6 +262,18 @@ TEST(LocalMembraneModel, keeps_the_focal_plane_from_cell_to_cell) {
   }
 }
 
+TEST(PoseHistory, begins_anew_when_the_clock_jumps_back) {
+  static PoseHistory history;
+  for (int k = 0; k < 100; ++k) history.push({k * 1'000'000, Vec3(1, 0, 0), -Vec3::UnitX()});
+  history.push({2'000'000'000, Vec3(2, 0, 0), -Vec3::UnitX()});  // one tick a second ahead
+  for (int k = 101; k < 120; ++k) history.push({k * 1'000'000, Vec3(3, 0, 0), -Vec3::UnitX()});
+  TipPose pose;
+  EXPECT_FALSE(history.at(50'000'000, pose));
+  EXPECT_FALSE(history.at(2'000'000'000, pose));
+  ASSERT_TRUE(history.at(110'500'000, pose));
+  EXPECT_EQ(pose.tip_m, Vec3(3, 0, 0));
+}
+
 TEST(PoseHistory, interpolates_and_reaches_back_more_than_a_second_at_8_kHz) {
   static PoseHistory history;
   const auto place = [](double t) { return Vec3(1e-6 * t, 2e-6 * t * 3, -t * 1e-6); };

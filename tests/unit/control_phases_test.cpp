@@ -15,6 +15,7 @@ struct Needle {
   explicit Needle(const PhaseParams& params = {}) : phases(params) { in.membrane_known = true; }
   Phase step() {
     const Phase before = phases.phase();
+    in.inward_m = in.depth_m + vision_m;
     const Phase now = phases.step(in, kTick_s);
     if (now != before) order.push_back(now);
     EXPECT_EQ(phases.changed(), now != before);
@@ -37,6 +38,7 @@ struct Needle {
   }
   Phases phases;
   PhaseInput in;
+  double vision_m = 0;  // the encoders' way to the depth that vision says
   std::vector<Phase> order;
 };
 
@@ -54,6 +56,22 @@ TEST(Phases, go_through_one_injection_in_order) {
   r.move(-20e-6, 30e-6);
   EXPECT_EQ(r.order, (std::vector{contact, indentation, puncture, injection, withdrawal, clear}));
   EXPECT_EQ(r.phases.cell(), 0U);
+}
+
+TEST(Phases, take_no_correction_by_vision_for_a_withdrawal) {
+  for (const bool moves : {false, true}) {
+    Needle r;
+    r.in.depth_m = -10e-6;
+    r.move(10e-6, 10e-6);
+    r.in.vision_punctured = true;
+    r.move(30e-6, 10e-6);
+    ASSERT_EQ(r.phases.phase(), puncture);
+    r.in.outward_m_s = 10e-6;  // she trembles
+    r.in.depth_m -= 3e-6;      // more than the way back that a withdrawal takes
+    if (!moves) r.vision_m += 3e-6;
+    r.hold(0.1);
+    EXPECT_EQ(r.phases.phase(), moves ? withdrawal : puncture);
+  }
 }
 
 TEST(Phases, allow_withdrawal_without_an_injection) {

@@ -141,8 +141,10 @@ struct FakeInjector final : hal::Injector {
 
 struct FakeVacuum final : hal::HoldingVacuum {
   double pressure = 600;
+  int reads = 0;
+  bool hangs = false;  // the same digits again and again
   Status read(double& p) noexcept override {
-    p = pressure;
+    p = pressure + (hangs ? 0 : 0.1 * (reads++ % 2));
     return Status::ok;
   }
 };
@@ -943,6 +945,92 @@ TEST(Servo, does_not_open_the_injector_again_after_a_stop_while_the_button_is_st
   EXPECT_TRUE(b.injector.open);
 }
 
+TEST(Servo, shuts_the_gate_while_vision_is_silent_and_waits_for_a_new_press) {
+  Bench b(icsi());
+  b.to_inside();
+  b.hand.buttons = hal::kButtonInject;
+  b.run(0.3);
+  ASSERT_TRUE(b.injector.open);
+  b.seeing = false;
+  b.run(0.5);
+  EXPECT_FALSE(b.injector.open);
+  EXPECT_EQ(b.servo->fault(), Fault::none);
+  b.seeing = true;
+  b.run(1);
+  EXPECT_FALSE(b.injector.open);  // still held down
+  b.hand.buttons = 0;
+  b.run(0.05);
+  b.hand.buttons = hal::kButtonInject;
+  b.run(0.05);
+  EXPECT_TRUE(b.injector.open);
+}
+
+TEST(Servo, says_when_the_gauge_stands_still) {
+  for (const double still_s : {1.0, 0.0}) {
+    ServoConfig config = icsi();
+    config.vacuum->still_s = still_s;
+    Bench b(config);
+    b.run(1);
+    b.vacuum.hangs = true;
+    b.run(0.99);
+    EXPECT_EQ(b.sample().alarms & alarm_sensor, 0U);
+    b.run(0.05);
+    EXPECT_EQ((b.sample().alarms & alarm_sensor) != 0, still_s > 0);
+    b.vacuum.hangs = false;
+    b.run(0.01);
+    EXPECT_EQ(b.sample().alarms & alarm_sensor, 0U);
+    EXPECT_EQ(b.servo->fault(), Fault::none);
+  }
+}
+
+TEST(Servo, ends_by_command_only_when_the_needle_is_out_of_the_cell) {
+  for (const bool here : {false, true}) {
+    Bench b(icsi());
+    b.to_inside();
+    ASSERT_TRUE(b.station->commands.try_push({Command::end, 0}));
+    b.run(0.5);
+    EXPECT_EQ(b.servo->outcome(), Outcome::running);
+    EXPECT_GT(b.force(), 0);
+    // Not deeper, and nothing is injected; back it goes.
+    b.hand.buttons = hal::kButtonInject;
+    const double depth = -b.gap();
+    b.move(b.wanted_x - 10e-6, 20e-6);
+    b.run(0.3);
+    EXPECT_LT(-b.gap(), depth + 0.3e-6);
+    EXPECT_FALSE(b.injector.open);
+    if (here) {
+      b.servo->request_end_here();
+    } else {
+      b.move(60e-6, 40e-6);
+    }
+    b.run(0.5);
+    EXPECT_EQ(b.servo->outcome(), Outcome::ended);
+    EXPECT_EQ(b.force(), 0);
+    EXPECT_EQ(-b.gap() > 0, here);
+  }
+}
+
+TEST(Servo, moves_the_set_point_by_no_leap_after_a_late_tick) {
+  const ServoConfig config = icsi();
+  Bench b(config);
+  b.run(0.5);
+  Vec3 before = b.stage.commanded.back();
+  double most = 0;
+  b.every_tick = [&] {
+    most = std::max(most, (b.stage.commanded.back() - before).norm());
+    before = b.stage.commanded.back();
+  };
+  b.move(40e-6, 100e-6);
+  b.hand.step(0.05);
+  b.stage.step(0.05);
+  b.now += 49'000'000;
+  b.servo->tick({b.ticks += 49, b.now, b.now, 0.05, 49});
+  b.every_tick();
+  b.move(20e-6, 100e-6);
+  EXPECT_LE(most, 2 * config.limits.stage_velocity_m_s * 1e-3 * (1 + 1e-9));
+  EXPECT_EQ(b.servo->fault(), Fault::none);
+}
+
 TEST(Servo, stops_when_the_injector_stays_open_although_its_gate_is_shut) {
   Bench b(icsi());
   b.to_inside();
@@ -1028,6 +1116,9 @@ TEST(Servo, checks_the_range_of_commands) {
   b.run(1);
   EXPECT_EQ(b.sample().membrane_N, 0);
   ASSERT_TRUE(b.station->commands.try_push({Command::end, 0}));
+  b.run(0.5);
+  EXPECT_EQ(b.servo->outcome(), Outcome::running);  // the needle dents a cell
+  b.move(60e-6, 40e-6);
   b.run(0.5);
   EXPECT_EQ(b.servo->outcome(), Outcome::ended);
   EXPECT_EQ(b.force(), 0);

@@ -135,18 +135,14 @@ std::vector<Box> boxes_of(const Map& map, const std::map<double, Edges>& x,
   return boxes;
 }
 
-std::string axis(const char* which, const std::string& label, bool log, double low, double high) {
-  std::string s = fmt::format("set {}label {} noenhanced{}\n", which, quoted(label),
-                              which[0] == 'x' ? " offset 0,0.4" : "");
-  if (!log) return s + fmt::format("set format {} '%g'\n", which);
-  s += fmt::format("set logscale {}\n", which);
-  // Within one decade powers of ten alone say too little.
-  return s + (high / low > 30 ? fmt::format("set format {} '10^{{%T}}'\n", which)
-                              : fmt::format("set format {} '%g'\n", which));
-}
-
 struct Range {
   double low = std::numeric_limits<double>::infinity(), high = -std::numeric_limits<double>::infinity();
+  [[nodiscard]] bool empty() const { return !(low <= high); }
+  // Where v lies in it, 0 .. 1.
+  [[nodiscard]] double part(double v, bool log) const {
+    if (!(low < high)) return 0;
+    return log ? std::log(v / low) / std::log(high / low) : (v - low) / (high - low);
+  }
   void take(double v, bool log) {
     if (!drawable(v, log)) return;
     low = std::min(low, v);
@@ -154,15 +150,39 @@ struct Range {
   }
 };
 
+// A logarithmic axis ends a little beyond its data, not at the next power of ten; where powers of ten alone
+// would say too little, 2 and 5 times them are there too.
+std::string axis(const char* which, const std::string& label, bool log, const Range& data, bool ranged) {
+  std::string s = fmt::format("set {0}label {1} noenhanced{2}\nset format {0} '%g'\n", which, quoted(label),
+                              which[0] == 'x' ? " offset 0,0.4" : "");
+  if (!log || data.empty()) return s;
+  const double beyond = std::max(1.25, std::pow(data.high / data.low, 0.06));
+  const double low = data.low / beyond, high = data.high * beyond;
+  s += fmt::format("set logscale {}\n", which);
+  if (!ranged) s += fmt::format("set {}range [{:.9g}:{:.9g}]\n", which, low, high);
+  if (high / low > 200) return s + fmt::format("set format {} '10^{{%T}}'\n", which);
+  std::string tics;
+  for (double decade = std::pow(10, std::floor(std::log10(low))); decade <= high; decade *= 10)
+    for (const double step : {1.0, 2.0, 5.0})
+      if (step * decade >= low && step * decade <= high)
+        tics += fmt::format("{}{:.9g}", tics.empty() ? "" : ", ", step * decade);
+  return s + fmt::format("set {}tics ({})\n", which, tics);
+}
+
 std::string panel_script(const Panel& p, int index) {
   std::string blocks, plots;
   const auto plot = [&plots](const std::string& what) {
     plots += (plots.empty() ? "plot " : ", \\\n  ") + what;
   };
+  std::size_t longest = 0;
+  for (const Series& s : p.series) longest = std::max(longest, s.name.size());
   std::string set =
       "reset\nset encoding utf8\nset grid lc rgb '#e4e4e4'\nset border lc rgb '#777777'\n"
-      "set tics textcolor rgb '#222222'\n"
-      "set key outside below center horizontal Left reverse samplen 2.5 noenhanced font ',11' title ' '\n";
+      "set tics textcolor rgb '#222222'\n" +
+      fmt::format(  // gnuplot thinks letters wider than they are
+          "set key outside below center horizontal Left reverse samplen 2 width {:.1f} noenhanced font ',11' "
+          "title ' '\n",
+          -0.15 * static_cast<double>(longest));
   set += fmt::format("set title {} noenhanced font ',13'\n", quoted(p.title));
 
   Range x, y;
@@ -246,13 +266,17 @@ std::string panel_script(const Panel& p, int index) {
     const std::string name = fmt::format("$k{}_{}", index, id++);
     blocks += fmt::format("{} << EOD\n{:.9g} {:.9g}\nEOD\n", name, m.x, m.y);
     plot(fmt::format("{} with points pt 6 ps 2.2 lw 2.2 lc rgb '{}' notitle", name, ink));
-    if (!m.label.empty())
-      set += fmt::format(
-          "set label {} at {:.9g},{:.9g} left offset char 1.2,0.9 front noenhanced font ',11' textcolor rgb "
-          "'{}'\n",
-          quoted(m.label), m.x, m.y, ink);
   }
-  set += axis("x", p.x_label, p.log_x, x.low, x.high) + axis("y", p.y_label, p.log_y, y.low, y.high);
+  for (const Mark& m : p.marks) {
+    if (m.label.empty() || !drawable(m.x, p.log_x) || !drawable(m.y, p.log_y)) continue;
+    const bool room = x.part(m.x, p.log_x) < 0.8;
+    set += fmt::format(
+        "set label {} at {:.9g},{:.9g} {} offset char {},0.9 front noenhanced font ',11' textcolor rgb "
+        "'{}'\n",
+        quoted(m.label), m.x, m.y, room ? "left" : "right", room ? 1.2 : -1.2, ink);
+  }
+  const bool ranged = p.map || p.bars;
+  set += axis("x", p.x_label, p.log_x, x, ranged) + axis("y", p.y_label, p.log_y, y, ranged);
   if (plots.empty()) {  // the panel says so itself
     set +=
         "set label 'nothing could be drawn' at graph 0.5,0.5 center\nset xrange [0:1]\nset yrange "

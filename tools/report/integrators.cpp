@@ -241,7 +241,7 @@ double order_of(const Problem& p, const std::string& method, bool located) {
   double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
   for (const Run& r : p.runs) {
     if (r.method != method || r.located != located || r.single) continue;
-    if (!(r.error.event_s > 1e-13 && r.error.event_s < 1e-2)) continue;
+    if (!(r.error.event_s > 1e-13 && r.error.event_s < 2e-3)) continue;
     const double x = -std::log(static_cast<double>(r.per_tick)), y = std::log(r.error.event_s);
     n += 1;
     sx += x;

@@ -49,7 +49,7 @@ std::vector<Method> methods() {
   return {
       {"greedy snake",
        "{} nodes",
-       {8, 16, 32, 64, 128, 256},
+       {8, 16, 32, 64, 128},
        {16, 64},
        [](VisionConfig c, double nodes, int w, int h) {
          c.refine = false;
@@ -58,7 +58,7 @@ std::vector<Method> methods() {
        }},
       {"greedy snake (64 nodes)",
        "search +-{} px",
-       {1, 2, 3, 4},
+       {1, 2, 4},
        {},
        [](VisionConfig c, double radius, int w, int h) {
          c.refine = false;
@@ -68,7 +68,7 @@ std::vector<Method> methods() {
        }},
       {"closed path",
        "{} angles",
-       {128, 192, 256, 512, 1024},
+       {128, 192, 256, 384, 512},
        {128, 256, 512},
        [](VisionConfig c, double angles, int w, int h) {
          c.contour_points = static_cast<int>(angles);
@@ -78,7 +78,7 @@ std::vector<Method> methods() {
        static_cast<double>(shipped.contour_points)},
       {"closed path (finer snake)",
        "{} nodes",
-       {8, 32, 64, 128},
+       {32, 64, 128},
        {64},
        [](VisionConfig c, double nodes, int w, int h) {
          c.snake.nodes = static_cast<int>(nodes);
@@ -86,7 +86,7 @@ std::vector<Method> methods() {
        }},
       {"closed path (outer only)",
        "{} angles",
-       {128, 256, 512},
+       {256},
        {256},
        [](VisionConfig c, double angles, int w, int h) {
          c.inner = false;
@@ -98,7 +98,7 @@ std::vector<Method> methods() {
        false},
       {"closed path (started anew)",
        "{} angles",
-       {128, 256},
+       {256},
        {256},
        [](const VisionConfig& config, double angles, int w, int h) -> Eye {
          VisionConfig c = config;
@@ -288,8 +288,8 @@ std::vector<InjectionPlan> plans(bool quick) {
       p.noise = noise;
       p.aim_m = aim.aim_m;
       p.tilt_rad = aim.tilt_rad;
+      p.approach_m_s = 40e-6;
       if (quick) {
-        p.approach_m_s = 40e-6;
         p.indentation_m_s = 20e-6;
         p.inside_s = 0.3;
       }

@@ -1,9 +1,11 @@
 // The topics there are, in the order of the report. A topic is one file: declared and listed here, added to
 // tools/CMakeLists.txt, nothing else.
+#include "tools/report/force_pairs.hpp"
 #include "tools/report/topic.hpp"
 
 namespace punctum::report {
 
+Result run_force(const Job&);
 Result run_integrators(const Job&);
 Result run_velocity(const Job&);
 #ifdef PUNCTUM_VISION
@@ -14,6 +16,8 @@ Result run_scenes(const Job&);
 
 std::span<const Topic> topics() {
   static const std::vector<Topic> list = {
+      {"force", "the membrane's force: eq. 5 as it is evaluated, and the laws against large deflection",
+       run_force, evaluate_pairs_file},
       {"integrators", "ways to step the plant through contact, friction and puncture", run_integrators},
       {"velocity", "the hand's velocity from its quantised positions: error, lag and noise", run_velocity},
 #ifdef PUNCTUM_VISION

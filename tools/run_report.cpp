@@ -21,7 +21,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kAlarms[] = {"vision_stale", "force_limited", "depth_limited", "travel_limited",
                                    "tip_force",    "model_invalid", "phase_timeout", "overrun",
-                                   "sensor",       "degraded"};
+                                   "sensor",       "degraded",      "stiffness_reduced"};
 
 Json number(const std::optional<double>& v, double scale = 1) {
   return v && std::isfinite(*v) ? Json(*v * scale) : Json(nullptr);

@@ -467,6 +467,13 @@ std::vector<Table> make_tables() {
             real("frequency_hz", v.frequency_Hz, 5, 2000), real("amplitude_N", v.amplitude_N, 0, 5),
             milli("decay_ms", v.decay_s, 1, 1000), micro("energy_uJ", v.energy_J, 0, 1e5)};
       }));
+
+  t.push_back(thing(
+      "guard", [](Scene & s) -> auto& { return s.servo.guard; },
+      [](Scene& s) {
+        auto& g = *s.servo.guard;
+        return std::vector<Key>{real("margin", g.margin, 0.1, 0.95), real("recover_s", g.recover_s, 0.1, 60)};
+      }));
   return t;
 }
 

@@ -26,7 +26,7 @@ struct MembraneParams {
 struct ConeParams {
   enum class Method : std::uint8_t { potential, paper };
   Method method = Method::potential;
-  double K_N_m = 200;      // at the hand, on the membrane: 2 b/T of the default device at 1 kHz
+  double K_N_m = 150;      // at the hand, on the membrane: with the membrane's own, below 0.9 of what keeps passive
   double d0_m = 40e-6;     // distance from the membrane at which the pull has halved (needle scale)
   double r0_m = 1e-6;      // free radius at the membrane (needle scale)
   double alpha_rad = 0.2;  // half-angle of the free core
@@ -88,6 +88,12 @@ struct HandDevice {
   double encoder_step_m = 0.03e-3;
   double force_max_N = 8.5;
   int delay_ticks = 0;  // 0 .. 5: a force acts this many ticks after it is written
+};
+
+// The passivity guard, passivity.hpp.
+struct GuardParams {
+  double margin = 0.9;   // of the device's passive stiffness: what may be rendered
+  double recover_s = 2;  // a lowered stiffness returns over this
 };
 
 struct MappingParams {
@@ -180,6 +186,7 @@ struct ServoConfig {
   std::optional<RepulsiveParams> repulsive;
   std::optional<FrictionParams> friction;
   std::optional<VibrationParams> vibration;
+  std::optional<GuardParams> guard;
   std::optional<InjectorParams> injector;
   std::optional<VacuumParams> vacuum;
   bool force_sensor = false;

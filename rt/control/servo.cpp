@@ -22,6 +22,7 @@ constexpr double kSensorTimeout_s = 0.1;
 constexpr double kSoftHysteresis = 0.9;    // of the soft tip-force limit
 constexpr double kForceScaleRate_1_s = 2;  // of the command force_scale
 constexpr double kRounding_s = 1e-9;
+constexpr double kStiffnessKept = 0.9;  // of the commanded one; less raises an alarm
 constexpr int kCommandsPerTick = 8;
 
 [[nodiscard]] bool is_finite(const hal::Vec3& v) noexcept {
@@ -55,6 +56,9 @@ Servo::Servo(const ServoConfig& config, const Devices& devices, Station& station
   if (config.cone) cone_.emplace(*config.cone, config.mapping.position_scale);
   if (config.axis) axis_.emplace(*config.axis, config.mapping.position_scale);
   if (config.damping) damping_.emplace(*config.damping);
+  if (config.guard) {
+    guard_.emplace(*config.guard, config.device, at_rate(config.velocity, config.rate_Hz), config.rate_Hz);
+  }
   if (config.repulsive) repulsive_.emplace(*config.repulsive, config.mapping.position_scale);
   if (config.friction) friction_.emplace(*config.friction);
   if (config.vibration) vibration_.emplace(*config.vibration, config.device.delay_ticks);
@@ -73,7 +77,7 @@ void Servo::tick(const TickInfo& now) noexcept {
   estimate_velocity();
   advance_phase();
   const hal::Vec3 wanted_N = sum_force_effects();
-  cause = first_of(cause, limit_force(wanted_N));
+  cause = first_of(cause, limit_force(keep_passive(wanted_N)));
   latch(cause);
   choose_stage_set_point();
   write_devices();
@@ -470,6 +474,34 @@ hal::Vec3 Servo::sum_force_effects() noexcept {
          (membrane_N_ + cone_N_ + axis_N_ + damping_N_ + repulsive_N_ + friction_N_ + vibration_N_);
 }
 
+// What the hand may be given of it.
+hal::Vec3 Servo::keep_passive(const hal::Vec3& wanted_N) noexcept {
+  if (!guard_) return wanted_N;
+  const double presence = presence_.gain();
+  const double k_p = config_.mapping.position_scale;
+  GuardInput in;
+  in.position_m = world_from_hand(hand_.position_m);
+  in.storing[0] = {presence * (cone_N_ + axis_N_ + repulsive_N_), k_p * mapping_.hand_point()};
+  in.storing[1] = {presence * membrane_N_, k_p * (devices_.stage ? stage_.tip_m : mapping_.hand_point())};
+  in.dissipative_N = presence * (damping_N_ + friction_N_);
+  in.active_N = presence * vibration_N_;
+  double fixtures_N_m = 0;
+  if (cone_) fixtures_N_m += cone_->stiffness_N_m();
+  if (axis_) fixtures_N_m += axis_->stiffness_N_m();
+  if (repulsive_) fixtures_N_m += repulsive_->stiffness_N_m();
+  in.stiffness_N_m = presence * fixture_gain_ * fixtures_N_m;
+  if (membrane_) {
+    in.stiffness_N_m += presence * fixture_gain_ * force_scale_ * config_.mapping.force_scale / k_p *
+                        membrane_->state().stiffness_N_m;
+  }
+  in.damping_Ns_m = presence * (damping_ ? damping_->B_Ns_m() : 0);
+  in.elapsed_s = elapsed_s_;
+  const hal::Vec3 force_N = guard_->step(in);
+  guard_N_ = (force_N - wanted_N).norm();
+  if (guard_->gain() < kStiffnessKept) alarms_ |= alarm_stiffness_reduced;
+  return force_N;
+}
+
 void Servo::render_membrane(double gain) noexcept {
   if (!membrane_) return;
   const bool known = model_ && model_->membrane().known;
@@ -586,6 +618,7 @@ void Servo::write_devices() noexcept {
     injector->gate(gate_open_);
   }
 
+  if (guard_) guard_->wrote(world_from_hand(hand_force_N_));
   const hal::Status status = devices_.hand.write_force(hand_force_N_);
   if (status == hal::Status::disconnected || status == hal::Status::fault) {
     write_fault_ = first_of(write_fault_, Fault::hand_lost);
@@ -625,7 +658,7 @@ void Servo::publish(const TickInfo& now) noexcept {
   s.repulsive_N = presence * repulsive_N_.norm();
   s.friction_N = presence * friction_N_.norm();
   s.vibration_N = presence * vibration_N_.norm();
-  s.guard_N = 0;
+  s.guard_N = guard_N_;
 
   if (model_ && model_->membrane().known) {
     s.wd_m = std::max(depth_m_, 0.0);

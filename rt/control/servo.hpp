@@ -15,6 +15,7 @@
 #include "rt/control/limits.hpp"
 #include "rt/control/local_membrane_model.hpp"
 #include "rt/control/master_to_stage.hpp"
+#include "rt/control/passivity.hpp"
 #include "rt/control/phases.hpp"
 #include "rt/control/safety_latch.hpp"
 #include "rt/forces/cone_guide.hpp"
@@ -92,6 +93,7 @@ class Servo {
   void estimate_velocity() noexcept;
   void advance_phase() noexcept;
   [[nodiscard]] hal::Vec3 sum_force_effects() noexcept;
+  [[nodiscard]] hal::Vec3 keep_passive(const hal::Vec3& wanted_N) noexcept;
   [[nodiscard]] Fault limit_force(const hal::Vec3& wanted_N) noexcept;
   void latch(Fault cause) noexcept;
   void choose_stage_set_point() noexcept;
@@ -129,6 +131,7 @@ class Servo {
   std::optional<ConeGuide> cone_;
   std::optional<WithdrawalAxis> axis_;
   std::optional<Damping> damping_;
+  std::optional<PassivityGuard> guard_;
   std::optional<RepulsiveRegion> repulsive_;
   std::optional<Friction> friction_;
   std::optional<Vibration> vibration_;
@@ -224,6 +227,7 @@ class Servo {
   hal::Vec3 cone_N_ = hal::Vec3::Zero();
   hal::Vec3 axis_N_ = hal::Vec3::Zero();
   hal::Vec3 damping_N_ = hal::Vec3::Zero();
+  double guard_N_ = 0;
   hal::Vec3 repulsive_N_ = hal::Vec3::Zero();
   hal::Vec3 friction_N_ = hal::Vec3::Zero();
   hal::Vec3 vibration_N_ = hal::Vec3::Zero();

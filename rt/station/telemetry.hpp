@@ -54,6 +54,7 @@ enum Alarm : std::uint32_t {
   alarm_overrun = 1U << 7,         // too many missed ticks (simulated actuators)
   alarm_sensor = 1U << 8,          // a device returned no or unusable data this tick
   alarm_degraded = 1U << 9,        // running without real-time rights
+  alarm_stiffness_reduced = 1U << 10,  // the passivity guard renders less than was asked for
 };
 
 enum class StopStage : std::uint8_t { running, stopping, stopped };  // of the safety latch

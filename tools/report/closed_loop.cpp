@@ -1,0 +1,323 @@
+#include "tools/report/closed_loop.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <initializer_list>
+#include <limits>
+#include <optional>
+#include <random>
+#include <vector>
+
+#include "hal/sim/hand.hpp"
+#include "rt/control/device_limits.hpp"
+#include "rt/control/passivity.hpp"
+#include "rt/forces/membrane.hpp"
+#include "rt/forces/velocity.hpp"
+
+namespace punctum::report {
+namespace {
+
+constexpr double kFrom_m = 5e-3;
+constexpr double kLongest_s = 40;
+constexpr double kSmallest_m = 0.1e-3;
+constexpr double kEnergyPart = 0.05;
+constexpr int kRing = 8;
+
+// The effect against which the handle is pushed, x > 0 inside.
+class Wall {
+ public:
+  explicit Wall(const LoopCell& cell) : K_(cell.stiffness_N_m) {
+    if (cell.membrane_E_Pa <= 0) return;
+    membrane_.emplace();
+    membrane_->E_Pa = cell.membrane_E_Pa;
+  }
+  struct At {
+    double force_N = 0;  // at the hand
+    double stiffness_N_m = 0;
+    double energy_J = 0;
+  };
+  [[nodiscard]] At at(double x_m) const {
+    if (x_m <= 0) return {};
+    if (!membrane_) return {-K_ * x_m, K_, 0.5 * K_ * x_m * x_m};
+    const auto s = rt::membrane_law(*membrane_, x_m / scale_.position_scale, membrane_->R_m, 1);
+    const double k_f = scale_.force_scale;
+    return {-k_f * s.force_N, k_f / scale_.position_scale * s.stiffness_N_m,
+            k_f * scale_.position_scale * s.energy_J};
+  }
+
+ private:
+  double K_;
+  std::optional<rt::MembraneParams> membrane_;
+  rt::MappingParams scale_;
+};
+
+class Velocity {
+ public:
+  Velocity(const rt::VelocityParams& params, double rate_Hz) {
+    if (params.method == rt::VelocityParams::Method::kalman) {
+      kalman_.emplace(params, 1 / rate_Hz);
+    } else {
+      foaw_.emplace(rt::at_rate(params, rate_Hz));
+    }
+  }
+  double step(double x_m, double dt_s) {
+    const hal::Vec3 x(x_m, 0, 0);
+    return kalman_ ? kalman_->step(x, dt_s).x() : foaw_->step(x, dt_s).x();
+  }
+
+ private:
+  std::optional<rt::Kalman> kalman_;
+  std::optional<rt::Foaw> foaw_;
+};
+
+class Ticks {
+ public:
+  Ticks(Timing timing, double T_s, std::uint64_t seed) : timing_(timing), T_s_(T_s), random_(seed) {}
+  double next(double t_s) {
+    switch (timing_) {
+      case Timing::steady:
+        break;
+      case Timing::jitter:
+        return T_s_ * (1 + 0.4 * (part() - 0.5));
+      case Timing::lost_ticks:
+        if (part() < 0.01) return T_s_ * std::floor(2 + 4 * part());
+        break;
+      case Timing::late_tick:
+        if (t_s > 1 && !late_) {
+          late_ = true;
+          return 21 * T_s_;
+        }
+        break;
+    }
+    return T_s_;
+  }
+
+ private:
+  double part() { return std::uniform_real_distribution<double>(0, 1)(random_); }
+  Timing timing_;
+  double T_s_;
+  std::mt19937_64 random_;
+  bool late_ = false;
+};
+
+}  // namespace
+
+LoopResult run_loop(const LoopCell& cell) {
+  const double T = 1 / cell.rate_Hz;
+  rt::VelocityParams estimate;
+  estimate.d_m = std::max(cell.device.encoder_step_m, 1e-6);
+  const double B_limit = rt::stable_damping_Ns_m(cell.declared, T, rt::at_rate(estimate, cell.rate_Hz));
+  const double B = cell.damping_share * B_limit;
+
+  sim::HandParams hand;
+  hand.mass_kg = cell.device.mass_kg;
+  hand.damping_Ns_m = cell.device.damping_Ns_m;
+  hand.coulomb_N = cell.coulomb_N;
+  sim::ArmImpedance arm;
+  if (cell.holder == Holder::fingertip) arm.damping_Ns_m = 1;
+  if (cell.holder == Holder::arm) arm = {250, 6};
+
+  const Wall wall(cell);
+  Velocity velocity(estimate, cell.rate_Hz);
+  Ticks ticks(cell.timing, T, cell.seed);
+  std::optional<rt::PassivityGuard> guard;
+  if (cell.guarded) {
+    guard.emplace(rt::GuardParams{}, cell.declared, rt::at_rate(estimate, cell.rate_Hz), cell.rate_Hz);
+  }
+
+  LoopResult r;
+  r.passive_N_m = rt::passive_stiffness_N_m(cell.device, T);
+  const double soft_N_m = std::min(wall.at(1e-3).stiffness_N_m, 0.9 * r.passive_N_m);
+  const double push_N =
+      cell.holder == Holder::arm ? 0 : cell.coulomb_N + std::min(cell.push_N, 0.01 * soft_N_m);
+  const double enough_m = std::max(4 * cell.device.encoder_step_m, kSmallest_m);
+  const double settles_s =
+      cell.holder == Holder::nobody ? 24 * cell.device.mass_kg / cell.device.damping_Ns_m : 14;
+  const double longest_s =
+      cell.holder == Holder::arm ? 12 : std::min(kLongest_s, std::max(settles_s, 6 + 6 * B / soft_N_m));
+
+  sim::HandAxis handle{-kFrom_m, cell.speed_m_s};
+  double intention_m = -kFrom_m;
+  std::array<double, kRing> commands{};
+  double t = 0, dt = T;
+  double port_J = 0, counted_J = 0, port_before_J = 0;
+  double low = handle.x_m, high = handle.x_m, second = 0;
+  std::vector<double> swings;
+  double stored_J = 0;
+  double noise_N2 = 0;
+  std::int64_t noise_ticks = 0;
+  while (t < longest_s) {
+    const double step_m = cell.device.encoder_step_m;
+    const double x = step_m > 0 ? step_m * std::round(handle.x_m / step_m) : handle.x_m;
+    const double v = velocity.step(x, dt);
+    const Wall::At effect = wall.at(x);
+    double force_N = effect.force_N - B * v;
+    double gain = 1;
+    if (guard) {
+      rt::GuardInput in;
+      in.position_m = {x, 0, 0};
+      in.storing[0] = {{effect.force_N, 0, 0}, {x, 0, 0}};
+      in.dissipative_N = {-B * v, 0, 0};
+      in.stiffness_N_m = effect.stiffness_N_m;
+      in.damping_Ns_m = B;
+      in.elapsed_s = dt;
+      force_N = guard->step(in).x();
+      gain = guard->gain();
+      r.damper_Ns_m = std::max(r.damper_Ns_m, guard->damper_Ns_m());
+      noise_N2 += guard->damper_N().squaredNorm();
+      ++noise_ticks;
+    }
+    force_N = std::clamp(force_N, -cell.device.force_max_N, cell.device.force_max_N);
+    if (guard) guard->wrote({force_N, 0, 0});
+    commands[static_cast<std::size_t>(r.ticks % kRing)] = force_N;
+    const std::int64_t acting = r.ticks - cell.device.delay_ticks;
+    const double applied_N = acting >= 0 ? commands[static_cast<std::size_t>(acting % kRing)] : 0;
+    r.commanded_N_m = effect.stiffness_N_m;
+    r.rendered_N_m = gain * effect.stiffness_N_m;
+
+    dt = ticks.next(t);
+    const double before_m = handle.x_m;
+    const double reached_m =
+        cell.holder == Holder::arm ? std::min(intention_m + 0.05 * dt, 0.02) : intention_m;
+    const double pace = (reached_m - intention_m) / dt;
+    sim::advance(handle, hand, arm, applied_N + push_N, intention_m, pace, dt);
+    intention_m = reached_m;
+    port_J += applied_N * (handle.x_m - before_m);
+    t += dt;
+    ++r.ticks;
+    stored_J = gain * wall.at(handle.x_m).energy_J;
+    r.stored_max_J = std::max(r.stored_max_J, stored_J);
+
+    low = std::min(low, handle.x_m);
+    high = std::max(high, handle.x_m);
+    if (t - second < 1) continue;
+    swings.push_back(high - low);
+    if (high - low > enough_m) counted_J += port_J - port_before_J;
+    port_before_J = port_J;
+    r.rest_N = noise_ticks > 0 ? std::sqrt(noise_N2 / static_cast<double>(noise_ticks)) : 0;
+    noise_N2 = 0;
+    noise_ticks = 0;
+    second = t;
+    low = high = handle.x_m;
+    const std::size_t n = swings.size();
+    if (n >= 4 && swings[n - 1] < 0.3 * enough_m && swings[n - 2] < enough_m) break;
+    const bool lasts =
+        !cell.guarded && n >= 6 && swings[n - 1] > 5 * enough_m && swings[n - 1] > 0.98 * swings[n - 3];
+    if (lasts || !std::isfinite(handle.x_m)) break;
+  }
+  r.end_s = t;
+  r.peak_to_peak_m = swings.empty() ? std::numeric_limits<double>::infinity() : swings.back();
+  r.moving = !(r.peak_to_peak_m <= enough_m);
+  r.surplus_J = counted_J + stored_J;
+  const double count_J = 4 * cell.device.encoder_step_m * std::min(cell.device.force_max_N, push_N + 0.1);
+  r.active = !(r.surplus_J <= kEnergyPart * r.stored_max_J + count_J);
+  return r;
+}
+
+LoopCell sweep_cell(std::uint64_t n, bool guarded) {
+  std::mt19937_64 random(n * 7919 + 13);
+  const auto one_of = [&random](std::initializer_list<double> list) {
+    return *(list.begin() + static_cast<std::ptrdiff_t>(random() % list.size()));
+  };
+  const auto log_uniform = [&random](double from, double to) {
+    return from * std::pow(to / from, std::uniform_real_distribution<double>(0, 1)(random));
+  };
+  LoopCell c;
+  c.seed = n;
+  c.guarded = guarded;
+  c.rate_Hz = one_of({500, 1000, 2000, 4000, 8000});
+  c.device.delay_ticks = static_cast<int>(random() % 6);
+  c.device.mass_kg = one_of({0.045, 0.075, 0.15});
+  c.device.damping_Ns_m = one_of({0.05, 0.1, 0.5});
+  c.device.encoder_step_m = one_of({0.01e-3, 0.03e-3, 0.055e-3});
+  c.coulomb_N = one_of({0, 0, 0.04, 0.1});
+  c.stiffness_N_m = log_uniform(1e1, 1e6);
+  if (random() % 3 == 0) c.membrane_E_Pa = log_uniform(1, 1e9);
+  c.damping_share = one_of({0, 0, 0.1, 0.5, 1, 3, 10});
+  c.timing = static_cast<Timing>(random() % 4);
+  c.holder = static_cast<Holder>(random() % 3);
+  c.speed_m_s = one_of({0, 0.05, 0.2});
+  c.push_N = one_of({0.2, 0.5, 1});
+  // Nobody's hand on a heavy handle in light bearings would swing for a minute by itself.
+  if (c.holder == Holder::nobody && c.device.mass_kg / c.device.damping_Ns_m > 1.6) {
+    c.device.damping_Ns_m = 0.1;
+  }
+  // Against next to nothing a push alone would creep for minutes.
+  if (Wall(c).at(1e-3).stiffness_N_m < 5) c.holder = Holder::arm;
+  c.declared = c.device;
+  return c;
+}
+
+bool faithful(const LoopCell& cell, const LoopResult& r) noexcept {
+  if (r.commanded_N_m <= 0 || cell.timing == Timing::lost_ticks || cell.timing == Timing::late_tick) {
+    return true;
+  }
+  if (r.commanded_N_m < 0.8 * r.passive_N_m) return r.rendered_N_m >= 0.9 * r.commanded_N_m;
+  return r.rendered_N_m >= 0.5 * r.passive_N_m;
+}
+
+double measured_boundary_N_m(const rt::HandDevice& device, double T_s, double B_Ns_m) {
+  sim::HandParams hand;
+  hand.mass_kg = device.mass_kg;
+  hand.damping_Ns_m = device.damping_Ns_m;
+  hand.coulomb_N = 0;
+  constexpr int kTicks = 8000;
+  const auto comes_to_rest = [&](double K) {
+    sim::HandAxis handle{1e-3, 0};
+    std::array<double, kRing> commands{};
+    double before_m = handle.x_m, earlier_m = 0, later_m = 0;
+    for (int k = 0; k < kTicks; ++k) {
+      const double v = (handle.x_m - before_m) / T_s;
+      before_m = handle.x_m;
+      commands[static_cast<std::size_t>(k % kRing)] = -K * handle.x_m - B_Ns_m * v;
+      const int acting = k - device.delay_ticks;
+      const double force_N = acting >= 0 ? commands[static_cast<std::size_t>(acting % kRing)] : 0;
+      sim::advance(handle, hand, {}, force_N, 0, 0, T_s);
+      const double x = std::abs(handle.x_m);
+      if (!(x < 1e3)) return false;
+      if (k >= kTicks / 4 && k < kTicks / 2) earlier_m = std::max(earlier_m, x);
+      if (k >= 3 * kTicks / 4) later_m = std::max(later_m, x);
+    }
+    return later_m < earlier_m || later_m < 1e-12;
+  };
+  double below = 0, above = 4 * device.mass_kg / (T_s * T_s);
+  for (int i = 0; i < 50; ++i) {
+    const double K = 0.5 * (below + above);
+    (comes_to_rest(K) ? below : above) = K;
+  }
+  return below;
+}
+
+CycleEnergy cycle_energy(double K_N_m, double B_Ns_m, double tau_s, double T_s, int delay_ticks) {
+  // Work of the held force and the integral of v^2 over many periods, both for amplitude 1.
+  const auto needed = [&](double omega, double phase, double v2_per_tick) {
+    constexpr int kSettle = 400, kCount = 200000;
+    std::array<double, kRing> commands{};
+    double v = 0, work = 0, before = std::sin(phase - omega * T_s);
+    for (int k = 0; k < kSettle + kCount; ++k) {
+      const double x = std::sin(omega * k * T_s + phase);
+      v = (tau_s * v + (x - before)) / (tau_s + T_s);
+      before = x;
+      commands[static_cast<std::size_t>(k % kRing)] = -K_N_m * x - B_Ns_m * v;
+      const int acting = k - delay_ticks;
+      if (k < kSettle || acting < 0) continue;
+      work +=
+          commands[static_cast<std::size_t>(acting % kRing)] * (std::sin(omega * (k + 1) * T_s + phase) - x);
+    }
+    return work / (kCount * v2_per_tick);
+  };
+  CycleEnergy e;
+  const double nyquist = 3.14159265358979323846 / T_s;
+  e.slow_Ns_m = -std::numeric_limits<double>::infinity();
+  for (const double part : {0.01, 0.03, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9}) {
+    const double omega = part * 0.99173 * nyquist;  // no period is a whole number of ticks
+    e.slow_Ns_m = std::max(e.slow_Ns_m, needed(omega, 0.3, 0.5 * omega * omega * T_s));
+  }
+  const double peak = 0.5 * 3.14159265358979323846;  // samples at the turning points
+  e.sinusoid_Ns_m = needed(nyquist, peak, 0.5 * nyquist * nyquist * T_s);
+  e.triangle_Ns_m = needed(nyquist, peak, 4 / T_s);
+  return e;
+}
+
+}  // namespace punctum::report

@@ -23,7 +23,7 @@ h1 { font-size: 1.7rem; margin-bottom: .2rem; } h2 { font-size: 1.35rem; margin:
 figure { margin: 1.2rem 0; } figure svg { max-width: 100%; height: auto; } figcaption { color: #555; font-size: .9rem; }
 .wide { overflow-x: auto; margin: 1rem 0; } table { border-collapse: collapse; font-size: .85rem; }
 caption { text-align: left; color: #555; padding-bottom: .3rem; } th, td { padding: .2rem .7rem; text-align: left; border-bottom: 1px solid #e6e6e6; white-space: nowrap; }
-th { font-weight: 600; background: #f7f7f7; } td.number { text-align: right; font-variant-numeric: tabular-nums; }
+th { font-weight: 600; background: #f7f7f7; } tr.shipped { font-weight: 600; background: #eef5fb; } td.number { text-align: right; font-variant-numeric: tabular-nums; }
 dl { display: grid; grid-template-columns: max-content 1fr; gap: .1rem 1rem; font-size: .85rem; color: #555; } dt { font-weight: 600; } dd { margin: 0; overflow-wrap: anywhere; }
 nav a { margin-right: 1rem; }
 )";
@@ -45,8 +45,11 @@ std::string table_html(const Table& t) {
   std::string s = "<div class=\"wide\"><table><caption>" + escaped(what) + "</caption>\n<tr>";
   for (const std::size_t c : columns) s += "<th>" + escaped(t.columns[c]) + "</th>";
   s += "</tr>\n";
+  const auto shipped =
+      static_cast<std::size_t>(std::find(t.columns.begin(), t.columns.end(), "shipped") - t.columns.begin());
   for (const std::size_t r : rows) {
-    s += "<tr>";
+    const bool bold = shipped < t.columns.size() && t.rows[r][shipped].text() == "1";
+    s += bold ? "<tr class=\"shipped\">" : "<tr>";
     for (const std::size_t c : columns) {
       const Cell& cell = t.rows[r][c];
       const bool words = std::holds_alternative<std::string>(cell.value());

@@ -1,6 +1,13 @@
 // What must fit together between the tables of a scene.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
+#include "rt/control/device_limits.hpp"
+#include "rt/forces/cone_guide.hpp"
+#include "rt/forces/membrane.hpp"
+#include "rt/forces/ramp.hpp"
 #include "tools/scene_keys.hpp"
 
 namespace punctum::tools {
@@ -24,6 +31,141 @@ bool failing_device_is_there(const Scene& s, sim::Device d) {
       return true;
   }
   return false;
+}
+
+// Four digits, rounded down: what is said to be allowed is allowed.
+double rounded_down(double v) {
+  if (!(v > 0) || !std::isfinite(v)) return v;
+  const double unit = std::pow(10, std::floor(std::log10(v)) - 3);
+  return std::floor(v / unit) * unit;
+}
+
+std::string device_text(const rt::ServoConfig& servo) {
+  const auto& v = servo.velocity;
+  return fmt::format(
+      "m = haptic.mass_kg {:g}, T = 1/servo.rate_hz = {:g} ms, delay {} ticks, velocity by {}{}",
+      servo.device.mass_kg, 1e3 / servo.rate_Hz, servo.device.delay_ticks,
+      v.method == rt::VelocityParams::Method::kalman ? "Kalman filter"
+                                                     : fmt::format("window of {} at 1 kHz", v.window),
+      v.smooth_s > 0 ? fmt::format(" and low-pass of {:g} ms", v.smooth_s * 1e3) : "");
+}
+
+// Damping that would make the handle itself swing.
+std::optional<Problem> check_damping(const rt::ServoConfig& servo) {
+  if (!servo.damping && !servo.axis) return std::nullopt;
+  const double T = 1 / servo.rate_Hz;
+  const double most = rt::stable_damping_Ns_m(servo.device, T, servo.velocity);
+  const std::string formula =
+      fmt::format("at most {:g} m/T = {:g} ({})", rounded_down(most * T / servo.device.mass_kg),
+                  rounded_down(most), device_text(servo));
+  double inside = 0;
+  if (const auto& d = servo.damping) {
+    for (const auto& [key, B] : {std::pair{"damping.B1_Ns_m", d->B1_Ns_m}, {"damping.B2_Ns_m", d->B2_Ns_m}})
+      if (!(B < most)) return Problem{key, fmt::format("{:g} cannot be rendered, allowed: {}", B, formula)};
+    inside = std::max(d->B1_Ns_m, d->B2_Ns_m);
+  }
+  if (servo.axis && !(inside + servo.axis->B_inward_Ns_m < most))
+    return Problem{"axis.B_inward_Ns_m", fmt::format("{:g} beside damping.B2_Ns_m = {:g} cannot be rendered, "
+                                                     "allowed: together {}",
+                                                     servo.axis->B_inward_Ns_m, inside, formula)};
+  return std::nullopt;
+}
+
+// The largest stiffness that the membrane has at the hand, up to the force that a limit cuts off.
+double membrane_stiffness_N_m(const rt::ServoConfig& servo) {
+  if (!servo.membrane || !servo.local_model) return 0;
+  const double k_p = servo.mapping.position_scale;
+  const double k_f = servo.mapping.force_scale;
+  constexpr int kSteps = 200;
+  double largest = 0;
+  for (int i = 1; i <= kSteps; ++i) {
+    const double part = static_cast<double>(i) / kSteps;
+    const rt::MembraneState m =
+        rt::membrane_law(*servo.membrane, part * part * servo.limits.penetration_depth_m, servo.membrane->R_m,
+                         servo.local_model->dimple_scale);
+    largest = std::max(largest, m.stiffness_N_m * k_f / k_p);
+    if (m.force_N > servo.limits.tip_force_hard_N || m.force_N * k_f > servo.limits.hand_force_N) break;
+  }
+  return largest;
+}
+
+template <class Config>
+bool unguarded(const Config& servo) {
+  if constexpr (requires { servo.guard; }) return !servo.guard;
+  return false;
+}
+
+struct Spring {
+  const char* key;
+  const char* name;
+  double K_N_m;
+};
+
+// Springs that act at once beside damping B: stable with nobody at the handle, and passive where no guard
+// sees to it.
+std::optional<Problem> check_springs(const rt::ServoConfig& servo, std::initializer_list<Spring> springs,
+                                     double B) {
+  double K = 0;
+  std::string sum;
+  const Spring* stiffest = springs.begin();
+  for (const Spring& s : springs) {
+    if (!(s.K_N_m > 0)) continue;
+    K += s.K_N_m;
+    sum += fmt::format("{}{} {:.4g}", sum.empty() ? "" : " + ", s.name, s.K_N_m);
+    if (s.K_N_m > stiffest->K_N_m) stiffest = &s;
+  }
+  if (sum.empty()) return std::nullopt;
+  const double T = 1 / servo.rate_Hz;
+  const double stable = rt::stable_stiffness_N_m(servo.device, T, servo.velocity, B);
+  if (!(K <= stable))
+    return Problem{
+        stiffest->key,
+        fmt::format("stiffness {} = {:.4g} N/m beside B = {:g} Ns/m swings by itself, allowed: at most {:g} "
+                    "m/T^2 = {:g}, where a pole of 1 + (K + B V(z)) P(z) z^-delay reaches the unit circle "
+                    "(b = haptic.damping_Ns_m {:g}, {})",
+                    sum, K, B, rounded_down(stable * T * T / servo.device.mass_kg), rounded_down(stable),
+                    servo.device.damping_Ns_m, device_text(servo))};
+  const double passive = rt::passive_stiffness_N_m(servo.device, T);
+  if (unguarded(servo) && !(K <= passive))
+    return Problem{stiffest->key,
+                   fmt::format("stiffness {} = {:.4g} N/m is not passive, allowed: at most b/(T/2 + delay) = "
+                               "{:g} (b = haptic.damping_Ns_m {:g}, {}), or add [guard]",
+                               sum, K, rounded_down(passive), servo.device.damping_Ns_m, device_text(servo))};
+  return std::nullopt;
+}
+
+std::optional<Problem> check_stiffness(const rt::ServoConfig& servo) {
+  const double cone = servo.cone ? rt::cone_stiffness_bound_N_m(*servo.cone) : 0;
+  const double axis = servo.axis ? servo.axis->K_N_m : 0;
+  const Spring repulsive{"repulsive.K_N_m", "repulsive", servo.repulsive ? servo.repulsive->K_N_m : 0};
+  const Spring friction{"friction.K_N_m", "friction", servo.friction ? servo.friction->K_N_m : 0};
+  const double B1 = servo.damping ? servo.damping->B1_Ns_m : 0;
+  const double B2 = servo.damping ? servo.damping->B2_Ns_m : 0;
+  const Spring membrane{"membrane.E_kPa", "membrane", membrane_stiffness_N_m(servo)};
+  if (auto p = check_springs(servo, {{"cone.K_N_m", "cone", cone}, membrane, repulsive, friction}, B1))
+    return p;
+
+  // At the puncture the cone is switched off while the axis is switched on.
+  double fading = 0;
+  double both = axis;
+  if (servo.cone && servo.axis) {
+    constexpr int kSteps = 64;
+    for (int i = 0; i < kSteps; ++i) {
+      const double t_s = i * std::max(servo.cone->ramp_s, servo.axis->ramp_s) / kSteps;
+      const double of_cone = cone * rt::smooth_step(1 - t_s / servo.cone->ramp_s);
+      const double of_axis = axis * rt::smooth_step(t_s / servo.axis->ramp_s);
+      if (of_cone + of_axis > both) {
+        both = of_cone + of_axis;
+        fading = of_cone;
+      }
+    }
+  }
+  const Spring inside{"axis.K_N_m", "axis", both - fading};
+  const double one_way = servo.axis ? servo.axis->B_inward_Ns_m : 0;
+  for (const double B : {B1, B2, B2 + one_way})
+    if (auto p = check_springs(servo, {inside, {"cone.K_N_m", "cone", fading}, repulsive, friction}, B))
+      return p;
+  return std::nullopt;
 }
 
 }  // namespace
@@ -57,6 +199,10 @@ std::optional<Problem> check_together(const Scene& s) {
                  "it says where the entry point is"),
            needs(servo.phases.has_value(), "phases", servo.local_model.has_value(), "local_model",
                  "the phases follow its depth"),
+           needs(servo.repulsive.has_value(), "repulsive", servo.local_model.has_value(), "local_model",
+                 "it says where the cell is"),
+           needs(servo.vibration.has_value(), "vibration", servo.phases.has_value(), "phases",
+                 "contact and puncture are phases"),
            needs(sim.microscope && s.vision, "camera", sim.cell.has_value(), "cell",
                  "there is nothing to look at"),
            needs(sim.holder.has_value(), "holder", sim.cell.has_value(), "cell", "there is nothing to hold"),
@@ -148,16 +294,12 @@ std::optional<Problem> check_together(const Scene& s) {
     return Problem{"damping.B2_Ns_m",
                    fmt::format("is below the damping outside, allowed: at least B1_Ns_m = {:g}",
                                servo.damping->B1_Ns_m)};
-  if (servo.damping) {
-    // Discrete stability of a mass with one tick of delay: B < 0.828 m / T.
-    const double most = 0.828 * sim.hand.mass_kg * servo.rate_Hz;
-    if (servo.damping->B2_Ns_m > most)
-      return Problem{
-          "damping.B2_Ns_m",
-          fmt::format(
-              "cannot be rendered at this rate, allowed: at most 0.828 haptic.mass_kg * rate_hz = {:g}",
-              most)};
-  }
+  if (auto p = check_damping(servo)) return p;
+  if (auto p = check_stiffness(servo)) return p;
+  if (servo.vibration && servo.vibration->frequency_Hz > servo.rate_Hz / 4)
+    return Problem{"vibration.frequency_hz",
+                   fmt::format("is too fast for the servo, allowed: at most servo.rate_hz / 4 = {:g}",
+                               servo.rate_Hz / 4)};
   if (limits.tip_force_soft_N >= limits.tip_force_hard_N)
     return Problem{"limits.tip_force_soft_uN",
                    fmt::format("is not below the hard limit, allowed: below tip_force_hard_uN = {:g}",

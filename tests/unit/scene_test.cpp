@@ -108,9 +108,8 @@ const std::vector<Broken>& broken() {
       {"B2 below B1", kLeast + "[damping]\nB1_Ns_m = 4\nB2_Ns_m = 2\n",
        "b.toml:7:11: damping.B2_Ns_m: is below the damping outside, allowed: at least B1_Ns_m = 4"},
       {"more damping than a tick can render", kLeast + "[damping]\nB1_Ns_m = 1\nB2_Ns_m = 80\n",
-       "b.toml:7:11: damping.B2_Ns_m: cannot be rendered at this rate, allowed: at most 0.828 haptic.mass_kg "
-       "* "
-       "rate_hz = 62.1"},
+       "b.toml:7:11: damping.B2_Ns_m: 80 cannot be rendered, allowed: at most 0.2313 m/T = 17.35 (m = "
+       "haptic.mass_kg 0.075, T = 1/servo.rate_hz = 1 ms, delay 0 ticks, velocity by Kalman filter)"},
       {"a guide without vision", kLeast + "[cone]\n",
        "b.toml:5:2: cone: needs [local_model] (it says where the entry point is), allowed: add [local_model] "
        "or "
@@ -342,6 +341,40 @@ TEST(Scene, OverridesAreReadAndCheckedAsTheFileIs) {
     ASSERT_FALSE(scene.has_value()) << text;
     EXPECT_EQ(scene.error(), message);
   }
+}
+
+// The numbers are those of device_limits_reference.py: 489.7 N/m beside B = 1 with two ticks of delay, 17.35
+// and 13.79 Ns/m without.
+TEST(Scene, WhatTheHapticDeviceCannotRenderIsRefusedWithTheFormula) {
+  const std::vector<std::string> late = {"haptic.delay_ticks=2", "friction=on"};
+  const auto with = [](std::vector<std::string> all, const std::string& one) {
+    all.push_back(one);
+    return all;
+  };
+  const auto refused = load_scene("free", with(late, "friction.K_N_m=490"));
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error(),
+            "--set: friction.K_N_m: stiffness friction 490 = 490 N/m beside B = 1 Ns/m swings by itself, "
+            "allowed: at most 0.006529 m/T^2 = 489.7, where a pole of 1 + (K + B V(z)) P(z) z^-delay reaches "
+            "the unit circle (b = haptic.damping_Ns_m 0.1, m = haptic.mass_kg 0.075, T = 1/servo.rate_hz = 1 "
+            "ms, delay 2 ticks, velocity by Kalman filter)");
+
+  const std::vector<std::string> most = {"damping.B1_Ns_m=17.35", "damping.B2_Ns_m=17.35"};
+  EXPECT_TRUE(load_scene("free", most).has_value());
+  EXPECT_FALSE(load_scene("free", {"damping.B1_Ns_m=17.36", "damping.B2_Ns_m=17.36"}).has_value());
+  EXPECT_NE(
+      load_scene("free", {"velocity.method=foaw", "velocity.smooth_ms=3", "damping.B1_Ns_m=13.8",
+                          "damping.B2_Ns_m=13.8"})
+          .error()
+          .find("at most 0.1838 m/T = 13.78 (m = haptic.mass_kg 0.075, T = 1/servo.rate_hz = 1 ms, delay "
+                "0 ticks, velocity by window of 16 at 1 kHz and low-pass of 3 ms)"),
+      std::string::npos);
+  const auto one_way = load_scene("icsi", {"axis.B_inward_Ns_m=14"});
+  ASSERT_FALSE(one_way.has_value());
+  EXPECT_TRUE(one_way.error().starts_with(
+      "--set: axis.B_inward_Ns_m: 14 beside damping.B2_Ns_m = 4 cannot be rendered, allowed: together at "
+      "most 0.2313 m/T = 17.35"))
+      << one_way.error();
 }
 
 TEST(Scene, NoMutationOfABuiltInSceneCrashesOrSaysMoreThanALine) {

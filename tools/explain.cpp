@@ -9,6 +9,7 @@
 #include <fstream>
 #include <thread>
 
+#include "rt/control/device_limits.hpp"
 #include "rt/platform/real_time_rights.hpp"
 #include "tools/child.hpp"
 #include "tools/scene_keys.hpp"
@@ -19,6 +20,12 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string cpu(int n) { return n < 0 ? "any CPU" : fmt::format("CPU {}", n); }
+
+// Of one frame, once everything is found and far from the cell: the picture, pipettes, what hides membranes,
+// the membranes, the undeformed cell.
+int vision_stages(const vision::VisionConfig& v) {
+  return 4 + (v.holder ? 1 : 0) + (v.needle ? 1 : 0) + (v.inner ? 1 : 0);
+}
 
 // What each absent table would have cost. Sizes are of the order of magnitude, for orientation.
 struct Saving {
@@ -41,6 +48,7 @@ constexpr Saving kSavings[] = {
     {"cone", "no cone guide"},
     {"axis", "no withdrawal axis"},
     {"damping", "no viscous damping"},
+    {"guard", "no passivity guard: the device must be passive with these effects by itself"},
     {"repulsive", "no region is kept free"},
     {"friction", "no dry friction"},
     {"vibration", "no burst marks contact and puncture"},
@@ -61,7 +69,7 @@ std::string explain(const Scene& s) {
   line(fmt::format("  clock      {}",
                    s.clock == ClockKind::real ? "real" : "virtual: as fast as everybody is ready"));
 
-  line("processes");
+  line(fmt::format("{} processes of one thread each", s.vision ? 3 : 2));
   line("  punctum         ordinary, memory not locked: starts, watches, records, reports");
   line(fmt::format(
       "  punctum-core    one real-time thread: SCHED_FIFO {}, {}, memory locked, {} Hz (every {:g} us)",
@@ -90,7 +98,11 @@ std::string explain(const Scene& s) {
   if (s.servo.phases)
     line("  phase                 free > contact > indentation > puncture > injection > withdrawal > clear");
   std::string effects;
-  const auto effect = [&effects](const std::string& e) { effects += (effects.empty() ? "" : ", ") + e; };
+  int effect_count = 0;
+  const auto effect = [&](const std::string& e) {
+    effects += (effects.empty() ? "" : ", ") + e;
+    ++effect_count;
+  };
   if (const auto& m = s.servo.membrane)
     effect(fmt::format("membrane ({}, E {:g} kPa, h {:g} um, c {:g} um)",
                        m->law == rt::MembraneParams::Law::paper ? "paper" : "large deflection",
@@ -108,7 +120,12 @@ std::string explain(const Scene& s) {
   if (const auto& cue = s.servo.vibration)
     effect(fmt::format("vibration at contact and puncture ({:g} Hz, {:g} N)", cue->frequency_Hz,
                        cue->amplitude_N));
-  line("  force effects         " + (effects.empty() ? std::string("none") : effects));
+  line("  force effects         " +
+       (effects.empty() ? std::string("none") : fmt::format("{}: {}", effect_count, effects)));
+  if (const auto& g = s.servo.guard)
+    line(
+        fmt::format("  passivity guard       stiffness up to {:g} N/m, {:g} of what the device keeps passive",
+                    g->margin * rt::passive_stiffness_N_m(s.servo.device, 1 / rate), g->margin));
   line(fmt::format(
       "  limits                hand {:g} N, stage {:g} um/s, depth {:g} um, far wall {:g} um, tip {:g} uN",
       s.servo.limits.hand_force_N, s.servo.limits.stage_velocity_m_s * 1e6,
@@ -144,6 +161,11 @@ std::string explain(const Scene& s) {
           fmt::format(" (snake, {} nodes{}), ", s.vision->snake.nodes, s.vision->refine ? ", refined" : "");
       if (s.vision->needle) stages += "contact, puncture, ";
       line("  " + stages + "w_d, a, R");
+      const int far = vision_stages(*s.vision);
+      line(s.vision->needle
+               ? fmt::format("  {} stages far from the cell, where no contact is looked for, {} at it", far,
+                             far + 1)
+               : fmt::format("  {} stages", far));
     }
   }
 
@@ -153,7 +175,10 @@ std::string explain(const Scene& s) {
     for (const auto& saving : kSavings)
       if (t.name == saving.table) absent += fmt::format("  {:<15} {}\n", t.name, saving.saves);
   }
-  if (!absent.empty()) out += "left out\n" + absent;
+  if (s.vision && s.vision->method == vision::Method::paper && !s.vision->inner)
+    absent += fmt::format("  {:<15} {}\n", "vision.inner", "no edge is looked for inside the outer membrane");
+  if (!absent.empty())
+    out += "left out, and nothing is spent on it (`punctum-report scenes` counts)\n" + absent;
   if (s.sim && s.sim->failure_count + s.sim->estop_event_count > 0)
     line(fmt::format("staged           {} device failures, {} e-stop presses", s.sim->failure_count,
                      s.sim->estop_event_count));

@@ -12,6 +12,7 @@ Result run_velocity(const Job&);
 Result run_vision(const Job&);
 Result run_surface(const Job&);
 #endif
+Result run_stability(const Job&);
 Result run_scenes(const Job&);
 
 std::span<const Topic> topics() {
@@ -24,6 +25,8 @@ std::span<const Topic> topics() {
       {"vision", "contours, tip, dimple and force as seen in pictures whose truth is known", run_vision},
       {"surface", "descriptions of the indented cell's surface", run_surface},
 #endif
+      {"stability", "stiffness, delay and damping on the haptic device, with and without the guard",
+       run_stability},
       {"scenes", "what each built-in scene costs: processes, libraries, instructions, stages of vision",
        run_scenes},
   };

@@ -1,0 +1,205 @@
+// The passivity guard in closed loop with the simulated device; the limits it is held to are the published
+// ones, computed here.
+#include "rt/control/passivity.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tools/report/closed_loop.hpp"
+
+namespace punctum::rt {
+namespace {
+
+using report::faithful;
+using report::LoopCell;
+using report::LoopResult;
+using report::run_loop;
+using report::sweep_cell;
+
+constexpr std::uint64_t kCells = 1200;  // `punctum-report stability` runs 20 000
+
+std::vector<LoopResult> sweep(bool guarded, std::uint64_t n) {
+  std::vector<LoopResult> results(n);
+  std::atomic<std::uint64_t> next{0};
+  std::vector<std::jthread> threads;
+  for (int i = 0; i < 2; ++i) {
+    threads.emplace_back([&] {
+      for (std::uint64_t k = next++; k < n; k = next++) results[k] = run_loop(sweep_cell(k + 1, guarded));
+    });
+  }
+  threads.clear();
+  return results;
+}
+
+TEST(Passivity, no_cell_of_the_sweep_is_unstable_with_the_guard_and_none_is_faded_away) {
+  const auto results = sweep(true, kCells);
+  int stiff = 0;
+  for (std::uint64_t i = 0; i < kCells; ++i) {
+    const LoopCell cell = sweep_cell(i + 1, true);
+    const LoopResult& r = results[i];
+    EXPECT_FALSE(r.unstable()) << "cell " << i + 1 << ": " << r.peak_to_peak_m << " m, " << r.surplus_J
+                               << " J";
+    EXPECT_TRUE(faithful(cell, r)) << "cell " << i + 1 << ": " << r.rendered_N_m << " of " << r.commanded_N_m;
+    stiff += r.commanded_N_m > r.passive_N_m ? 1 : 0;
+  }
+  EXPECT_GT(stiff, 400);  // the sweep asks for what the device cannot give
+}
+
+TEST(Passivity, most_of_the_same_cells_are_unstable_without_it) {
+  int unstable = 0;
+  for (const LoopResult& r : sweep(false, 300)) unstable += r.unstable() ? 1 : 0;
+  EXPECT_GT(unstable, 150);
+}
+
+// Hannaford & Ryu's bookkeeping on paper: a spring K, two ticks, one step of 1 mm into it.
+TEST(Passivity, surplus_is_the_work_of_the_held_force_less_what_the_spring_took_up) {
+  HandDevice device;
+  device.encoder_step_m = 0;
+  PassivityGuard guard({}, device, {}, 1000);
+  GuardInput in;
+  in.elapsed_s = 1e-3;
+  in.stiffness_N_m = 100;
+  const auto tick = [&](double x, double applied_N) {
+    in.position_m = {x, 0, 0};
+    in.storing[0] = {{-100 * x, 0, 0}, in.position_m};
+    (void)guard.step(in);
+    guard.wrote({applied_N, 0, 0});
+  };
+  tick(1e-3, -0.1);
+  tick(2e-3, -0.2);
+  // W = -0.1 N * 1 mm; the spring took (0.1 + 0.2)/2 N * 1 mm: 0.05 mJ too much came back.
+  EXPECT_NEAR(guard.surplus_J(), 0.05e-3, 1e-6);
+}
+
+TEST(Passivity, a_late_needle_is_seen_where_the_handle_alone_would_not_show_it) {
+  // The membrane's force follows the needle, which follows the handle 50 ms late: each cycle gives energy.
+  const auto surplus = [](bool late) {
+    HandDevice device;
+    device.encoder_step_m = 0;
+    PassivityGuard guard({}, device, {}, 1000);
+    GuardInput in;
+    in.elapsed_s = 1e-3;
+    in.stiffness_N_m = 20;
+    double needle = 0, most = 0;
+    for (int k = 0; k < 4000; ++k) {
+      const double x = 5e-3 + 5e-3 * std::sin(6.28 * k * 1e-3);
+      needle += late ? (x - needle) * 0.02 : x - needle;
+      in.position_m = {x, 0, 0};
+      in.storing[1] = {{-20 * needle, 0, 0}, {needle, 0, 0}};
+      guard.wrote(guard.step(in));
+      most = std::max(most, guard.damper_Ns_m());
+    }
+    return most;
+  };
+  EXPECT_LT(surplus(false), 0.1);
+  EXPECT_GT(surplus(true), 0.5);  // K tau = 1 Ns/m is what it takes
+}
+
+TEST(Passivity, eight_hours_at_rest_and_in_gentle_motion_wind_nothing_up) {
+  HandDevice device;
+  PassivityGuard guard({}, device, {}, 1000);
+  GuardInput in;
+  in.elapsed_s = 1e-3;
+  in.stiffness_N_m = 100;
+  constexpr long kHour = 3'600'000;
+  const auto reaction_N = [&](double shove_m) {
+    // A sudden swing: what the guard adds to it.
+    double most = 0;
+    PassivityGuard copy = guard;
+    for (int k = 0; k < 200; ++k) {
+      const double x = 2e-3 + shove_m * std::sin(0.4 * k);
+      in.position_m = {x, 0, 0};
+      in.storing[0] = {{-100 * x, 0, 0}, in.position_m};
+      const hal::Vec3 f = copy.step(in);
+      copy.wrote(f);
+      most = std::max(most, copy.damper_N().norm());
+    }
+    return most;
+  };
+  double fresh = 0;
+  for (long k = 0; k < 8 * kHour; ++k) {
+    const double t = 1e-3 * static_cast<double>(k);
+    const double x = 3e-5 * std::round((2e-3 + 1e-3 * std::sin(0.2 * std::numbers::pi * t)) / 3e-5);
+    in.position_m = {x, 0, 0};
+    in.storing[0] = {{-100 * x, 0, 0}, in.position_m};
+    in.dissipative_N = {-6.3e-4 * std::cos(0.2 * std::numbers::pi * t), 0, 0};  // 1 Ns/m
+    const hal::Vec3 f = guard.step(in);
+    guard.wrote(f);
+    if (k + 1 == 60000) fresh = reaction_N(1e-3);
+  }
+  EXPECT_EQ(guard.gain(), 1);
+  EXPECT_LT(std::abs(guard.surplus_J()), 1e-4);
+  EXPECT_NEAR(reaction_N(1e-3), fresh, 0.05 * fresh);
+}
+
+TEST(Passivity, input_that_is_not_finite_passes_through_and_leaves_no_trace) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  PassivityGuard guard({}, {}, {}, 1000), twin({}, {}, {}, 1000);
+  GuardInput in;
+  in.elapsed_s = 1e-3;
+  in.stiffness_N_m = 1000;
+  for (int k = 0; k < 50; ++k) {
+    in.position_m = {1e-4 * k, 0, 0};
+    in.storing[0] = {{-0.1 * k, 0, 0}, in.position_m};
+    const hal::Vec3 a = guard.step(in), b = twin.step(in);
+    EXPECT_EQ(a, b);
+    if (k == 20) {
+      GuardInput broken = in;
+      broken.storing[0].force_N.x() = nan;
+      EXPECT_FALSE(guard.step(broken).allFinite());
+    }
+    guard.wrote(a);
+    twin.wrote(b);
+  }
+}
+
+TEST(Passivity, a_stiffness_falls_at_once_and_returns_slowly_to_the_passive_one) {
+  HandDevice device;  // b = 0.1 Ns/m at 1 kHz: passive up to 200 N/m
+  PassivityGuard guard({}, device, {}, 1000);
+  GuardInput in;
+  in.elapsed_s = 1e-3;
+  in.stiffness_N_m = 1000;
+  (void)guard.step(in);
+  EXPECT_NEAR(guard.gain() * 1000, 0.9 * 200, 1e-9);
+  in.stiffness_N_m = 0;
+  (void)guard.step(in);
+  EXPECT_LT(guard.gain(), 0.19);
+  for (int k = 0; k < 10000; ++k) (void)guard.step(in);
+  EXPECT_GT(guard.gain(), 0.98);
+}
+
+// Gil 2009 and Colgate & Schenkel, by simulation against the formulas.
+TEST(Passivity, measured_boundaries_are_the_published_ones) {
+  HandDevice device;
+  device.damping_Ns_m = 0.1;
+  for (const double rate : {1000.0, 8000.0}) {
+    const double T = 1 / rate;
+    for (int d = 0; d <= 2; ++d) {
+      device.delay_ticks = d;
+      const double B = 0.01 * device.mass_kg / T;
+      const double Gil = (device.damping_Ns_m + B) / (T * (0.5 + d));
+      EXPECT_NEAR(report::measured_boundary_N_m(device, T, B) / Gil, 1, 0.05) << rate << " " << d;
+    }
+  }
+  // b = 0 and no delay, exactly: K T^2/m = 2 beta (2 - beta)/(2 + beta).
+  device.damping_Ns_m = 1e-9;
+  device.delay_ticks = 0;
+  for (const double beta : {0.05, 0.4, 0.828, 1.5}) {
+    const double m = device.mass_kg, T = 1e-3;
+    const double K = m / (T * T) * 2 * beta * (2 - beta) / (2 + beta);
+    EXPECT_NEAR(report::measured_boundary_N_m(device, T, beta * m / T) / K, 1, 0.005) << beta;
+  }
+  const auto e = report::cycle_energy(1000, 2, 0.00531, 1e-3, 0);
+  EXPECT_NEAR(e.triangle_Ns_m / (1000 * 0.5e-3 + 2 * 1e-3 / (1e-3 + 2 * 0.00531)), 1, 0.01);
+  EXPECT_LT(e.sinusoid_Ns_m, e.triangle_Ns_m);
+}
+
+}  // namespace
+}  // namespace punctum::rt

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <random>
 
@@ -34,7 +35,7 @@ TEST(Polyline, FindsTheNearestPlaceWhateverTheRunsAre) {
     const Polyline line(walk, true);
     for (int k = 0; k < 100; ++k) {
       const Point2 p{10 * step(random), 10 * step(random)};
-      double nearest = INFINITY;  // walked along every piece
+      double nearest = std::numeric_limits<double>::infinity();  // walked along every piece
       for (std::size_t i = 0; i < n; ++i) {
         const Point2 &a = walk[i], &b = walk[(i + 1) % n];
         for (int s = 0; s <= 1000; ++s) {
@@ -105,7 +106,7 @@ TEST(SurfaceMethods, DescribeBetterTheMoreNodesTheyHave) {
   const DeformedCell cell = deformed_cell(zona(), kR, 20);
   for (const char* name : {"polygon", "polygon at equal angles", "periodic spline"}) {
     const SurfaceMethod& m = method(name);
-    double last = INFINITY;
+    double last = std::numeric_limits<double>::infinity();
     for (const double nodes : m.values) {
       const SurfaceError e = surface_error(cell, m.given(cell, nodes));
       EXPECT_LT(e.rms_um, last) << name << " " << nodes;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 namespace punctum::report {
@@ -39,7 +40,7 @@ double Polyline::distance(const Point2& p) const {
   const auto least = [&p](const Run& run) {
     return std::hypot(p[0] - run.centre[0], p[1] - run.centre[1]) - run.radius;
   };
-  double best2 = INFINITY;
+  double best2 = std::numeric_limits<double>::infinity();
   const auto look = [&](const Run& run) {
     for (std::size_t i = run.from; i < run.to; ++i) {
       best2 = std::min(best2, squared_distance(p, points_[i], points_[i + 1]));

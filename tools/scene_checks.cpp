@@ -13,6 +13,8 @@
 namespace punctum::tools {
 namespace {
 
+constexpr double kLargestClick_N = 0.25;
+
 constexpr double um(double m) { return m * 1e6; }
 
 bool failing_device_is_there(const Scene& s, sim::Device d) {
@@ -320,6 +322,15 @@ std::optional<Problem> check_together(const Scene& s) {
                    fmt::format("the stage lags further behind at full speed, allowed: at least "
                                "stage_velocity_um_s * stage.lag_ms = {:g}",
                                um(lags_m))};
+  // One step of the stage under a stiff law is felt as a click.
+  const double click_N =
+      membrane_stiffness_N_m(servo) * servo.mapping.position_scale * sim.stage.resolution_m;
+  if (click_N > kLargestClick_N)
+    return Problem{
+        "membrane.E_kPa",
+        fmt::format("one step of the stage would be {:.2g} N at the hand, allowed: at most {:g} N (softer, "
+                    "less mapping.force_scale or a finer stage.resolution_um)",
+                    click_N, kLargestClick_N)};
   if (servo.membrane && servo.membrane->c_m * 4 > servo.membrane->R_m)
     return Problem{"membrane.c_um", fmt::format("is too thick for the cell, allowed: at most R_um / 4 = {:g}",
                                                 um(servo.membrane->R_m / 4))};

@@ -42,7 +42,7 @@ const std::vector<Broken>& broken() {
       "scene, servo, haptic, operator, stage, needle, estop, velocity, mapping, limits, cell, holder, "
       "vacuum, "
       "injector, force_sensor, camera, vision, phases, local_model, membrane, cone, axis, damping, "
-      "repulsive, friction, vibration, failure, "
+      "repulsive, friction, vibration, guard, failure, "
       "estop_press";
   static const std::vector<Broken> list = {
       {"nothing at all", "",

@@ -82,7 +82,7 @@ class Tabled {
   explicit Tabled(int knots) : last_(static_cast<Real>(knots - 1)) {
     for (int i = -1; i <= knots; ++i) {
       const double v = kLeast + (1 - kLeast) * std::clamp(i, 0, knots - 1) / (knots - 1);
-      const double s = std::max(-std::expm1(8 * std::log(v)), 1e-9);
+      const double s = std::max(-std::expm1(8 * std::log(v)), 1e-15);
       const double rest = std::pow(v, 8);  // 1 - s
       const double zeta = std::sqrt(rest / (2 - rest));
       const double reach = 2 * s / ((1 + s) * (1 + zeta));

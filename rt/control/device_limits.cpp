@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <limits>
 #include <numbers>
 
@@ -12,18 +11,27 @@ namespace punctum::rt {
 namespace {
 
 using std::numbers::pi;
-using Complex = std::complex<double>;
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
-// As in the library, without its treatment of infinities and of negative radii.
+// The library's drags in streams.
+struct Complex {
+  double re = 0, im = 0;
+
+  friend Complex operator+(const Complex& p, const Complex& q) noexcept { return {p.re + q.re, p.im + q.im}; }
+  friend Complex operator+(const Complex& p, double q) noexcept { return {p.re + q, p.im}; }
+  friend Complex operator-(const Complex& p, const Complex& q) noexcept { return {p.re - q.re, p.im - q.im}; }
+  friend Complex operator-(double p, const Complex& q) noexcept { return {p - q.re, -q.im}; }
+  friend Complex operator-(const Complex& p) noexcept { return {-p.re, -p.im}; }
+  friend Complex operator*(double a, const Complex& p) noexcept { return {a * p.re, a * p.im}; }
+};
 [[nodiscard]] Complex polar(double r, double angle) noexcept {
   return {r * std::cos(angle), r * std::sin(angle)};
 }
 [[nodiscard]] Complex times(const Complex& p, const Complex& q) noexcept {
-  return {p.real() * q.real() - p.imag() * q.imag(), p.real() * q.imag() + p.imag() * q.real()};
+  return {p.re * q.re - p.im * q.im, p.re * q.im + p.im * q.re};
 }
 [[nodiscard]] Complex over(const Complex& p, const Complex& q) noexcept {
-  return times(p, std::conj(q)) / (q.real() * q.real() + q.imag() * q.imag());
+  return 1 / (q.re * q.re + q.im * q.im) * times(p, {q.re, -q.im});
 }
 [[nodiscard]] Complex minus_one(double theta) noexcept {  // e^(j theta) - 1
   return polar(2 * std::sin(0.5 * theta), 0.5 * (theta + pi));
@@ -121,23 +129,23 @@ void visit_real_values(int waves, Curve curve, Visit visit) noexcept {
   constexpr int kPerWave = 24;
   const double widest = pi / (kPerWave * waves);
   double from = kFirst;
-  bool below = curve(from).imag() < 0;
+  bool below = curve(from).im < 0;
   while (from < pi) {
     const double to = std::min({from * kRatio, from + widest, pi});
-    const bool next_below = curve(to).imag() < 0;
+    const bool next_below = curve(to).im < 0;
     if (next_below != below) {
       double a = from;
       double b = to;
       for (int i = 0; i < 60; ++i) {
         const double middle = 0.5 * (a + b);
-        ((curve(middle).imag() < 0) == below ? a : b) = middle;
+        ((curve(middle).im < 0) == below ? a : b) = middle;
       }
-      visit(curve(0.5 * (a + b)).real());
+      visit(curve(0.5 * (a + b)).re);
     }
     below = next_below;
     from = to;
   }
-  visit(curve(pi).real());
+  visit(curve(pi).re);
 }
 
 // B for which z = e^(j theta) solves 1 + B V P/z^d = 0, largest 1/B.

@@ -85,8 +85,11 @@ TEST_F(Report, AllWritesTablesFiguresAndOnePageForEveryTopic) {
 }
 
 TEST_F(Report, BadInputIsOneLineAndCodeTwo) {
-  const std::vector<std::vector<std::string>> inputs = {
-      {"colour", "--out", report()}, {"all", "--out", "/proc/nowhere"}, {}, {"all", "--fast"}};
+  const std::vector<std::vector<std::string>> inputs = {{"colour", "--out", report()},
+                                                        {"all", "--out", "/proc/nowhere"},
+                                                        {"all", "--out", ""},
+                                                        {},
+                                                        {"all", "--fast"}};
   for (const auto& args : inputs) {
     EXPECT_EQ(run(args), 2) << said_;
     EXPECT_EQ(std::count(said_.begin(), said_.end(), '\n'), 1) << said_;

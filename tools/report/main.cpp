@@ -85,7 +85,8 @@ int main_or_throw(int argc, char** argv) {
   std::string folder, input, output;
   bool quick = false;
   app.add_option("TOPIC", wanted, "one or more of: " + names)->required();
-  app.add_option("--out", folder, "folder of tables, figures and index.html (default: reports/report-DATE)");
+  const auto* to_folder = app.add_option(
+      "--out", folder, "folder of tables, figures and index.html (default: reports/report-DATE)");
   app.add_flag("--quick", quick, "fewer points and cells, all together within a minute");
   CLI::Option* in = nullptr;
   if (evaluates != topics().end()) {
@@ -112,6 +113,7 @@ int main_or_throw(int argc, char** argv) {
       return bad(fmt::format("--input: allowed with the one topic {}", evaluates->name));
     return evaluates->evaluate(input, output);
   }
+  if (to_folder->count() > 0 && folder.empty()) return bad("--out: names no folder");
   const fs::path out = fs::absolute(
       folder.empty() ? fmt::format("reports/report-{:%Y%m%d-%H%M%S}", fmt::localtime(std::time(nullptr)))
                      : folder);

@@ -91,12 +91,6 @@ double membrane_stiffness_N_m(const rt::ServoConfig& servo) {
   return largest;
 }
 
-template <class Config>
-bool unguarded(const Config& servo) {
-  if constexpr (requires { servo.guard; }) return !servo.guard;
-  return false;
-}
-
 struct Spring {
   const char* key;
   const char* name;
@@ -128,7 +122,7 @@ std::optional<Problem> check_springs(const rt::ServoConfig& servo, std::initiali
                     sum, K, B, rounded_down(stable * T * T / servo.device.mass_kg), rounded_down(stable),
                     servo.device.damping_Ns_m, device_text(servo))};
   const double passive = rt::passive_stiffness_N_m(servo.device, T);
-  if (unguarded(servo) && !(K <= passive))
+  if (!servo.guard && !(K <= passive))
     return Problem{stiffest->key,
                    fmt::format("stiffness {} = {:.4g} N/m is not passive, allowed: at most b/(T/2 + delay) = "
                                "{:g} (b = haptic.damping_Ns_m {:g}, {}), or add [guard]",

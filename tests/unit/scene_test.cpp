@@ -359,6 +359,14 @@ TEST(Scene, WhatTheHapticDeviceCannotRenderIsRefusedWithTheFormula) {
             "the unit circle (b = haptic.damping_Ns_m 0.1, m = haptic.mass_kg 0.075, T = 1/servo.rate_hz = 1 "
             "ms, delay 2 ticks, velocity by Kalman filter)");
 
+  // b / (T/2 + delay) = 0.1 / 2.5 ms where no guard sees to it.
+  EXPECT_NE(load_scene("free", with(late, "friction.K_N_m=41"))
+                .error()
+                .find("= 41 N/m is not passive, allowed: at most b/(T/2 + delay) = 40 "),
+            std::string::npos);
+  EXPECT_TRUE(load_scene("free", with(late, "friction.K_N_m=39")).has_value());
+  EXPECT_TRUE(load_scene("free", with(with(late, "friction.K_N_m=41"), "guard=on")).has_value());
+
   const std::vector<std::string> most = {"damping.B1_Ns_m=17.35", "damping.B2_Ns_m=17.35"};
   EXPECT_TRUE(load_scene("free", most).has_value());
   EXPECT_FALSE(load_scene("free", {"damping.B1_Ns_m=17.36", "damping.B2_Ns_m=17.36"}).has_value());

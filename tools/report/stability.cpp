@@ -142,6 +142,20 @@ Table counts_table(const std::vector<Swept>& with, const std::vector<Swept>& wit
   return t;
 }
 
+// Of a finite difference at any rate: device_limits widens windows with the rate, so it is asked for the same
+// b T/m and B T/m at 1 kHz.
+double exact_boundary_N_m(const rt::HandDevice& device, double T_s, double B_Ns_m) {
+  rt::VelocityParams difference;
+  difference.method = rt::VelocityParams::Method::foaw;
+  difference.window = 1;
+  difference.smooth_s = 0;
+  constexpr double T1_s = 1e-3;
+  rt::HandDevice same = device;
+  same.damping_Ns_m *= T_s / T1_s;
+  const double K1 = rt::stable_stiffness_N_m(same, T1_s, difference, B_Ns_m * T_s / T1_s);
+  return K1 * (T1_s / T_s) * (T1_s / T_s);
+}
+
 // Exact, Gil's and the measured boundary of the linear loop.
 struct Boundaries {
   Table table;
@@ -184,17 +198,13 @@ Boundaries boundaries(bool quick, Progress& progress) {
     points[i].measured = measured_boundary_N_m(points[i].device, 1 / points[i].rate, points[i].B);
     progress.step();
   });
-  rt::VelocityParams difference;
-  difference.method = rt::VelocityParams::Method::foaw;
-  difference.window = 1;
-  difference.smooth_s = 0;
   constexpr const char* kNames[] = {"exact, no delay", "exact, one tick", "exact, two ticks"};
   std::array<Series, 3> exact, Gil;
   Series measured{"measured", {}, {}, Style::points};
   for (const Point& p : points) {
     const double T = 1 / p.rate, m = p.device.mass_kg, b = p.device.damping_Ns_m;
     const int d = p.device.delay_ticks;
-    const double K_exact = rt::stable_stiffness_N_m(p.device, T, difference, p.B);
+    const double K_exact = exact_boundary_N_m(p.device, T, p.B);
     const double K_Gil = (b + p.B) / (T * (0.5 + d));
     const bool claims = b * T / m <= 0.01 && p.B * T / m <= 0.02;
     out.worst_exact = std::max(out.worst_exact, std::abs(p.measured / K_exact - 1));

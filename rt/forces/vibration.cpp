@@ -12,8 +12,7 @@ constexpr double kDecays = 7;  // a burst ends after as many: a thousandth is le
 }  // namespace
 
 Vibration::Vibration(const VibrationParams& params, int delay_ticks) noexcept
-    : params_(params),
-      delay_(static_cast<std::size_t>(std::clamp(delay_ticks, 0, static_cast<int>(given_N_.size()) - 1))) {
+    : params_(params), delay_(static_cast<std::size_t>(std::clamp(delay_ticks, 0, kKept - 1))) {
   given_N_.fill(hal::Vec3::Zero());
 }
 

@@ -1,4 +1,5 @@
-// Vibration: a short burst along the needle that marks contact and puncture, F = A e^(-t/decay) sin(2 pi f t).
+// Vibration: a short burst along the needle that marks contact and puncture, F = A e^(-t/decay) sin(2 pi f
+// t).
 //
 // The one effect that is active: it may give energy to the hand. What it gives is counted,
 // sum of f_{k-1} (x_k - x_{k-1}) with the force that acts after the device's delay, and a burst ends with the
@@ -24,6 +25,8 @@ class Vibration {
   [[nodiscard]] double injected_energy_J() const noexcept { return injected_J_; }  // signed, cumulative
 
  private:
+  static constexpr int kKept = 8;  // forces; more than the longest delay
+
   VibrationParams params_;
   std::size_t delay_;
   bool running_ = false;
@@ -32,7 +35,7 @@ class Vibration {
   double injected_J_ = 0;
   hal::Vec3 hand_before_m_ = hal::Vec3::Zero();
   bool seen_ = false;
-  std::array<hal::Vec3, 8> given_N_;  // newest first
+  std::array<hal::Vec3, kKept> given_N_;  // newest first
 };
 
 }  // namespace punctum::rt

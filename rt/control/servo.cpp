@@ -494,7 +494,8 @@ hal::Vec3 Servo::keep_passive(const hal::Vec3& wanted_N) noexcept {
     in.stiffness_N_m += presence * fixture_gain_ * force_scale_ * config_.mapping.force_scale / k_p *
                         membrane_->state().stiffness_N_m;
   }
-  in.damping_Ns_m = presence * (damping_ ? damping_->B_Ns_m() : 0);
+  if (friction_) in.stiffness_N_m += presence * friction_->stiffness_N_m();
+  in.damping_Ns_m = presence * ((damping_ ? damping_->B_Ns_m() : 0) + (axis_ ? axis_->B_Ns_m() : 0));
   in.elapsed_s = elapsed_s_;
   const hal::Vec3 force_N = guard_->step(in);
   guard_N_ = (force_N - wanted_N).norm();

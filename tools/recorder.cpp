@@ -129,8 +129,7 @@ void Recorder::row(const rt::TelemetrySample& s, const sim::Snapshot* world) {
     if (world->has_cell != 0) {
       const sim::Truth t = sim::truth_of(sim_, *world);
       put(t.axial_force_N), put(t.gap_m), put(t.wd_m), put(t.a_m);
-      fmt::format_to(std::back_inserter(out), FMT_COMPILE("{:d},{:d},{:d},"), t.contact, t.punctured,
-                     t.lost);
+      fmt::format_to(std::back_inserter(out), FMT_COMPILE("{:d},{:d},{:d},"), t.contact, t.punctured, t.lost);
     } else {
       fmt::format_to(std::back_inserter(out), ",,,,,,,");
     }

@@ -152,11 +152,10 @@ std::vector<Table> make_tables() {
 
   t.push_back({"velocity", Kind::settings, always, keep, [](Scene& s) {
                  auto& v = s.servo.velocity;
-                 return std::vector<Key>{choice("method", v.method, {"kalman", "foaw"}),
-                                         milli("d_mm", v.d_m, 1e-5, 1),
-                                         real("jerk_m_s3_rtHz", v.jerk_m_s3_rtHz, 0.01, 1000),
-                                         whole("window", v.window, 2, 64),
-                                         milli("smooth_ms", v.smooth_s, 0, 100)};
+                 return std::vector<Key>{
+                     choice("method", v.method, {"kalman", "foaw"}), milli("d_mm", v.d_m, 1e-5, 1),
+                     real("jerk_m_s3_rtHz", v.jerk_m_s3_rtHz, 0.01, 1000), whole("window", v.window, 2, 64),
+                     milli("smooth_ms", v.smooth_s, 0, 100)};
                }});
 
   t.push_back({"mapping", Kind::settings, always, keep, [](Scene& s) {
@@ -406,9 +405,12 @@ std::vector<Table> make_tables() {
       [](Scene& s) {
         auto& m = *s.servo.membrane;
         return std::vector<Key>{choice("law", m.law, {"large_deflection", "paper"}),
-                                kilo("E_kPa", m.E_Pa, 0.1, 1e5), real("nu", m.nu, 0, 0.5),
-                                micro("h_um", m.h_m, 0.05, 100), micro("c_um", m.c_m, 0.2, 50),
-                                micro("R_um", m.R_m, 5, 2000), real("prestrain", m.prestrain, 0.002, 1),
+                                kilo("E_kPa", m.E_Pa, 0.1, 1e5),
+                                real("nu", m.nu, 0, 0.5),
+                                micro("h_um", m.h_m, 0.05, 100),
+                                micro("c_um", m.c_m, 0.2, 50),
+                                micro("R_um", m.R_m, 5, 2000),
+                                real("prestrain", m.prestrain, 0.002, 1),
                                 micro("seat_um", m.seat_m, 1, 2000)};
       }));
 

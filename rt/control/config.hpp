@@ -13,12 +13,12 @@ using hal::Vec3;
 struct MembraneParams {
   enum class Law : std::uint8_t { large_deflection, paper };
   Law law = Law::large_deflection;
-  double E_Pa = 35.3e3;    // elastic modulus
-  double nu = 0.5;         // Poisson ratio
-  double h_m = 4.6e-6;     // thickness
-  double c_m = 3.8e-6;     // pipette radius
-  double R_m = 60e-6;      // undeformed cell, until vision knows better
-  double prestrain = 0.2;  // large deflection: of the undeformed membrane, by turgor
+  double E_Pa = 35.3e3;     // elastic modulus
+  double nu = 0.5;          // Poisson ratio
+  double h_m = 4.6e-6;      // thickness
+  double c_m = 3.8e-6;      // pipette radius
+  double R_m = 60e-6;       // undeformed cell, until vision knows better
+  double prestrain = 0.2;   // large deflection: of the undeformed membrane, by turgor
   double seat_m = 29.5e-6;  // large deflection: radius of the patch that rests in the holding pipette or dish
 };
 
@@ -26,7 +26,8 @@ struct MembraneParams {
 struct ConeParams {
   enum class Method : std::uint8_t { potential, paper };
   Method method = Method::potential;
-  double K_N_m = 150;      // at the hand, on the membrane: with the membrane's own, below 0.9 of what keeps passive
+  double K_N_m =
+      150;  // at the hand, on the membrane: with the membrane's own, below 0.9 of what keeps passive
   double d0_m = 40e-6;     // distance from the membrane at which the pull has halved (needle scale)
   double r0_m = 1e-6;      // free radius at the membrane (needle scale)
   double alpha_rad = 0.2;  // half-angle of the free core
@@ -77,8 +78,8 @@ struct VelocityParams {
   Method method = Method::kalman;
   double d_m = 0.03e-3;       // encoder step
   double jerk_m_s3_rtHz = 5;  // kalman: of the hand, root of its spectral density; more follows faster
-  int window = 16;            // foaw: intervals between samples at most, at 1 kHz; grows with the rate, up to 64
-  double smooth_s = 0;        // first-order low-pass behind it; 0 = off
+  int window = 16;      // foaw: intervals between samples at most, at 1 kHz; grows with the rate, up to 64
+  double smooth_s = 0;  // first-order low-pass behind it; 0 = off
 };
 
 // The haptic device as the core knows it: what can be rendered follows from it.

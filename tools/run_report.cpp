@@ -19,10 +19,6 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kAlarms[] = {"vision_stale", "force_limited", "depth_limited", "travel_limited",
-                                   "tip_force",    "model_invalid", "phase_timeout", "overrun",
-                                   "sensor",       "degraded",      "stiffness_reduced"};
-
 Json number(const std::optional<double>& v, double scale = 1) {
   return v && std::isfinite(*v) ? Json(*v * scale) : Json(nullptr);
 }
@@ -233,8 +229,8 @@ tl::expected<void, std::string> write_report(const std::string& path, const Scen
   j["vision_restarts"] = Json::array();
   for (const auto& r : end.vision_restarts) j["vision_restarts"].push_back({{"t_s", r.t_s}, {"why", r.why}});
   j["alarms_s"] = Json::object();
-  for (std::size_t i = 0; i < std::size(kAlarms); ++i)
-    if (m.alarm_ticks[i] > 0) j["alarms_s"][kAlarms[i]] = part_of_limit(m, m.alarm_ticks[i]);
+  for (std::size_t i = 0; i < std::size(rt::kAlarmNames); ++i)
+    if (m.alarm_ticks[i] > 0) j["alarms_s"][rt::kAlarmNames[i]] = part_of_limit(m, m.alarm_ticks[i]);
   j["faults"] = Json::array();
   for (const auto& f : m.faults) j["faults"].push_back({{"name", rt::name(f.fault)}, {"t_s", f.t_s}});
   j["commands_refused"] = core.commands_refused.load();
@@ -324,9 +320,9 @@ std::string summary(const Scene& scene, const RunEnd& end, const Measures& m, co
                  ? "not known"
                  : fmt::format("{} + {}", core.minor_faults.load(), core.major_faults.load())));
   std::string alarms;
-  for (std::size_t i = 0; i < std::size(kAlarms); ++i)
+  for (std::size_t i = 0; i < std::size(rt::kAlarmNames); ++i)
     if (part_of_limit(m, m.alarm_ticks[i]) >= 0.005 && (1U << i) != rt::alarm_degraded)
-      alarms += fmt::format("{}{} {:.2f} s", alarms.empty() ? "" : ", ", kAlarms[i],
+      alarms += fmt::format("{}{} {:.2f} s", alarms.empty() ? "" : ", ", rt::kAlarmNames[i],
                             part_of_limit(m, m.alarm_ticks[i]));
   if (!alarms.empty()) line("alarms", alarms);
   for (std::size_t i = 0; i < std::min<std::size_t>(m.faults.size(), 5); ++i)

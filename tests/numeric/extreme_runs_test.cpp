@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdio>
 #include <deque>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <memory>
@@ -513,12 +514,9 @@ class Station {
 };
 
 std::string words(std::uint32_t alarms) {
-  constexpr const char* names[] = {"vision_stale", "force_limited", "depth_limited", "travel_limited",
-                                   "tip_force",    "model_invalid", "phase_timeout", "overrun",
-                                   "sensor",       "degraded"};
   std::string s;
-  for (int i = 0; i < 10; ++i)
-    if ((alarms >> i & 1U) != 0) s += std::string(s.empty() ? "" : " ") + names[i];
+  for (std::size_t i = 0; i < std::size(rt::kAlarmNames); ++i)
+    if ((alarms >> i & 1U) != 0) s += std::string(s.empty() ? "" : " ") + rt::kAlarmNames[i];
   return s.empty() ? "-" : s;
 }
 

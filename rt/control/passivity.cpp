@@ -11,17 +11,20 @@ namespace {
 constexpr double kCompensation = 2;    // of K (T/2 + t_d): half of it may be lost to the velocity's delay
 constexpr double kDamperShare = 0.5;   // of the damping that the device can render
 constexpr double kForget_s = 0.1;      // dissipation counts this long
-constexpr double kSurplusStays_s = 5;  // surplus that no motion gives a chance to take back is forgotten
+constexpr double kSurplusStays_s = 5;  // and surplus this long
+constexpr double kRest_s = 0.3;        // or this long while the handle is given nothing
 constexpr double kTakeBack_s = 0.02;   // the damper aims to take surplus back within this
 constexpr double kDamperRise_s = 0.002;
-constexpr double kLower_s = 0.1;     // the gain falls over this while surplus stays
+constexpr double kLower_s = 0.5;     // the gain falls over this while surplus stays
 constexpr double kMeanPeriod_s = 5;  // over which the kept period is averaged
 constexpr double kSingleDelay = 8;   // periods: a longer one is an event of its own, not a rate
 constexpr double kLate = 1.5;        // kept periods: from here on an interval's surplus is kept apart
 constexpr double kLateReserve = 1.5;
 constexpr double kPeriodUp = 1.02;       // the kept period steps up when its mean exceeds it by this ...
 constexpr double kPeriodReserve = 1.25;  // ... to this above the mean, so that it rarely steps again,
-constexpr double kPeriodDown = 1.6;      // and recovers when the mean is this far below
+constexpr double kPeriodDown = 1.6;      // steps back when the mean is this far below
+constexpr double kOnTime = 1.005;        // or the nominal one, to this
+constexpr double kPeriodUp_s = 0.1;      // the stiffness that follows from it moves without a click
 constexpr double kPhase = 0.6;           // rad
 constexpr double kFaster = 2.5;          // poles of the guard's velocity, over the fastest oscillation
 constexpr double kSteadyForce_N = 0.02;
@@ -77,6 +80,7 @@ PassivityGuard::PassivityGuard(const GuardParams& params, const HandDevice& devi
       own_stable_Ns_m_(stable_damping_Ns_m(device, T_s_, own_)),
       stable_Ns_m_(stable_damping_Ns_m(device, T_s_, velocity)),
       in_phase_N_m_(device.mass_kg * square(in_phase_rad_s(velocity, T_s_))),
+      reserved_s_(T_s_),
       kept_s_(T_s_),
       mean_s_(T_s_) {
   written_N_.fill(hal::Vec3::Zero());
@@ -96,11 +100,12 @@ double PassivityGuard::real_J(const GuardInput& in) const noexcept {
 void PassivityGuard::follow_period(double elapsed_s) noexcept {
   const double counted_s = std::min(elapsed_s, kSingleDelay * T_s_);
   approach(mean_s_, counted_s, counted_s, kMeanPeriod_s);
-  if (mean_s_ > kPeriodUp * kept_s_) {
-    kept_s_ = kPeriodReserve * mean_s_;
-  } else if (kPeriodDown * mean_s_ < kept_s_) {
-    approach(kept_s_, kPeriodReserve * mean_s_, counted_s, params_.recover_s);
+  if (mean_s_ < kOnTime * T_s_) {
+    reserved_s_ = T_s_;
+  } else if (mean_s_ > kPeriodUp * reserved_s_ || kPeriodDown * mean_s_ < reserved_s_) {
+    reserved_s_ = kPeriodReserve * mean_s_;
   }
+  approach(kept_s_, reserved_s_, counted_s, reserved_s_ > kept_s_ ? kPeriodUp_s : params_.recover_s);
 }
 
 // The exact work of the held force over the last interval, less what the storing effects took up in it (the
@@ -109,16 +114,20 @@ void PassivityGuard::follow_period(double elapsed_s) noexcept {
 void PassivityGuard::observe(const GuardInput& in) noexcept {
   const auto ago = static_cast<std::size_t>(device_.delay_ticks);
   const hal::Vec3& acted_N = written_N_[(newest_ + kRing - ago) % kRing];
-  double more_J = acted_N.dot(in.position_m - position_m_);
+  const double given_J = acted_N.dot(in.position_m - position_m_);
+  double more_J = given_J;
   for (std::size_t i = 0; i < in.storing.size(); ++i) {
     const hal::Vec3 force_N = 0.5 * (stored_[i].force_N + gain_ * in.storing[i].force_N);
     more_J -= force_N.dot(in.storing[i].point_m - stored_[i].point_m);
   }
   more_J -= 0.5 * device_.encoder_step_m * (acted_N - acted_N_).lpNorm<1>();
   if (surplus_J_ < 0) approach(surplus_J_, 0, in.elapsed_s, kForget_s);
+  acted_N_ = acted_N;
+  if (!std::isfinite(more_J)) return;
+  approach(given_J_, 0, in.elapsed_s, kForget_s);
+  given_J_ += given_J;
   surplus_J_ += more_J;
   if (in.elapsed_s > kLate * kept_s_) late_J_ += kLateReserve * std::max(more_J, 0.0);
-  acted_N_ = acted_N;
 }
 
 hal::Vec3 PassivityGuard::step(const GuardInput& in) noexcept {
@@ -151,20 +160,24 @@ hal::Vec3 PassivityGuard::step(const GuardInput& in) noexcept {
   const double compensation = std::min(kCompensation * rendered * delay_s(), bound);
   const double room = std::max(0.0, bound - share * in.damping_Ns_m - compensation);
   const double speed2 = v.squaredNorm();
-  const double to_take_J = std::max(surplus_J_, late_J_);
+  const double to_take_J = std::max(surplus_J_ - kSteadyForce_N * device_.encoder_step_m, late_J_);
   const double wanted = to_take_J > 0 && speed2 > 0 ? to_take_J / (kTakeBack_s * speed2) : 0;
   approach(taking_Ns_m_, std::min(wanted, room), in.elapsed_s, kDamperRise_s);
   taking_Ns_m_ = std::min(taking_Ns_m_, room);
   late_J_ = std::max(0.0, late_J_ - taking_Ns_m_ * speed2 * in.elapsed_s);
 
-  // Where the damper cannot suffice, stiffness falls.
+  // Where the damper cannot suffice, stiffness falls. A late needle leaves surplus at a handle that rests:
+  // the stage has paid for it, and nothing is given back yet.
   const bool at_its_bound = wanted > room && taking_Ns_m_ >= 0.95 * (room - 0.05 * bound);
-  if (surplus_J_ > real_J(in) && at_its_bound) {
+  const bool gives = given_J_ > real_J(in);
+  if (surplus_J_ > real_J(in) && at_its_bound && gives) {
     surplus_gain_ *= 1 - std::min(0.5, in.elapsed_s / kLower_s);
   } else {
     approach(surplus_gain_, 1, in.elapsed_s, params_.recover_s);
   }
-  if (surplus_J_ > 0) approach(surplus_J_, 0, in.elapsed_s, kSurplusStays_s);
+  const double stays_s = gives ? kSurplusStays_s : kRest_s;
+  if (surplus_J_ > 0) approach(surplus_J_, 0, in.elapsed_s, stays_s);
+  approach(late_J_, 0, in.elapsed_s, stays_s);
 
   first_ = false;
   position_m_ = in.position_m;

@@ -9,8 +9,8 @@
 //                 (Hannaford & Ryu 2002). What it exceeds the change of stored energy by, and a quantised
 //                 position cannot explain, is surplus; a bounded damper takes it back;
 //   stiffness     a gain on the storing effects, lowered at once to the device's passive stiffness (Colgate &
-//                 Schenkel) at the period that is really kept, and further while surplus remains that the
-//                 damper cannot take; it recovers slowly.
+//                 Schenkel) at the period that is really kept, and further while the handle is given surplus
+//                 that the damper cannot take; it recovers slowly.
 // Dissipative effects are scaled down where the device cannot render them. Nothing is banked: dissipation is
 // forgotten within kForget_s, so no credit winds up however long it runs.
 //
@@ -82,7 +82,8 @@ class PassivityGuard {
   double own_stable_Ns_m_;
   double stable_Ns_m_;   // damping that the device renders of the effects' velocity
   double in_phase_N_m_;  // stiffness whose motion that velocity follows
-  double kept_s_;        // period that is really kept, with some reserve
+  double reserved_s_;    // period that is really kept, with some reserve
+  double kept_s_;        // follows it without a step
   double mean_s_;        // its time-weighted mean
 
   bool first_ = true;
@@ -94,6 +95,7 @@ class PassivityGuard {
   std::size_t newest_ = 0;
 
   double surplus_J_ = 0;
+  double given_J_ = 0;       // work on the handle, forgotten within kForget_s
   double late_J_ = 0;        // of intervals that were much too long, until the damper has taken it
   double stiff_gain_ = 1;    // for the passive stiffness
   double surplus_gain_ = 1;  // for surplus that stays

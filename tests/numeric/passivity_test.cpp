@@ -175,6 +175,43 @@ TEST(Passivity, a_stiffness_falls_at_once_and_returns_slowly_to_the_passive_one)
   EXPECT_GT(guard.gain(), 0.98);
 }
 
+TEST(Passivity, late_ticks_lower_the_stiffness_without_a_click_and_only_while_they_come) {
+  PassivityGuard guard({}, {}, {}, 1000);
+  GuardInput in;
+  in.stiffness_N_m = 180;
+  double before = 1, click = 0, least = 1;
+  const auto run = [&](int ticks, int late_every) {
+    for (int k = 1; k <= ticks; ++k) {
+      in.elapsed_s = k % late_every == 0 ? 5e-3 : 1e-3;
+      (void)guard.step(in);
+      click = std::max(click, before - guard.gain());
+      before = guard.gain();
+      least = std::min(least, before);
+    }
+  };
+  run(1, 2);
+  EXPECT_EQ(guard.gain(), 1);
+  run(20000, 50);  // a mean period of 1.08 ms
+  EXPECT_LT(least, 1 / 1.08);
+  EXPECT_LT(click, 0.02);
+  run(60000, 100000);
+  EXPECT_GT(guard.gain(), 0.99);
+}
+
+TEST(Passivity, forces_that_are_finite_but_huge_leave_a_finite_surplus) {
+  PassivityGuard guard({}, {}, {}, 1000);
+  GuardInput in;
+  in.elapsed_s = 1e-3;
+  for (int k = 0; k < 3; ++k) {
+    in.position_m = {1e-3 * k, 0, 0};
+    in.storing[0] = {{-1e308, 0, 0}, in.position_m};
+    in.storing[1] = in.storing[0];
+    (void)guard.step(in);
+    guard.wrote({-3, 0, 0});
+  }
+  EXPECT_TRUE(std::isfinite(guard.surplus_J()));
+}
+
 // Gil 2009 and Colgate & Schenkel, by simulation against the formulas.
 TEST(Passivity, measured_boundaries_are_the_published_ones) {
   HandDevice device;

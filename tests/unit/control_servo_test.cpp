@@ -413,6 +413,58 @@ TEST(Servo, holds_still_in_contact_without_a_limit_cycle) {
   }
 }
 
+// The needle follows the hand late, so its force gives energy; the stage pays for the dimple that it presses
+// in while the hand already rests.
+TEST(Servo, leaves_the_membrane_its_force_under_a_hand_that_rests_although_the_guard_is_on) {
+  ServoConfig config = icsi();
+  config.guard.emplace();
+  Bench b(config);
+  b.puncture_at = 1;
+  b.run(1);
+  for (const double speed_m_s : {15e-6, 50e-6, 100e-6}) {
+    b.move(8e-6, speed_m_s);
+    b.run(0.5);
+    double force_N = 0, membrane_N = 0;
+    b.every_tick = [&] {
+      force_N += b.hand.force.x();
+      membrane_N += b.sample().membrane_N;
+    };
+    b.run(3);
+    b.every_tick = nullptr;
+    EXPECT_GT(force_N, 0.9 * membrane_N) << speed_m_s;
+    b.move(30e-6, speed_m_s);
+    b.run(0.5);
+  }
+}
+
+TEST(Servo, does_not_let_a_loosely_held_hand_swing_against_the_late_needle_with_the_guard) {
+  for (const bool guarded : {false, true}) {
+    ServoConfig config = icsi();
+    config.damping.reset();
+    config.cone.reset();
+    if (guarded) config.guard.emplace();
+    Bench b(config);
+    b.puncture_at = 1;
+    b.hand.arm_k = 8;
+    b.hand.arm_c = 1;
+    b.run(1);
+    b.move(-20e-6, 200e-6);
+    b.run(8);
+    double low = 1, high = -1;
+    b.every_tick = [&] {
+      low = std::min(low, b.hand.x.x());
+      high = std::max(high, b.hand.x.x());
+    };
+    b.run(2);
+    if (guarded) {
+      EXPECT_LT(high - low, 0.15e-3);
+      EXPECT_GT(b.hand.force.x(), 0.9 * b.sample().membrane_N);
+    } else {
+      EXPECT_GT(high - low, 10e-3);
+    }
+  }
+}
+
 TEST(Servo, pushes_a_handle_that_is_let_go_out_of_contact_and_no_further) {
   Bench b(icsi());
   b.to_indentation();

@@ -40,12 +40,6 @@ class BasicKalman {
 
   // A new sample, dt_s after the one before. Returns the velocity, 0 for the first.
   Vector step(const Vector& position_m, Real dt_s) noexcept;
-  void reset() noexcept {
-    begun_ = false;
-    velocity_.setZero();
-    acceleration_.setZero();
-  }
-  [[nodiscard]] const Vector& velocity() const noexcept { return velocity_; }
 
  private:
   [[nodiscard]] BasicKalmanGains<Real> late_gains(Real dt_s) const noexcept;
@@ -72,11 +66,6 @@ class BasicFoaw {
 
   // A new sample, dt_s after the one before. Returns the velocity, 0 for the first.
   Vector step(const Vector& position_m, Real dt_s) noexcept;
-  void reset() noexcept {
-    count_ = 0;
-    velocity_.setZero();
-  }
-  [[nodiscard]] const Vector& velocity() const noexcept { return velocity_; }
 
  private:
   struct Sample {

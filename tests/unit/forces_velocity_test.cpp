@@ -138,17 +138,6 @@ TYPED_TEST(EitherMethod, repeats_its_value_when_no_time_has_passed_or_the_positi
   }
 }
 
-TYPED_TEST(EitherMethod, begins_anew_after_a_reset) {
-  auto used = estimator<TypeParam>(), fresh = estimator<TypeParam>();
-  for (int k = 0; k < 100; ++k) used.step(Vec3(1e-4 * k, 0, 0), 1e-3);
-  used.reset();
-  EXPECT_EQ(used.velocity(), Vec3::Zero());
-  for (int k = 0; k < 100; ++k) {
-    const Vec3 x(0.07, 3e-5 * k, 0);
-    EXPECT_EQ(used.step(x, 1e-3), fresh.step(x, 1e-3));
-  }
-}
-
 TYPED_TEST(EitherMethod, takes_the_mean_velocity_over_a_gap) {
   auto method = estimator<TypeParam>();
   double x = 0;

@@ -111,20 +111,6 @@ TEST(ReportFront, TheShippedOneMayBeSlowerByTheNoiseOfTimingOnly) {
   EXPECT_FALSE(on_front(works));
 }
 
-TEST(ReportFront, SlopeIsTheExponentOfThePowerLaw) {
-  std::vector<Work> works;
-  for (const double ns : {10.0, 20.0, 80.0, 640.0}) {
-    works.push_back(at("fourth order", ns, 3 * std::pow(ns, -4)));
-    works.push_back(at("first order", ns, 7 / ns));
-  }
-  works.push_back(at("first order", 1e4, 0));  // no logarithm
-  works.push_back(at("one point", 5, 1));
-  EXPECT_NEAR(fitted_slope(works, "fourth order"), -4, 1e-12);
-  EXPECT_NEAR(fitted_slope(works, "first order"), -1, 1e-12);
-  EXPECT_TRUE(std::isnan(fitted_slope(works, "one point")));
-  EXPECT_TRUE(std::isnan(fitted_slope(works, "not there")));
-}
-
 TEST(ReportFront, PanelHasALinePerMethodTheShippedPointAndTheLimits) {
   const std::vector<Work> works = {at("a", 10, 1e-2), at("b", 100, 1e-5, true), at("a", 20, 1e-3),
                                    at("c", 50, 0)};

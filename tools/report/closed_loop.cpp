@@ -5,6 +5,7 @@
 #include <cmath>
 #include <initializer_list>
 #include <limits>
+#include <numbers>
 #include <optional>
 #include <random>
 #include <vector>
@@ -107,7 +108,7 @@ LoopResult run_loop(const LoopCell& cell) {
   const double T = 1 / cell.rate_Hz;
   rt::VelocityParams estimate;
   estimate.d_m = std::max(cell.device.encoder_step_m, 1e-6);
-  const double B_limit = rt::stable_damping_Ns_m(cell.declared, T, rt::at_rate(estimate, cell.rate_Hz));
+  const double B_limit = rt::stable_damping_Ns_m(cell.device, T, rt::at_rate(estimate, cell.rate_Hz));
   const double B = cell.damping_share * B_limit;
 
   sim::HandParams hand;
@@ -123,7 +124,7 @@ LoopResult run_loop(const LoopCell& cell) {
   Ticks ticks(cell.timing, T, cell.seed);
   std::optional<rt::PassivityGuard> guard;
   if (cell.guarded) {
-    guard.emplace(rt::GuardParams{}, cell.declared, rt::at_rate(estimate, cell.rate_Hz), cell.rate_Hz);
+    guard.emplace(rt::GuardParams{}, cell.device, rt::at_rate(estimate, cell.rate_Hz), cell.rate_Hz);
   }
 
   LoopResult r;
@@ -245,7 +246,6 @@ LoopCell sweep_cell(std::uint64_t n, bool guarded) {
   }
   // Against next to nothing a push alone would creep for minutes.
   if (Wall(c).at(1e-3).stiffness_N_m < 5) c.holder = Holder::arm;
-  c.declared = c.device;
   return c;
 }
 
@@ -308,13 +308,13 @@ CycleEnergy cycle_energy(double K_N_m, double B_Ns_m, double tau_s, double T_s, 
     return work / (kCount * v2_per_tick);
   };
   CycleEnergy e;
-  const double nyquist = 3.14159265358979323846 / T_s;
+  const double nyquist = std::numbers::pi / T_s;
   e.slow_Ns_m = -std::numeric_limits<double>::infinity();
   for (const double part : {0.01, 0.03, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9}) {
     const double omega = part * 0.99173 * nyquist;  // no period is a whole number of ticks
     e.slow_Ns_m = std::max(e.slow_Ns_m, needed(omega, 0.3, 0.5 * omega * omega * T_s));
   }
-  const double peak = 0.5 * 3.14159265358979323846;  // samples at the turning points
+  const double peak = 0.5 * std::numbers::pi;  // samples at the turning points
   e.sinusoid_Ns_m = needed(nyquist, peak, 0.5 * nyquist * nyquist * T_s);
   e.triangle_Ns_m = needed(nyquist, peak, 4 / T_s);
   return e;

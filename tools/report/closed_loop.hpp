@@ -26,7 +26,6 @@ struct LoopCell {
   double push_N = 0.5;
   double speed_m_s = 0;  // towards the wall, from 5 mm before it
   bool guarded = true;
-  rt::HandDevice declared;  // what the guard is told
   std::uint64_t seed = 1;
 };
 

@@ -46,7 +46,7 @@ std::vector<Swept> sweep(std::size_t n, bool guarded, Progress& progress) {
   return all;
 }
 
-constexpr const char* kTimings[] = {"steady", "jitter", "lost_ticks", "late_burst"};
+constexpr const char* kTimings[] = {"steady", "jitter", "lost_ticks", "late_tick"};
 constexpr const char* kHolders[] = {"nobody", "fingertip", "arm"};
 
 Table cells_table(const std::vector<Swept>& with, const std::vector<Swept>& without) {
@@ -272,7 +272,6 @@ LoopCell plain_cell(double rate, int delay, double K, bool guarded) {
   c.stiffness_N_m = K;
   c.speed_m_s = 0.05;
   c.guarded = guarded;
-  c.declared = c.device;
   return c;
 }
 

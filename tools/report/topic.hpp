@@ -211,9 +211,6 @@ inline constexpr double kTimingNoise = 0.15;
 // Of the shipped default; false when none is marked.
 [[nodiscard]] bool on_front(std::span<const Work> works, double noise = kTimingNoise);
 
-// Least squares of log error over log median time of one method; NaN with fewer than two distinct times.
-[[nodiscard]] double fitted_slope(std::span<const Work> works, std::string_view method);
-
 // "membrane (order 3) errs by 2.1e-16 in 8.4 ns and is on the front" or "... ; X (knob) is as exact in 3 ns".
 [[nodiscard]] std::string front_sentence(std::span<const Work> works);
 

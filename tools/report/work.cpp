@@ -53,21 +53,6 @@ bool on_front(std::span<const Work> works, double noise) {
   return shipped != nullptr && better_than(*shipped, works, noise) == nullptr;
 }
 
-double fitted_slope(std::span<const Work> works, std::string_view method) {
-  double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0;
-  for (const Work& w : works) {
-    if (w.method != method || !(w.error > 0) || !(w.time.median_ns > 0) || !std::isfinite(w.error)) continue;
-    const double x = std::log(w.time.median_ns), y = std::log(w.error);
-    n += 1;
-    sx += x;
-    sy += y;
-    sxx += x * x;
-    sxy += x * y;
-  }
-  const double spread = n * sxx - sx * sx;
-  return n >= 2 && spread > 1e-12 * n * sxx ? (n * sxy - sx * sy) / spread : std::nan("");
-}
-
 std::string front_sentence(std::span<const Work> works) {
   const Work* shipped = shipped_of(works);
   if (shipped == nullptr) return "nothing of this is shipped";

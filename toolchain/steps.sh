@@ -98,9 +98,10 @@ install_packages() {
     "${as_root[@]}" "${apt[@]}" install --no-install-recommends "${missing[@]}" || exit 1
 }
 
-# build PRESET TARGET: configures and builds; quick when nothing has changed.
+# build PRESET TARGET...: configures and builds; quick when nothing has changed.
 build() {
-  local preset=$1 target=$2 dir=$root/build/$1
+  local preset=$1 dir=$root/build/$1
+  shift
   (cd "$root" && step configure "$preset" "$dir/configure.log" cmake --preset "$preset") || return 1
-  (cd "$root" && step build "$preset" "$dir/build.log" cmake --build --preset "$preset" --target "$target" -j "$jobs")
+  (cd "$root" && step build "$preset" "$dir/build.log" cmake --build --preset "$preset" --target "$@" -j "$jobs")
 }

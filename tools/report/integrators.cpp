@@ -565,10 +565,8 @@ Result run_integrators(const Job& job) {
           "bending: that is its error, whatever the step."};
   Figure events{
       .name = "integrators_events",
-      .note = "A contact or puncture that is only noticed at the end of a step costs any method its order."};
-  Figure floats{
-      .name = "integrators_float",
-      .note = "Beside double: float is little faster and ends at 1e-9 m; the plant is stepped in double."};
+      .note = "Located: a step ends on the contact or puncture. Else it is noticed at the end of the step."};
+  Figure floats{.name = "integrators_float", .note = "Float beside double; the plant is stepped in double."};
   Table orders{.name = "integrators_orders",
                .columns = {"problem", "method", "order_located", "order_not_located"}};
   for (const Problem& p : problems) {

@@ -419,12 +419,11 @@ Result run_stability(const Job& job) {
   double noise = 0;
   for (const Swept& s : with) noise = std::max(noise, s.result.unstable() ? 0 : s.result.rest_N);
   out.reading = fmt::format(
-      "Of {} cells {} are unstable without the guard and {} with it, {} of those render less stiffness than "
-      "is "
-      "owed; measured boundaries are within {:.2g} % of the exact ones, {:.2g} % of Gil's where it claims to "
+      "Of {} cells {} are unstable without the guard and {} with it, {} render less stiffness with it than "
+      "is owed; measured boundaries are within {:.2g} % of the exact ones, {:.2g} % of Gil's where it claims "
+      "to "
       "hold and {:.2g} % of Colgate and Schenkel's; the guard takes {:.0f} ns a tick and adds at most {:.1f} "
-      "mN "
-      "rms once the handle rests.",
+      "mN rms once the handle rests.",
       n, unstable(without), unstable(with), poor, 100 * bounds.worst_exact, 100 * bounds.worst_Gil,
       100 * passive.worst, cost.median_ns, 1e3 * noise);
 
@@ -441,8 +440,8 @@ Result run_stability(const Job& job) {
       {std::move(map.without), std::move(map.with), std::move(bounds.panel), std::move(largest.panel)}};
   figure.note =
       "Maps: the default device pushed against a wall by a fingertip, every rate and delay. Unstable: moving "
-      "by "
-      "more than 4 encoder counts and 0.1 mm after the end, or given more energy than is stored.";
+      "by more than 4 encoder counts and 0.1 mm in the last second, or given more energy than is stored, by "
+      "5 % of the most stored and a few encoder counts' work, over the seconds in which it moves that much.";
   out.figures = {std::move(figure)};
   return out;
 }

@@ -4,6 +4,8 @@
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 export LC_ALL=C.UTF-8
+# Where ccache is there, clones in different places share what they compiled.
+export CCACHE_BASEDIR=$root CCACHE_NOHASHDIR=1
 cores=$(nproc)
 # A compiler at work takes up to 1.5 GB.
 jobs=$(awk -v n="$cores" '/MemAvailable/ { m = int($2 / 1500000) } END { if (m < 1) m = 1; print (m < n) ? m : n }' /proc/meminfo)

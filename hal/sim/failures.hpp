@@ -8,9 +8,8 @@
 //               commands still arrive
 //   disconnect  the device is gone
 //   saturate    the device hangs at the end of its range; what that means is said in each device's header
-//   noise       every reading carries broadband interference of its own, as large as each device's header
-//   says;
-//               commands still arrive
+//   noise       every reading carries broadband interference, as large as each device's header says; commands
+//               still arrive
 #pragma once
 
 #include <array>

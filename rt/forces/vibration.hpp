@@ -1,5 +1,5 @@
-// Vibration: a short burst along the needle that marks contact and puncture, F = A e^(-t/decay) sin(2 pi f
-// t).
+// Vibration: a short burst along the needle that marks contact and puncture,
+// F = A e^(-t/decay) sin(2 pi f t).
 //
 // The one effect that is active: it may give energy to the hand. What it gives is counted,
 // sum of f_{k-1} (x_k - x_{k-1}) with the force that acts after the device's delay, and a burst ends with the

@@ -28,7 +28,8 @@
 namespace punctum::rt {
 
 // Effects that store energy as one point moves: `force_N` at the hand, `point_m` at the hand's scale. The
-// fixtures' point is the handle itself, the membrane's is the needle, which follows it late.
+// fixtures' point is the handle behind the clutch and the limits, the membrane's is the needle, which follows
+// it late, and that of friction's bristle is the handle itself.
 struct Storing {
   hal::Vec3 force_N = hal::Vec3::Zero();
   hal::Vec3 point_m = hal::Vec3::Zero();
@@ -37,14 +38,16 @@ struct Storing {
 // What the effects of one tick ask for, at the hand.
 struct GuardInput {
   hal::Vec3 position_m = hal::Vec3::Zero();  // of the handle, as its encoders say
-  std::array<Storing, 2> storing;
-  hal::Vec3 dissipative_N = hal::Vec3::Zero();  // damping, friction
+  std::array<Storing, 3> storing;
+  hal::Vec3 dissipative_N = hal::Vec3::Zero();  // of a velocity
   hal::Vec3 active_N = hal::Vec3::Zero();       // a cue with a bounded energy of its own
   double stiffness_N_m = 0;                     // bound of the storing effects' stiffness
   double damping_Ns_m = 0;                      // bound of the dissipative effects' damping
   double elapsed_s = 0;                         // since the last step
 
-  [[nodiscard]] hal::Vec3 stored_N() const noexcept { return storing[0].force_N + storing[1].force_N; }
+  [[nodiscard]] hal::Vec3 stored_N() const noexcept {
+    return storing[0].force_N + storing[1].force_N + storing[2].force_N;
+  }
   [[nodiscard]] hal::Vec3 wanted_N() const noexcept { return stored_N() + dissipative_N + active_N; }
 };
 
@@ -88,7 +91,7 @@ class PassivityGuard {
 
   bool first_ = true;
   hal::Vec3 position_m_ = hal::Vec3::Zero();
-  std::array<Storing, 2> stored_;  // as rendered on the last step
+  std::array<Storing, 3> stored_;  // as rendered on the last step
   hal::Vec3 active_N_ = hal::Vec3::Zero();
   hal::Vec3 acted_N_ = hal::Vec3::Zero();  // over the interval before the last
   std::array<hal::Vec3, kRing> written_N_;

@@ -483,7 +483,8 @@ hal::Vec3 Servo::keep_passive(const hal::Vec3& wanted_N) noexcept {
   in.position_m = world_from_hand(hand_.position_m);
   in.storing[0] = {presence * (cone_N_ + axis_N_ + repulsive_N_), k_p * mapping_.hand_point()};
   in.storing[1] = {presence * membrane_N_, k_p * (devices_.stage ? stage_.tip_m : mapping_.hand_point())};
-  in.dissipative_N = presence * (damping_N_ + friction_N_);
+  in.storing[2] = {presence * friction_N_, in.position_m};
+  in.dissipative_N = presence * damping_N_;
   in.active_N = presence * vibration_N_;
   double fixtures_N_m = 0;
   if (cone_) fixtures_N_m += cone_->stiffness_N_m();

@@ -78,6 +78,23 @@ TEST(Passivity, surplus_is_the_work_of_the_held_force_less_what_the_spring_took_
   EXPECT_NEAR(guard.surplus_J(), 0.05e-3, 1e-6);
 }
 
+TEST(Passivity, the_force_that_acts_is_the_one_written_before_the_delay) {
+  HandDevice device;
+  device.encoder_step_m = 0;
+  device.delay_ticks = 2;
+  PassivityGuard guard({}, device, {}, 1000);
+  GuardInput in;
+  in.elapsed_s = 1e-3;
+  const double written_N[] = {0.1, 0.2, 0.4, 0.8, 1.6};
+  for (const double force_N : written_N) {
+    (void)guard.step(in);
+    guard.wrote({force_N, 0, 0});
+  }
+  in.position_m = {1e-3, 0, 0};
+  (void)guard.step(in);
+  EXPECT_NEAR(guard.surplus_J(), 0.4e-3, 1e-6);  // the last one acts two ticks from now
+}
+
 TEST(Passivity, a_late_needle_is_seen_where_the_handle_alone_would_not_show_it) {
   // The membrane's force follows the needle, which follows the handle 50 ms late: each cycle gives energy.
   const auto surplus = [](bool late) {

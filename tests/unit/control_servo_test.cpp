@@ -437,6 +437,31 @@ TEST(Servo, leaves_the_membrane_its_force_under_a_hand_that_rests_although_the_g
   }
 }
 
+// A bristle is a spring until it slides.
+TEST(Servo, does_not_let_a_free_handle_ring_in_a_stiff_bristle_with_the_guard) {
+  for (const bool guarded : {false, true}) {
+    ServoConfig config;
+    config.friction = FrictionParams{.F_c_N = 0.5, .K_N_m = 1000};
+    if (guarded) config.guard.emplace();
+    Bench b(config);
+    b.hand.arm_k = b.hand.arm_c = 0;
+    b.run(1);
+    b.hand.v = {0.05, 0.02, 0};
+    b.run(4);
+    Vec3 low = b.hand.x, high = b.hand.x;
+    b.every_tick = [&] {
+      low = low.cwiseMin(b.hand.x);
+      high = high.cwiseMax(b.hand.x);
+    };
+    b.run(1);
+    if (guarded) {
+      EXPECT_LT((high - low).maxCoeff(), 0.06e-3);
+    } else {
+      EXPECT_GT((high - low).maxCoeff(), 0.5e-3);
+    }
+  }
+}
+
 TEST(Servo, does_not_let_a_loosely_held_hand_swing_against_the_late_needle_with_the_guard) {
   for (const bool guarded : {false, true}) {
     ServoConfig config = icsi();

@@ -481,10 +481,12 @@ hal::Vec3 Servo::keep_passive(const hal::Vec3& wanted_N) noexcept {
   const double k_p = config_.mapping.position_scale;
   GuardInput in;
   in.position_m = world_from_hand(hand_.position_m);
-  in.storing[0] = {presence * (cone_N_ + axis_N_ + repulsive_N_), k_p * mapping_.hand_point()};
+  hal::Vec3 one_way_N = hal::Vec3::Zero();
+  if (axis_) one_way_N = fixture_gain_ * axis_->one_way_N();
+  in.storing[0] = {presence * (cone_N_ + axis_N_ - one_way_N + repulsive_N_), k_p * mapping_.hand_point()};
   in.storing[1] = {presence * membrane_N_, k_p * (devices_.stage ? stage_.tip_m : mapping_.hand_point())};
   in.storing[2] = {presence * friction_N_, in.position_m};
-  in.dissipative_N = presence * damping_N_;
+  in.dissipative_N = presence * (damping_N_ + one_way_N);
   in.active_N = presence * vibration_N_;
   double fixtures_N_m = 0;
   if (cone_) fixtures_N_m += cone_->stiffness_N_m();

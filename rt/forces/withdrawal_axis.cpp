@@ -30,6 +30,7 @@ hal::Vec3 WithdrawalAxis::step(const hal::Vec3& tip_m, const hal::Vec3& velocity
     if (!on) {
       stored_J_ = 0;
       one_way_.set(0);
+      one_way_N_.setZero();
       return hal::Vec3::Zero();
     }
     frame_ = line;
@@ -41,7 +42,8 @@ hal::Vec3 WithdrawalAxis::step(const hal::Vec3& tip_m, const hal::Vec3& velocity
   injected_J_ += (ramp_.gain() - gain_before) * pull.energy_J;
 
   const double inward = std::max(frame_.axis.dot(velocity_m_s), 0.0);
-  return ramp_.gain() * pull.force_N - one_way_.gain() * params_.B_inward_Ns_m * inward * frame_.axis;
+  one_way_N_ = -B_Ns_m() * inward * frame_.axis;
+  return ramp_.gain() * pull.force_N + one_way_N_;
 }
 
 }  // namespace punctum::rt

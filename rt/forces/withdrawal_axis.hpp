@@ -30,8 +30,9 @@ class WithdrawalAxis {
   [[nodiscard]] const FixtureFrame& frame() const noexcept { return frame_; }
   // Upper bound now, at the hand, of the well's Hessian: K psi' and K psi/r are at most K.
   [[nodiscard]] double stiffness_N_m() const noexcept { return ramp_.gain() * params_.K_N_m; }
-  // Of the one-way damper, now.
+  // Of the one-way damper, now; and its part of the force.
   [[nodiscard]] double B_Ns_m() const noexcept { return one_way_.gain() * params_.B_inward_Ns_m; }
+  [[nodiscard]] const hal::Vec3& one_way_N() const noexcept { return one_way_N_; }
 
  private:
   AxisParams params_;
@@ -39,6 +40,7 @@ class WithdrawalAxis {
   FixtureFrame frame_;
   Ramp ramp_;
   Ramp one_way_;
+  hal::Vec3 one_way_N_ = hal::Vec3::Zero();
   double stored_J_ = 0;
   double injected_J_ = 0;
 };

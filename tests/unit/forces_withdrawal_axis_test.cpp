@@ -87,6 +87,11 @@ TEST(WithdrawalAxis, resists_only_motion_into_the_cell_and_only_in_withdrawal) {
   for (int k = 0; k < 1000; ++k) force = axis.step(kLine.entry_m, in, kLine, true, true, 1e-3);
   EXPECT_NEAR(force.dot(kLine.axis), -params.B_inward_Ns_m * 0.01, 1e-12);
   EXPECT_EQ(axis.step(kLine.entry_m, -in, kLine, true, true, 1e-3).norm(), 0);
+  // Beside the axis it is told apart from the well, which stores.
+  const Vec3 beside = kLine.entry_m + 4e-6 * kLine.axis.cross(Vec3::UnitY()).normalized();
+  force = axis.step(beside, in, kLine, true, true, 1e-3);
+  EXPECT_NEAR(axis.one_way_N().dot(kLine.axis), -params.B_inward_Ns_m * 0.01, 1e-12);
+  EXPECT_LT((force - axis.one_way_N() - axis_pull(params, kScale, kLine, beside).force_N).norm(), 1e-12);
 }
 
 TEST(WithdrawalAxis, books_what_switching_injects_and_lets_go_without_a_step) {

@@ -212,7 +212,9 @@ LoopResult run_loop(const LoopCell& cell) {
   r.moving = !(r.peak_to_peak_m <= enough_m);
   r.surplus_J = counted_J + stored_J;
   const double count_J = 4 * cell.device.encoder_step_m * std::min(cell.device.force_max_N, push_N + 0.1);
-  r.active = !(r.surplus_J <= kEnergyPart * r.stored_max_J + count_J);
+  const double allowed_J = kEnergyPart * r.stored_max_J + count_J;
+  r.active = !(r.surplus_J <= allowed_J);
+  r.active_at_rest = !(port_J + stored_J <= allowed_J);
   return r;
 }
 

@@ -46,6 +46,7 @@ TEST(Passivity, no_cell_of_the_sweep_is_unstable_with_the_guard_and_none_is_fade
     const LoopResult& r = results[i];
     EXPECT_FALSE(r.unstable()) << "cell " << i + 1 << ": " << r.peak_to_peak_m << " m, " << r.surplus_J
                                << " J";
+    EXPECT_FALSE(r.active_at_rest) << "cell " << i + 1;
     EXPECT_TRUE(faithful(cell, r)) << "cell " << i + 1 << ": " << r.rendered_N_m << " of " << r.commanded_N_m;
     stiff += r.commanded_N_m > r.passive_N_m ? 1 : 0;
   }

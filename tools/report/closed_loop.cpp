@@ -145,7 +145,7 @@ LoopResult run_loop(const LoopCell& cell) {
   double port_J = 0, counted_J = 0, port_before_J = 0;
   double low = handle.x_m, high = handle.x_m, second = 0;
   std::vector<double> swings;
-  double stored_J = 0;
+  double stored_J = 0, raised_J = 0, gain_before = 1;
   double noise_N2 = 0;
   std::int64_t noise_ticks = 0;
   while (t < longest_s) {
@@ -188,6 +188,8 @@ LoopResult run_loop(const LoopCell& cell) {
     t += dt;
     ++r.ticks;
     stored_J = gain * wall.at(handle.x_m).energy_J;
+    raised_J += std::max(0.0, gain - gain_before) * wall.at(handle.x_m).energy_J;
+    gain_before = gain;
     r.stored_max_J = std::max(r.stored_max_J, stored_J);
 
     low = std::min(low, handle.x_m);
@@ -214,7 +216,7 @@ LoopResult run_loop(const LoopCell& cell) {
   const double count_J = 4 * cell.device.encoder_step_m * std::min(cell.device.force_max_N, push_N + 0.1);
   const double allowed_J = kEnergyPart * r.stored_max_J + count_J;
   r.active = !(r.surplus_J <= allowed_J);
-  r.active_at_rest = !(port_J + stored_J <= allowed_J);
+  r.active_at_rest = !(port_J + stored_J - raised_J <= allowed_J);
   return r;
 }
 

@@ -32,7 +32,8 @@ struct LoopCell {
 // moving: over the last second the handle went further than 4 encoder counts and 0.1 mm. active: over the
 // seconds in which it did, the port (force and true position) delivered more than it took up and stores, by
 // over 5 % of the most it stored and the work of four encoder counts. active_at_rest: the same with all
-// seconds counted, those in which the encoder hardly sees a motion too.
+// seconds counted, those in which the encoder hardly sees a motion too, less what a returning stiffness
+// stores by itself.
 struct LoopResult {
   bool moving = false, active = false, active_at_rest = false;
   double peak_to_peak_m = 0;

@@ -5,6 +5,9 @@
 #include <limits>
 #include <numbers>
 #include <random>
+#include <stdexcept>
+#include <string>
+#include <string_view>
 
 #include "tools/report/surface.hpp"
 
@@ -17,11 +20,11 @@ constexpr double kPi = std::numbers::pi;
 constexpr double kR = 60;           // um
 constexpr double kStick_um = 1e-4;  // what distances are measured to
 
-const SurfaceMethod& method(const std::string& name) {
+const SurfaceMethod& method(std::string_view name) {
   for (const SurfaceMethod& m : surface_methods()) {
     if (m.name == name) return m;
   }
-  throw std::runtime_error(name);
+  throw std::runtime_error(std::string(name));
 }
 
 sim::MembraneShape zona() { return {.c_over_R = 3.8 / kR, .seat_over_R = 0.5, .nu = 0.5, .prestrain = 0.2}; }

@@ -48,8 +48,8 @@ constexpr double kSteadyForce_N = 0.02;
 // Up to here the effects' velocity is some 45 degrees behind at most, and damps a spring.
 [[nodiscard]] double in_phase_rad_s(const VelocityParams& velocity, double T_s) noexcept {
   const bool foaw = velocity.method == VelocityParams::Method::foaw;
-  const double lag_s =
-      velocity.smooth_s + (foaw ? 0.5 * velocity.window * T_s : 1 / poles_rad_s(velocity, T_s));
+  const double lag_s = velocity.smooth_s + (foaw ? 0.5 * at_rate(velocity, 1 / T_s).window * T_s
+                                                 : 1 / poles_rad_s(velocity, T_s));
   return kPhase / lag_s;
 }
 

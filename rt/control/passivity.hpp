@@ -53,7 +53,7 @@ struct GuardInput {
 
 class PassivityGuard {
  public:
-  // velocity: as the dissipative effects get it.
+  // velocity: as the scene says, of what the dissipative effects get.
   PassivityGuard(const GuardParams& params, const HandDevice& device, const VelocityParams& velocity,
                  double rate_Hz) noexcept;
 
@@ -67,12 +67,12 @@ class PassivityGuard {
   [[nodiscard]] double damper_Ns_m() const noexcept { return damper_Ns_m_; }
   [[nodiscard]] const hal::Vec3& damper_N() const noexcept { return damper_N_; }
   [[nodiscard]] double surplus_J() const noexcept { return surplus_J_; }
-  [[nodiscard]] double allowed_stiffness_N_m() const noexcept;
 
  private:
   static constexpr std::size_t kRing = 8;  // written forces; more than the longest delay
 
   void follow_period(double elapsed_s) noexcept;
+  [[nodiscard]] double allowed_stiffness_N_m() const noexcept;
   [[nodiscard]] double delay_s() const noexcept;  // of hold and transport
   [[nodiscard]] double real_J(const GuardInput& in) const noexcept;
   void observe(const GuardInput& in) noexcept;

@@ -57,7 +57,7 @@ Servo::Servo(const ServoConfig& config, const Devices& devices, Station& station
   if (config.axis) axis_.emplace(*config.axis, config.mapping.position_scale);
   if (config.damping) damping_.emplace(*config.damping);
   if (config.guard) {
-    guard_.emplace(*config.guard, config.device, at_rate(config.velocity, config.rate_Hz), config.rate_Hz);
+    guard_.emplace(*config.guard, config.device, config.velocity, config.rate_Hz);
   }
   if (config.repulsive) repulsive_.emplace(*config.repulsive, config.mapping.position_scale);
   if (config.friction) friction_.emplace(*config.friction);

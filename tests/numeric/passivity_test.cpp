@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <limits>
@@ -12,6 +13,7 @@
 #include <thread>
 #include <vector>
 
+#include "rt/control/device_limits.hpp"
 #include "tools/report/closed_loop.hpp"
 
 namespace punctum::rt {
@@ -228,6 +230,24 @@ TEST(Passivity, forces_that_are_finite_but_huge_leave_a_finite_surplus) {
     guard.wrote({-3, 0, 0});
   }
   EXPECT_TRUE(std::isfinite(guard.surplus_J()));
+}
+
+TEST(Passivity, damping_is_kept_up_to_half_of_what_the_device_renders_at_every_rate) {
+  VelocityParams foaw;
+  foaw.method = VelocityParams::Method::foaw;
+  for (const VelocityParams& velocity : {VelocityParams{}, foaw}) {
+    for (const double rate : {1000.0, 2000.0, 4000.0}) {
+      const double limit = stable_damping_Ns_m(HandDevice{}, 1 / rate, velocity);
+      for (const double part : {0.45, 1.0}) {
+        PassivityGuard guard({}, {}, velocity, rate);
+        GuardInput in;
+        in.elapsed_s = 1 / rate;
+        in.dissipative_N = {-1, 0, 0};
+        in.damping_Ns_m = part * limit;
+        EXPECT_NEAR(guard.step(in).x(), -std::min(1.0, 0.5 / part), 1e-9) << rate << " " << part;
+      }
+    }
+  }
 }
 
 // Gil 2009 and Colgate & Schenkel, by simulation against the formulas.

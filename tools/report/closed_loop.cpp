@@ -108,7 +108,7 @@ LoopResult run_loop(const LoopCell& cell) {
   const double T = 1 / cell.rate_Hz;
   rt::VelocityParams estimate;
   estimate.d_m = std::max(cell.device.encoder_step_m, 1e-6);
-  const double B_limit = rt::stable_damping_Ns_m(cell.device, T, rt::at_rate(estimate, cell.rate_Hz));
+  const double B_limit = rt::stable_damping_Ns_m(cell.device, T, estimate);
   const double B = cell.damping_share * B_limit;
 
   sim::HandParams hand;
@@ -124,7 +124,7 @@ LoopResult run_loop(const LoopCell& cell) {
   Ticks ticks(cell.timing, T, cell.seed);
   std::optional<rt::PassivityGuard> guard;
   if (cell.guarded) {
-    guard.emplace(rt::GuardParams{}, cell.device, rt::at_rate(estimate, cell.rate_Hz), cell.rate_Hz);
+    guard.emplace(rt::GuardParams{}, cell.device, estimate, cell.rate_Hz);
   }
 
   LoopResult r;

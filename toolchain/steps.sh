@@ -5,8 +5,8 @@
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 export LC_ALL=C.UTF-8
 # Where ccache is there, clones in different places share what they compiled.
-export CCACHE_BASEDIR=$root CCACHE_NOHASHDIR=1
-cores=$(nproc)
+export CCACHE_BASEDIR=$root CCACHE_NOHASHDIR=1 CCACHE_SLOPPINESS=pch_defines,time_macros
+cores=${PUNCTUM_JOBS:-$(nproc)}
 # A compiler at work takes up to 1.5 GB.
 jobs=$(awk -v n="$cores" '/MemAvailable/ { m = int($2 / 1500000) } END { if (m < 1) m = 1; print (m < n) ? m : n }' /proc/meminfo)
 
@@ -42,7 +42,7 @@ step() {
     # The last line it wrote; of a compiler's or a test's, how far it is.
     progress=$(tail -c 2000 "$log" | tr '\r' '\n' | sed -En '/^\[[0-9]+\/[0-9]+\]|^ *[0-9]+\/[0-9]+ Test/s/^( *\[?[0-9]+\/[0-9]+\]?).*/\1/; /[^ ]/p' |
       tail -n 1 | tr -cd '[:print:]' | cut -c1-90) || true
-    if [ -n "${PUNCTUM_PROGRESS:-}" ]; then printf '%-10s %s %s %d s\n' "$name" "$what" "$progress" "$seconds" >"$PUNCTUM_PROGRESS"; fi
+    if [ -n "${PUNCTUM_PROGRESS:-}" ]; then printf '%-10s %s %s %d s\n' "$name" "$what" "$progress" "$seconds" >"$PUNCTUM_PROGRESS/$$"; fi
     if [ -t 2 ]; then
       printf '\r%-10s %s %s %d s \033[K' "$name" "$what" "$progress" "$seconds" >&2
     elif [ $((seconds - told)) -ge 30 ]; then

@@ -2,99 +2,137 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdio>
 #include <opencv2/imgproc.hpp>
+#include <string>
+
+#include "rt/station/telemetry.hpp"
 
 namespace punctum::vision {
 
-cv::Mat draw_overlay(const cv::Mat& grey, const Result& result, const VisionConfig& config) {
-  cv::Mat out;
-  const double longer = std::max(grey.cols, grey.rows);
-  const int scale = longer > 1200 ? 1 : std::clamp(static_cast<int>(std::ceil(900 / longer)), 1, 4);
-  cv::cvtColor(grey, out, cv::COLOR_GRAY2BGR);
-  if (scale > 1) {
-    cv::resize(out, out, cv::Size(), scale, scale, cv::INTER_CUBIC);
+namespace {
+
+const cv::Scalar kGreen(60, 230, 60), kCyan(255, 230, 40), kWhite(240, 240, 240), kYellow(0, 230, 255),
+    kRed(40, 40, 255), kMagenta(255, 60, 255), kOrange(0, 140, 255), kBlue(255, 120, 40),
+    kGrey(120, 120, 120);
+
+// An enlarged picture that is drawn on in the coordinates of the small one.
+class Canvas {
+ public:
+  explicit Canvas(const cv::Mat& grey) {
+    const double longer = std::max(grey.cols, grey.rows);
+    scale_ = longer > 1200 ? 1 : std::clamp(static_cast<int>(std::ceil(900 / longer)), 1, 4);
+    cv::cvtColor(grey, picture_, cv::COLOR_GRAY2BGR);
+    if (scale_ > 1) {
+      cv::resize(picture_, picture_, cv::Size(), scale_, scale_, cv::INTER_CUBIC);
+    }
   }
-  constexpr int kShift = 4;
-  // Pixel centres are at integers: the middle of pixel 0 is at (scale - 1) / 2 of the enlarged picture.
-  const auto at = [&](const Point& p) {
-    const double x = std::clamp((p.x + 0.5) * scale - 0.5, -2e4, 2e4),
-                 y = std::clamp((p.y + 0.5) * scale - 0.5, -2e4, 2e4);
-    return cv::Point(static_cast<int>(std::lround(x * (1 << kShift))),
-                     static_cast<int>(std::lround(y * (1 << kShift))));
-  };
-  const auto line = [&](const Point& a, const Point& b, const cv::Scalar& colour, int width = 1) {
-    cv::line(out, at(a), at(b), colour, width, cv::LINE_AA, kShift);
-  };
-  const auto closed = [&](const Contour& c, const cv::Scalar& colour, bool dashed) {
+  void line(const Point& a, const Point& b, const cv::Scalar& colour, int width = 1) {
+    cv::line(picture_, at(a), at(b), colour, width, cv::LINE_AA, kShift);
+  }
+  void closed(const Contour& c, const cv::Scalar& colour, bool dashed = false) {
     for (std::size_t i = 0; i < c.size(); ++i) {
       if (!dashed || (i / 3) % 2 == 0) {
-        line(c[i], c[(i + 1) % c.size()], colour, 1);
+        line(c[i], c[(i + 1) % c.size()], colour);
       }
     }
-  };
-  const auto dot = [&](const Point& p, double r, const cv::Scalar& colour, int width) {
-    cv::circle(out, at(p), static_cast<int>(std::lround(r * (1 << kShift))), colour, width, cv::LINE_AA,
-               kShift);
-  };
-  const cv::Scalar green(60, 230, 60), cyan(255, 230, 40), white(240, 240, 240), yellow(0, 230, 255),
-      red(40, 40, 255), magenta(255, 60, 255), orange(0, 140, 255), blue(255, 120, 40), faded(120, 120, 120);
-  if (result.holder.ok) {
-    const cv::Rect2d& b = result.holder.box;
-    const Point c[4] = {{b.x, b.y},
-                        {b.x + b.width - 1, b.y},
-                        {b.x + b.width - 1, b.y + b.height - 1},
-                        {b.x, b.y + b.height - 1}};
-    for (int i = 0; i < 4; ++i) {
-      line(c[i], c[(i + 1) % 4], blue);
+  }
+  void circle(const Point& p, double r_px, const cv::Scalar& colour, int width) {  // r: on the screen
+    cv::circle(picture_, at(p), static_cast<int>(std::lround(r_px * (1 << kShift))), colour, width,
+               cv::LINE_AA, kShift);
+  }
+  void text(const std::string& s, const cv::Scalar& colour) {  // below the last text
+    const double font = std::clamp(picture_.cols / 1100.0, 0.35, 1.0);
+    next_text_y_ += next_text_y_ == 0 ? static_cast<int>(22 * font) + 4 : static_cast<int>(26 * font) + 4;
+    for (const auto& [c, width] : {std::pair{cv::Scalar(0, 0, 0), 3}, std::pair{colour, 1}}) {
+      cv::putText(picture_, s, cv::Point(6, next_text_y_), cv::FONT_HERSHEY_SIMPLEX, font, c, width,
+                  cv::LINE_AA);
     }
-    dot(result.holder.mouth, 4, blue, 2);
   }
+  [[nodiscard]] const cv::Mat& picture() const { return picture_; }
+
+ private:
+  static constexpr int kShift = 4;
+  // The centre of pixel 0 is at (scale - 1) / 2 of the enlarged picture.
+  [[nodiscard]] cv::Point at(const Point& p) const {
+    const auto fixed_point = [this](double v) {
+      return static_cast<int>(std::lround(std::clamp((v + 0.5) * scale_ - 0.5, -2e4, 2e4) * (1 << kShift)));
+    };
+    return {fixed_point(p.x), fixed_point(p.y)};
+  }
+  cv::Mat picture_;
+  int scale_ = 1;
+  int next_text_y_ = 0;
+};
+
+void draw_holder(Canvas& canvas, const HolderPose& holder) {
+  const cv::Rect2d& b = holder.box;
+  const Point last(b.x + b.width - 1, b.y + b.height - 1);
+  canvas.closed({{b.x, b.y}, {last.x, b.y}, last, {b.x, last.y}}, kBlue);
+  canvas.circle(holder.mouth, 4, kBlue, 2);
+}
+
+void draw_needle(Canvas& canvas, const NeedlePose& n) {
+  canvas.line(n.at(-12, 0), n.at(60, 0), kYellow);
+  for (const double side : {-1.0, 1.0}) {
+    canvas.line(n.at(0, side * n.half_width), n.at(80, side * n.half_width_at(80)), kYellow);
+  }
+  canvas.line(n.tip + Point(0, -4), n.tip + Point(0, 4), kRed, 2);
+  canvas.line(n.tip + Point(-4, 0), n.tip + Point(4, 0), kRed, 2);
+}
+
+void draw_membranes(Canvas& canvas, const Result& result) {
   if (result.undeformed) {
-    closed(circle_contour(*result.undeformed, 240), white, true);
+    canvas.closed(circle_contour(*result.undeformed, 240), kWhite, true);
   }
-  closed(result.outer.contour, result.outer.ok ? green : faded, false);
-  closed(result.inner.contour, result.inner.ok ? cyan : faded, false);
+  canvas.closed(result.outer.contour, result.outer.ok ? kGreen : kGrey);
+  canvas.closed(result.inner.contour, result.inner.ok ? kCyan : kGrey);
   for (const Point& p : result.outer.nodes) {
-    dot(p, 2, green, cv::FILLED);
+    canvas.circle(p, 2, kGreen, cv::FILLED);
   }
   for (const Point& p : result.inner.nodes) {
-    dot(p, 2, cyan, cv::FILLED);
+    canvas.circle(p, 2, kCyan, cv::FILLED);
   }
-  if (result.needle.ok) {
-    const NeedleFix& n = result.needle;
-    line(n.at(-12, 0), n.at(60, 0), yellow);
-    for (const double side : {-1.0, 1.0}) {
-      line(n.at(0, side * n.half_width), n.at(80, side * n.half_width_at(80)), yellow);
-    }
-    line(n.tip + Point(0, -4), n.tip + Point(0, 4), red, 2);
-    line(n.tip + Point(-4, 0), n.tip + Point(4, 0), red, 2);
-  }
+}
+
+void draw_indentation(Canvas& canvas, const Result& result) {
   if (result.entry && result.wd_px && *result.wd_px > 0) {
-    line(*result.entry, *result.entry + *result.wd_px * result.needle.axis, orange, 2);
-    dot(*result.entry, 4, orange, 1);
+    canvas.line(*result.entry, *result.entry + *result.wd_px * result.needle.axis, kOrange, 2);
+    canvas.circle(*result.entry, 4, kOrange, 1);
   }
   for (const auto& p : result.points.point) {
     if (p) {
-      dot(*p, 4, magenta, 2);
+      canvas.circle(*p, 4, kMagenta, 2);
     }
   }
-  const double um = config.pixel_m * 1e6;
+}
+
+std::string measures_of(const Result& result, double um) {
   char text[240];
-  const auto num = [&](const std::optional<double>& v) { return v ? *v * um : 0.0; };
+  const auto in_um = [um](const std::optional<double>& v) { return v ? *v * um : 0.0; };
   std::snprintf(text, sizeof text, "#%llu %s%s%s  gap %.2f wd %.2f a %.2f R %.2f um",
                 static_cast<unsigned long long>(result.frame), rt::name(result.phase),
-                result.contact ? " contact" : "", result.punctured ? " punctured" : "", num(result.gap_px),
-                num(result.wd_px), num(result.a_px), result.undeformed ? result.undeformed->r * um : 0.0);
-  const double font = std::clamp(out.cols / 1100.0, 0.35, 1.0);
-  int y = static_cast<int>(22 * font) + 4;
-  for (const std::string& s : {std::string(text), result.verdict}) {
-    cv::putText(out, s, cv::Point(6, y), cv::FONT_HERSHEY_SIMPLEX, font, cv::Scalar(0, 0, 0), 3, cv::LINE_AA);
-    cv::putText(out, s, cv::Point(6, y), cv::FONT_HERSHEY_SIMPLEX, font, s == "ok" ? green : white, 1,
-                cv::LINE_AA);
-    y += static_cast<int>(26 * font) + 4;
+                result.contact ? " contact" : "", result.punctured ? " punctured" : "", in_um(result.gap_px),
+                in_um(result.wd_px), in_um(result.a_px), result.undeformed ? result.undeformed->r * um : 0.0);
+  return text;
+}
+
+}  // namespace
+
+cv::Mat draw_overlay(const cv::Mat& grey, const Result& result, const VisionConfig& config) {
+  Canvas canvas(grey);
+  if (result.holder.ok) {
+    draw_holder(canvas, result.holder);
   }
-  return out;
+  draw_membranes(canvas, result);
+  if (result.needle.ok) {
+    draw_needle(canvas, result.needle);
+  }
+  draw_indentation(canvas, result);
+  canvas.text(measures_of(result, config.pixel_m * 1e6), kWhite);
+  canvas.text(result.verdict, result.verdict == "ok" ? kGreen : kWhite);
+  return canvas.picture();
 }
 
 }  // namespace punctum::vision

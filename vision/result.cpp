@@ -8,7 +8,7 @@ std::string verdict_on(const Result& result, const VisionConfig& config) {
   std::string v;
   const auto say = [&v](const char* what, bool wanted, const auto& found) {
     if (wanted && !found.ok) {
-      v += (v.empty() ? "" : "; ") + (what + (": " + (found.why.empty() ? "not found" : found.why)));
+      v += (v.empty() ? "" : "; ") + (what + (": " + (found.reason.empty() ? "not found" : found.reason)));
     }
   };
   say("holder", config.holder.has_value(), result.holder);
@@ -21,7 +21,7 @@ std::string verdict_on(const Result& result, const VisionConfig& config) {
 rt::Observation to_observation(const Result& r, const VisionConfig& config, int width, int height) {
   rt::Observation o;
   const double k = config.pixel_m;
-  const auto place = [&](const Point& p, double(&out)[3]) {
+  const auto place = [&](const Point& p, double (&out)[3]) {
     out[0] = (p.x - (width - 1) / 2.0) * k;
     out[1] = (p.y - (height - 1) / 2.0) * k;
     out[2] = 0;
@@ -30,7 +30,8 @@ rt::Observation to_observation(const Result& r, const VisionConfig& config, int 
   o.exposure_ns = r.exposure_ns;
   o.flags = (r.holder.ok ? rt::Observation::holder_ok : 0U) | (r.needle.ok ? rt::Observation::tip_ok : 0U) |
             (r.outer.ok ? rt::Observation::outer_ok : 0U) | (r.inner.ok ? rt::Observation::inner_ok : 0U) |
-            (r.contact ? rt::Observation::contact : 0U) | (r.punctured ? rt::Observation::punctured : 0U);
+            (r.contact ? rt::Observation::contact : 0U) | (r.punctured ? rt::Observation::punctured : 0U) |
+            (r.inner_punctured ? rt::Observation::inner_punctured : 0U);
   if (r.needle.ok) {
     place(r.needle.tip, o.tip_m);
     o.axis[0] = r.needle.axis.x;

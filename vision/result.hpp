@@ -1,4 +1,4 @@
-// What one frame showed, in pixels, and the observation made of it, in metres.
+// What one frame shows, in pixels, and the observation that is made of it, in metres.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,9 @@
 #include "rt/station/observation.hpp"
 #include "rt/station/telemetry.hpp"
 #include "vision/config.hpp"
-#include "vision/holding_pipette.hpp"
-#include "vision/membrane_following.hpp"
+#include "vision/membrane/membrane_following.hpp"
+#include "vision/membrane/membrane_on_needle.hpp"
+#include "vision/pipettes/holding_pipette.hpp"
 
 namespace punctum::vision {
 
@@ -18,46 +19,47 @@ struct StageTimes {
   double prepare = 0;  // noise, smoothing, Sobel
   double holder = 0;
   double needle = 0;
-  double erase = 0;  // polygons, impurities
-  double start = 0;  // Hough transform and first contours; not while following
+  double erase = 0;  // pipettes and impurities
+  double start = 0;  // Hough transform and first contours; only until the membranes are followed
   double outer = 0;
   double inner = 0;
-  double contact = 0;  // contact points, dilation, labelling; not far from the cell
-  double measure = 0;  // undeformed shape, R, gap
+  double contact = 0;  // contact points, dilation, labelling; only near the cell
+  double measure = 0;  // undeformed shape, R and gap
   double total = 0;
 };
 
 struct Result {
   std::uint64_t frame = 0;
   std::int64_t exposure_ns = 0;
-  bool usable = false;  // the picture could be worked on at all
+  bool usable = false;  // the frame is a picture of the right size and has contrast
   double noise = 0;     // grey levels
 
-  HolderFix holder;
-  NeedleFix needle;
+  HolderPose holder;
+  NeedlePose needle;
   Membrane outer, inner;
   std::optional<Circle> undeformed;       // of the outer membrane
   std::optional<double> inner_radius_px;  // mean of the inner one
 
-  bool merged = false;  // the paper's test: dilation and labelling
+  bool merged = false;  // the paper's test of contact: dilation and labelling
   bool contact = false;
-  bool punctured = false;
+  bool punctured = false;        // the outer membrane
+  bool inner_punctured = false;  // and the inner one
   ContactPoints points;
-  std::optional<Point> entry;                 // needle's axis on the undeformed outer membrane
-  std::optional<double> gap_px, wd_px, a_px;  // a is empty without a dimple; w_d is 0 then
-  double membrane_velocity_px_s = 0;          // of the contact points, into the cell > 0
+  std::optional<Point> entry;                 // where the needle's axis meets the undeformed outer membrane
+  std::optional<double> gap_px, wd_px, a_px;  // without a dimple a is empty and w_d is 0
+  double membrane_velocity_px_s = 0;          // of the contact points, > 0 into the cell
   double gap_noise_px = 0;
   rt::Phase phase = rt::Phase::free;
   int impurities = 0;
 
   StageTimes us;
-  std::string verdict;  // "ok", or what is missing and why
+  std::string verdict;  // see verdict_on()
 };
 
-// "ok", or what of the scene is missing and why.
+// "ok"; or what of the scene was not found, and why.
 [[nodiscard]] std::string verdict_on(const Result& result, const VisionConfig& config);
 
-// Metres in the microscope's frame, for a picture of that size.
+// In metres, in the frame of the microscope: the origin is the middle of the picture, which has that size.
 [[nodiscard]] rt::Observation to_observation(const Result& result, const VisionConfig& config, int width,
                                              int height);
 

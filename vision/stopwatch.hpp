@@ -1,4 +1,4 @@
-// Microseconds between two places of the program.
+// Times of the stages of one frame.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,8 @@ namespace punctum::vision {
 
 class Stopwatch {
  public:
-  double lap_us() {  // since the last lap, or the beginning; never 0
+  // Microseconds since the last lap or the beginning. Never 0, which says that a stage did not run.
+  double lap_us() {
     const auto now = Clock::now();
     const double us = std::chrono::duration<double, std::micro>(now - last_).count();
     last_ = now;

@@ -4,26 +4,32 @@
 #include <cmath>
 #include <vector>
 
-#include "vision/contact.hpp"
-#include "vision/median.hpp"
-#include "vision/membrane_start.hpp"
-#include "vision/phase.hpp"
-#include "vision/puncture.hpp"
+#include "vision/events/contact.hpp"
+#include "vision/events/phase.hpp"
+#include "vision/events/puncture.hpp"
+#include "vision/image/median.hpp"
+#include "vision/image/polar_contour.hpp"
+#include "vision/membrane/dimple.hpp"
+#include "vision/membrane/membrane_on_needle.hpp"
+#include "vision/membrane/membrane_start.hpp"
+#include "vision/pipettes/holding_pipette.hpp"
+#include "vision/pipettes/injection_pipette.hpp"
+#include "vision/pipettes/wide_tube.hpp"
 #include "vision/stopwatch.hpp"
 
 namespace punctum::vision {
 
 namespace {
 
-constexpr int kHolderEvery = 8;           // frames between two looks for a tube that was not found
-constexpr double kNeedleMargin_px = 2.5;  // what blur spreads beyond the needle's edges
-constexpr double kUntouched_px = 12;      // so far outside nothing touches the tip
-constexpr double kLeastDimple_px = 0.7;   // of a depth whose width can be told
-constexpr double kNear_px = 8;            // nearer than this the needle is touching, or about to
+constexpr int kHolderEvery = 8;           // frames between two searches for a tube that was not found
+constexpr double kNeedleMargin_px = 2.5;  // the blur reaches so far beyond the needle's edges
+constexpr double kUntouched_px = 12;      // further outside, nothing touches the tip
+constexpr double kLeastDimple_px = 0.7;   // depth from which the width of a dimple can be measured
+constexpr double kNear_px = 8;            // nearer, the needle may touch the membrane
+constexpr double kTipNoise_px = 0.1;
 
 Side opposite(Side side) { return side == Side::right ? Side::left : Side::right; }
 
-// A square of that half side, and what belongs to it.
 cv::Rect2d square_round(const Point& p, double half) { return {p.x - half, p.y - half, 2 * half, 2 * half}; }
 
 VisionConfig checked(VisionConfig config) {
@@ -51,6 +57,7 @@ struct Tracker::Impl {
   LearntUndeformed undeformed;  // of the outer one
   bool was_contact = false;
   Puncture puncture;
+  InnerPuncture inner_puncture;
 
   Impl(const VisionConfig& c, int w, int h)
       : config(checked(c)),
@@ -73,7 +80,10 @@ struct Tracker::Impl {
   void follow_membranes(Stopwatch& watch);
   [[nodiscard]] Surroundings surroundings() const;
   void measure();
+  [[nodiscard]] int fit_undeformed_membrane();
+  void measure_gap(int fitted_points);
   [[nodiscard]] std::optional<double> look_for_contact();
+  [[nodiscard]] std::optional<double> inner_behind_tip() const;
   void classify_contact(const std::optional<double>& membrane_behind_tip);
   void decide_phase();
 };
@@ -98,14 +108,14 @@ const Result& Tracker::Impl::process(const hal::Frame& frame) {
   result.phase = last_phase;
   result.frame = frame.sequence;
   result.exposure_ns = frame.exposure_ns;
-  if (result.verdict = picture.take(frame, width, height); !result.verdict.empty()) {
+  if (result.verdict = picture.load(frame, width, height); !result.verdict.empty()) {
     result.us.total = total.lap_us();
     return result;
   }
   result.usable = true;
   result.noise = picture.noise;
   const bool starting = must_start();
-  picture.take_gradient(area_to_search(starting));
+  picture.compute_gradient(area_to_search(starting));
   result.us.prepare = watch.lap_us();
 
   if (config.needle) {
@@ -118,7 +128,8 @@ const Result& Tracker::Impl::process(const hal::Frame& frame) {
     result.us.holder = watch.lap_us();
   }
 
-  // At the start a needle inside the cell must not split it: what shines beside its walls is covered as well.
+  // At the start a needle inside the cell must not split it, so the bright lines beside its walls are covered
+  // as well.
   clear_picture(kNeedleMargin_px + (starting ? 0.7 * result.needle.half_width : 0));
   result.us.erase = watch.lap_us();
 
@@ -142,6 +153,7 @@ const Result& Tracker::Impl::process(const hal::Frame& frame) {
     }
   } else {
     result.punctured = puncture.update({.t_ns = result.exposure_ns});
+    result.inner_punctured = inner_puncture.update(result.punctured, std::nullopt, 0);
   }
   decide_phase();
   result.verdict = verdict_on(result, config);
@@ -151,7 +163,7 @@ const Result& Tracker::Impl::process(const hal::Frame& frame) {
 
 bool Tracker::Impl::must_start() const { return outer.known ? outer.lost() : !inner.known || inner.lost(); }
 
-// The whole picture while something must be found; else the surroundings of cell and needle.
+// The whole picture while something must be found; then the surroundings of cell and needle.
 cv::Rect Tracker::Impl::area_to_search(bool starting) const {
   const cv::Rect whole(0, 0, width, height);
   if (starting || (config.needle && (!needle.started() || !tip.last))) {
@@ -160,7 +172,7 @@ cv::Rect Tracker::Impl::area_to_search(bool starting) const {
   const FollowedMembrane& cell = outer.known ? outer : inner;
   cv::Rect2d box = square_round(cell.centre, 1.15 * *std::max_element(cell.r.begin(), cell.r.end()) + 30);
   if (config.needle) {
-    constexpr double kShaft_px = 180;  // of it tell its direction
+    constexpr double kShaft_px = 180;  // of the shaft tell its direction
     box |= square_round(*tip.last, 40);
     box |= square_round(*tip.last - kShaft_px * tip.axis, 24) & cv::Rect2d(0, 0, width, height);
   }
@@ -172,7 +184,7 @@ void Tracker::Impl::locate_needle() {
   if (!needle.started()) {
     (void)needle.start(picture.field, picture.noise);
   }
-  NeedleFix& n = result.needle;
+  NeedlePose& n = result.needle;
   n = needle.find(picture.field, picture.noise);
   if (n.ok && was_contact && !puncture.punctured() && outer.known) {
     n.tip += membrane_ahead_of_tip(picture.field, n, outer.polarity, outer.level) * n.axis;
@@ -181,7 +193,7 @@ void Tracker::Impl::locate_needle() {
 
 void Tracker::Impl::locate_holder() {
   if (!holder_tube && picture.field.area.width == width && holder_tries++ % kHolderEvery == 0) {
-    // It comes from the border opposite to the needle.
+    // It enters through the border opposite to the needle's.
     const Side known = config.needle && needle.started() ? needle.side() : config.needle_from;
     std::vector<Side> sides{Side::left, Side::right};
     if (known != Side::automatic) {
@@ -190,14 +202,14 @@ void Tracker::Impl::locate_holder() {
     holder_tube = find_holder_tube(picture.field, sides, height, config.px(config.R_max_m), picture.noise);
   }
   if (!holder.has_template()) {
-    result.holder.why = holder_tube ? holder.cut_template(picture.grey, *holder_tube, picture.noise)
-                                    : "no wide tube enters through the border";
+    result.holder.reason = holder_tube ? holder.cut_template(picture.grey, *holder_tube, picture.noise)
+                                       : "no wide tube enters through the border";
   }
   if (holder.has_template()) {
     result.holder = holder.find(picture.grey);
   }
   if (holder_tube) {
-    // The middle of a template that was given need not be the mouth.
+    // The middle of a given template need not be the mouth.
     const Point mouth = result.holder.ok && !template_given ? result.holder.mouth : holder_tube->end();
     picture.holder_face = {mouth, holder_tube->axis, holder_tube->end_half_width};
   }
@@ -229,14 +241,14 @@ bool Tracker::Impl::start() {
   StartedMembranes begun = start_membranes(picture, config, seed);
   outer = std::move(begun.outer);
   inner = std::move(begun.inner);
-  result.outer.why = begun.why;
+  result.outer.reason = begun.reason;
   if (!outer.known && !inner.known) {
     return false;
   }
-  // What was learnt of the cell without needle still holds if it is the same cell in its place. Learnt over a
-  // few frames only, or not needed because nothing touches: better learnt anew.
+  // The learnt rest shape is kept if this is the same cell in the same place. It is learnt anew if only a few
+  // frames told it, or if nothing touches the cell now.
   const bool needed = was_contact || puncture.punctured() || result.phase != rt::Phase::free;
-  if (outer.known && needed && outer_rest.mature() &&
+  if (outer.known && needed && outer_rest.reliable() &&
       undeformed.same_cell(outer.contour(), outer.centre, result.needle)) {
     outer.rest = outer_rest;
     inner.rest = inner_rest;
@@ -275,7 +287,6 @@ void Tracker::Impl::follow_membranes(Stopwatch& watch) {
   }
 }
 
-// The undeformed membrane, and how far from it the tip is.
 void Tracker::Impl::measure() {
   if (inner.known && result.inner.ok) {
     result.inner_radius_px = mean_radius(result.inner.contour);
@@ -283,9 +294,17 @@ void Tracker::Impl::measure() {
   if (!outer.known || !result.outer.ok) {
     return;
   }
-  const NeedleFix& n = result.needle;
+  const int fitted = fit_undeformed_membrane();
+  if (fitted > 0 && result.needle.ok) {
+    measure_gap(fitted);
+  }
+}
+
+// Returns the number of contour points that tell the undeformed membrane.
+int Tracker::Impl::fit_undeformed_membrane() {
   const Contour& contour = result.outer.contour;
-  std::optional<Point> entry;  // where the needle is near
+  const NeedlePose& n = result.needle;
+  std::optional<Point> entry;  // if the needle is near
   if (n.ok) {
     entry = entry_point(undeformed.known() ? undeformed.shape()->shape : contour, n.tip, n.axis);
     if (entry && (*entry - n.tip).dot(n.axis) >= kNear_px) {
@@ -299,41 +318,39 @@ void Tracker::Impl::measure() {
   const auto weights = undeformed_weights(contour, picture, entry, holder_tube ? mouth : std::nullopt);
   const auto now = fit_undeformed(contour, weights);
   if (!now) {
-    return;
+    return 0;
   }
   const bool touched = entry || was_contact || puncture.punctured();
-  const Point carried = undeformed.update(*now, touched, mouth);
+  const Point shift = undeformed.update(*now, touched, mouth);
   for (FollowedMembrane* m : {&outer, &inner}) {
-    m->rest.centre += carried;
+    m->rest.centre += shift;
   }
   if (!touched) {
     outer.rest.learn(outer.centre, outer.r);
     if (inner.known && result.inner.ok) {
       inner.rest.learn(inner.centre, inner.r);
     }
-  } else if (outer.rest.r.empty()) {  // never seen without: what its undeformed part tells
+  } else if (outer.rest.r.empty()) {  // it was never seen without the needle
     outer.rest.r = polar_radii(undeformed.shape()->shape, outer.centre, config.contour_points);
     outer.rest.centre = outer.centre;
   }
   result.undeformed = undeformed.shape()->circle;
-  if (!n.ok) {
-    return;
-  }
+  return static_cast<int>(std::count_if(weights.begin(), weights.end(), [](double w) { return w > 0; }));
+}
+
+void Tracker::Impl::measure_gap(int fitted_points) {
+  const NeedlePose& n = result.needle;
   result.entry = entry_point(undeformed.shape()->shape, n.tip, n.axis);
   if (!result.entry) {
     return;
   }
   result.gap_px = (*result.entry - n.tip).dot(n.axis);
-  constexpr double kTipNoise_px = 0.1;
-  const int fitted =
-      static_cast<int>(std::count_if(weights.begin(), weights.end(), [](double w) { return w > 0; }));
-  result.gap_noise_px =
-      std::hypot(kTipNoise_px, 3 * result.outer.residual_px / std::sqrt(std::max(fitted, 1)));
+  result.gap_noise_px = std::hypot(kTipNoise_px, 3 * result.outer.residual_px / std::sqrt(fitted_points));
 }
 
-// In the picture: do needle and cell touch, and where is the membrane on the needle?
+// Whether needle and cell touch. Returns how far behind the tip the membrane lies on the needle.
 std::optional<double> Tracker::Impl::look_for_contact() {
-  // The paper's test: needle and cell are two classes until they merge.
+  // The paper's test: needle and cell are two classes until they touch.
   const Contour& contour = result.outer.contour;
   result.merged = needle_merges_with_cell(picture, result.needle, contour, config.dilation_px);
   result.contact = touches(result.gap_px, result.merged, was_contact);
@@ -341,6 +358,28 @@ std::optional<double> Tracker::Impl::look_for_contact() {
       membrane_on_needle(picture, result.needle, contour, outer.polarity, outer.level);
   result.points = on_needle.points;
   return on_needle.behind_tip;
+}
+
+// How far behind the tip the inner membrane's contour crosses the lines beside the needle's edges: the nearer
+// of the two.
+std::optional<double> Tracker::Impl::inner_behind_tip() const {
+  constexpr double kBesideEdge_px = 2.5;
+  const NeedlePose& n = result.needle;
+  if (!n.ok || !inner.known || !result.inner.ok) {
+    return std::nullopt;
+  }
+  const Point across(-n.axis.y, n.axis.x);
+  std::optional<double> behind;
+  for (const double side : {-1.0, 1.0}) {
+    const double u = side * (n.half_width + kBesideEdge_px);
+    const auto crossing = entry_point(result.inner.contour, n.tip + u * across, n.axis);
+    if (!crossing) {
+      return std::nullopt;
+    }
+    const double at = -(*crossing - n.tip).dot(n.axis);
+    behind = std::min(behind.value_or(at), at);
+  }
+  return behind;
 }
 
 void Tracker::Impl::classify_contact(const std::optional<double>& membrane_behind_tip) {
@@ -356,13 +395,14 @@ void Tracker::Impl::classify_contact(const std::optional<double>& membrane_behin
     in.depth_px = in.membrane_px;
   }
   result.punctured = puncture.update(in);
+  result.inner_punctured =
+      inner_puncture.update(result.punctured, inner_behind_tip(), result.needle.half_width);
   result.membrane_velocity_px_s = puncture.membrane_velocity_px_s();
   was_contact = result.contact;
   if (!result.gap_px) {
     return;
   }
-  // Until the puncture the membrane lies on the tip; afterwards its own contour tells what is left of the
-  // dimple.
+  // Until the puncture the membrane lies on the tip. Afterwards its contour tells the rest of the dimple.
   const double depth = result.punctured ? in.depth_px : -*result.gap_px;
   result.wd_px = result.contact ? std::max(0.0, depth) : 0.0;
   if (*result.wd_px > kLeastDimple_px) {

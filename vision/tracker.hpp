@@ -1,4 +1,5 @@
-// Frame -> what is seen: the paper's vision loop, one frame at a time. Not for the real-time core: allocates.
+// The paper's vision loop, one frame at a time: what a frame shows of pipettes and cell. It allocates memory
+// and is not for the real-time core.
 #pragma once
 
 #include <memory>
@@ -15,13 +16,13 @@ class Tracker {
   Tracker(Tracker&&) noexcept;
   Tracker& operator=(Tracker&&) noexcept;
 
-  // Before the first frame. The circle replaces the Hough transform, the template what is cut at the start
-  // (CV_8U).
+  // To be called before the first frame. The circle replaces the Hough transform; the template (CV_8U)
+  // replaces the one that is cut from the first frame.
   void seed_circle(const Circle& circle);
   void holder_template(const cv::Mat& pattern);
 
-  // The result stays valid until the next call. Never throws on any pixels; a frame of another size or
-  // without contrast gives a verdict and leaves what was followed as it was.
+  // The result is valid until the next call. No pixels make it throw. A frame of another size or without
+  // contrast gives a verdict and changes nothing else.
   const Result& process(const hal::Frame& frame);
 
  private:

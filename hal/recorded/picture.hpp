@@ -24,8 +24,8 @@ struct Picture {
 };
 
 // PNG, JPEG, TIFF, BMP, PGM or PPM. Colour becomes grey; 16-bit samples are scaled from `bits`, or, when that
-// is 0, from the least of 8, 10, 12, 14, 16 bits that holds the brightest of them. What ends early, fails its
-// checksum or has a size that is not allowed is an error.
+// is 0, from the least of 8, 10, 12, 14, 16 bits that holds the brightest of them. A file that is incomplete,
+// damaged where its format tells, or larger than allowed is an error.
 [[nodiscard]] tl::expected<Picture, std::string> decode(std::span<const std::uint8_t> file, int bits = 0);
 
 // The same from a file; errors start with its path.

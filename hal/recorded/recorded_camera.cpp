@@ -47,10 +47,16 @@ tl::expected<std::vector<std::string>, std::string> files_of_folder(const std::s
   std::error_code error;
   fs::directory_iterator it(folder, error);
   for (; !error && it != fs::directory_iterator(); it.increment(error)) {
-    if (is_picture_name(it->path()) && is_file(it->path())) files.push_back(it->path().string());
+    if (is_picture_name(it->path()) && is_file(it->path())) {
+      files.push_back(it->path().string());
+    }
   }
-  if (error) return tl::unexpected(folder + ": " + error.message());
-  if (files.empty()) return tl::unexpected(folder + ": no pictures in this folder; allowed: " + kPictures);
+  if (error) {
+    return tl::unexpected(folder + ": " + error.message());
+  }
+  if (files.empty()) {
+    return tl::unexpected(folder + ": no pictures in this folder; allowed: " + kPictures);
+  }
   return files;
 }
 
@@ -59,11 +65,15 @@ tl::expected<std::vector<std::string>, std::string> files_of_pattern(const std::
   std::vector<std::string> files;
   if (::glob(pattern.c_str(), 0, nullptr, &found) == 0) {
     for (std::size_t i = 0; i < found.gl_pathc; ++i) {
-      if (is_file(found.gl_pathv[i])) files.emplace_back(found.gl_pathv[i]);
+      if (is_file(found.gl_pathv[i])) {
+        files.emplace_back(found.gl_pathv[i]);
+      }
     }
   }
   ::globfree(&found);
-  if (files.empty()) return tl::unexpected(pattern + ": no file matches");
+  if (files.empty()) {
+    return tl::unexpected(pattern + ": no file matches");
+  }
   return files;
 }
 
@@ -91,30 +101,46 @@ bool natural_less(std::string_view a, std::string_view b) noexcept {
   std::size_t j = 0;
   while (i < a.size() && j < b.size()) {
     if (digit(a[i]) && digit(b[j])) {
-      while (i < a.size() && a[i] == '0') ++i;
-      while (j < b.size() && b[j] == '0') ++j;
+      while (i < a.size() && a[i] == '0') {
+        ++i;
+      }
+      while (j < b.size() && b[j] == '0') {
+        ++j;
+      }
       std::size_t n = 0;
       std::size_t m = 0;
-      while (i + n < a.size() && digit(a[i + n])) ++n;
-      while (j + m < b.size() && digit(b[j + m])) ++m;
-      if (n != m) return n < m;
+      while (i + n < a.size() && digit(a[i + n])) {
+        ++n;
+      }
+      while (j + m < b.size() && digit(b[j + m])) {
+        ++m;
+      }
+      if (n != m) {
+        return n < m;
+      }
       const int order = a.substr(i, n).compare(b.substr(j, m));
-      if (order != 0) return order < 0;
+      if (order != 0) {
+        return order < 0;
+      }
       i += n;
       j += m;
     } else {
-      if (a[i] != b[j]) return static_cast<unsigned char>(a[i]) < static_cast<unsigned char>(b[j]);
+      if (a[i] != b[j]) {
+        return static_cast<unsigned char>(a[i]) < static_cast<unsigned char>(b[j]);
+      }
       ++i;
       ++j;
     }
   }
-  if ((i < a.size()) != (j < b.size())) return j < b.size();
-  return a < b;  // 01 and 1 are the same number: a fixed order all the same
+  if ((i < a.size()) != (j < b.size())) {
+    return j < b.size();
+  }
+  return a < b;  // 01 and 1 are the same number, but the order must be strict
 }
 
 struct Camera::Impl {
-  std::vector<std::string> files;  // empty: a film
-  cv::VideoCapture film;
+  std::vector<std::string> files;  // empty: a video
+  cv::VideoCapture video;
   std::string source;
   std::int64_t count = -1;
   double fps = kDefaultFps;
@@ -130,11 +156,13 @@ struct Camera::Impl {
   // Reads the picture at `position` into `picture`: ok, fault or disconnected, with `error`.
   hal::Status read() {
     error.clear();
-    return files.empty() ? read_film() : read_file();
+    return files.empty() ? read_video() : read_file();
   }
 
   hal::Status read_file() {
-    if (position >= count) return hal::Status::disconnected;
+    if (position >= count) {
+      return hal::Status::disconnected;
+    }
     name = files[static_cast<std::size_t>(position)];
     auto one = read_picture(name, position == 0 ? 0 : picture.bits);
     if (!one) {
@@ -144,11 +172,11 @@ struct Camera::Impl {
     return accept(std::move(*one));
   }
 
-  hal::Status read_film() {
+  hal::Status read_video() {
     name = source + ":" + std::to_string(position);
     cv::Mat raw;
     try {
-      if (!film.read(raw) || raw.empty()) {
+      if (!video.read(raw) || raw.empty()) {
         if (count > 0 && position < count) {
           error = source + ": ends after " + std::to_string(position) + " of " + std::to_string(count) +
                   " pictures";
@@ -186,36 +214,41 @@ struct Camera::Impl {
     return hal::Status::ok;
   }
 
-  tl::expected<void, std::string> open_film(double wanted_fps) {
-    // A path that cannot be taken for an address or a numbered pattern of pictures: those belong to other
-    // backends.
+  tl::expected<void, std::string> open_video(double wanted_fps) {
+    // An absolute path, so that no backend takes it for an address or a numbered pattern of pictures.
     std::error_code error_code;
     const std::string path = fs::absolute(source, error_code).string();
     cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
-    ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // quiet: what is wrong is returned as a value
+    ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // silent: an error is returned as a value
     for (const int backend : {cv::CAP_FFMPEG, cv::CAP_GSTREAMER, cv::CAP_OPENCV_MJPEG}) {
       try {
-        if (film.open(path, backend)) break;
+        if (video.open(path, backend)) {
+          break;
+        }
       } catch (const std::exception&) {
         continue;
       }
     }
-    if (!film.isOpened()) {
-      return tl::unexpected(source +
-                            ": neither a picture nor a film this program can read; pictures: " + kPictures);
+    if (!video.isOpened()) {
+      return tl::unexpected(
+          source + ": neither a picture nor a video that this program can read; pictures: " + kPictures);
     }
-    const double w = film.get(cv::CAP_PROP_FRAME_WIDTH);
-    const double h = film.get(cv::CAP_PROP_FRAME_HEIGHT);
+    const double w = video.get(cv::CAP_PROP_FRAME_WIDTH);
+    const double h = video.get(cv::CAP_PROP_FRAME_HEIGHT);
     if (w > static_cast<double>(kMaxSide) || h > static_cast<double>(kMaxSide) ||
         w * h > static_cast<double>(kMaxPixels)) {
       return tl::unexpected(source + ": its pictures are too large; allowed: sides of at most " +
                             std::to_string(kMaxSide) + " px and at most " + std::to_string(kMaxPixels) +
                             " px in all");
     }
-    const double frames = film.get(cv::CAP_PROP_FRAME_COUNT);
-    if (frames >= 1 && frames < 1e9) count = static_cast<std::int64_t>(frames);
-    const double own_fps = film.get(cv::CAP_PROP_FPS);
-    if (wanted_fps <= 0 && own_fps > 0 && own_fps <= kMaxFps) fps = own_fps;
+    const double frames = video.get(cv::CAP_PROP_FRAME_COUNT);
+    if (frames >= 1 && frames < 1e9) {
+      count = static_cast<std::int64_t>(frames);
+    }
+    const double own_fps = video.get(cv::CAP_PROP_FPS);
+    if (wanted_fps <= 0 && own_fps > 0 && own_fps <= kMaxFps) {
+      fps = own_fps;
+    }
     return {};
   }
 };
@@ -226,11 +259,14 @@ Camera::Camera(Camera&&) noexcept = default;
 Camera& Camera::operator=(Camera&&) noexcept = default;
 
 tl::expected<Camera, std::string> Camera::open(const std::string& source, double fps) {
-  if (!std::isfinite(fps) || fps > kMaxFps)
+  if (!std::isfinite(fps) || fps > kMaxFps) {
     return tl::unexpected<std::string>("fps: allowed: up to 100000 per second");
+  }
   auto impl = std::make_unique<Impl>();
   impl->source = source;
-  if (fps > 0) impl->fps = fps;
+  if (fps > 0) {
+    impl->fps = fps;
+  }
 
   std::error_code error;
   const fs::file_status status = fs::status(source, error);
@@ -238,7 +274,9 @@ tl::expected<Camera, std::string> Camera::open(const std::string& source, double
   if (fs::is_directory(status)) {
     files = files_of_folder(source);
   } else if (fs::is_regular_file(status)) {
-    if (is_picture_name(source)) files->push_back(source);
+    if (is_picture_name(source)) {
+      files->push_back(source);
+    }
   } else if (fs::exists(status)) {
     return tl::unexpected(source + ": neither a file nor a folder");
   } else if (source.find_first_of("*?[") != std::string::npos) {
@@ -246,13 +284,17 @@ tl::expected<Camera, std::string> Camera::open(const std::string& source, double
   } else {
     return tl::unexpected(source + ": no such file or folder");
   }
-  if (!files) return tl::unexpected(files.error());
+  if (!files) {
+    return tl::unexpected(files.error());
+  }
   impl->files = std::move(*files);
   std::sort(impl->files.begin(), impl->files.end(), natural_less);
 
   if (impl->files.empty()) {
-    const auto film = impl->open_film(fps);
-    if (!film) return tl::unexpected(film.error());
+    const auto video = impl->open_video(fps);
+    if (!video) {
+      return tl::unexpected(video.error());
+    }
   } else {
     impl->count = static_cast<std::int64_t>(impl->files.size());
   }
@@ -266,12 +308,16 @@ tl::expected<Camera, std::string> Camera::open(const std::string& source, double
 hal::Status Camera::next(hal::Frame& out, std::int64_t) {
   Impl& c = *impl_;
   const hal::Status status = std::exchange(c.first_is_waiting, false) ? hal::Status::ok : c.read();
-  if (status == hal::Status::disconnected) return status;
+  if (status == hal::Status::disconnected) {
+    return status;
+  }
   out = {};
   out.sequence = static_cast<std::uint64_t>(c.position);
   out.exposure_ns = std::llround(static_cast<double>(c.position) / c.fps * 1e9);
   ++c.position;
-  if (status != hal::Status::ok) return status;
+  if (status != hal::Status::ok) {
+    return status;
+  }
   out.pixels = c.picture.pixels.data();
   out.width = c.width;
   out.height = c.height;

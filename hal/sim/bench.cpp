@@ -9,83 +9,89 @@ namespace punctum::sim {
 
 void ExposureTaker::attach() noexcept {
   next_ = bench_.exposed.load(std::memory_order_acquire);
-  bench_.camera_delivered.store(next_, std::memory_order_release);
-  bench_.camera_pid.store(static_cast<std::uint64_t>(getpid()), std::memory_order_release);
+  answers_.delivered.store(next_, std::memory_order_release);
+  answers_.pid.store(static_cast<std::uint64_t>(getpid()), std::memory_order_release);
   attached_ = true;
   taken_ = false;
 }
 
 void ExposureTaker::detach() noexcept {
-  if (!attached_) return;
+  if (!attached_) {
+    return;
+  }
   auto mine = static_cast<std::uint64_t>(getpid());
-  bench_.camera_pid.compare_exchange_strong(mine, 0);
+  answers_.pid.compare_exchange_strong(mine, 0);
   attached_ = false;
 }
 
 hal::Status ExposureTaker::next(Exposure& out, std::int64_t timeout_ns) noexcept {
-  if (taken_) release();
+  if (taken_) {
+    release();
+  }
   // The clock may have stopped waiting for this camera: it is late, not gone.
-  if (!attached_ || bench_.camera_pid.load(std::memory_order_acquire) == 0) attach();
+  if (!attached_ || answers_.pid.load(std::memory_order_acquire) == 0) {
+    attach();
+  }
   Waiting waiting(timeout_ns);
   for (;;) {
     const bool finished = bench_.finished.load(std::memory_order_acquire) != 0;
     const std::uint64_t exposed = bench_.exposed.load(std::memory_order_acquire);
     if (exposed > next_) {
-      if (bench_.virtual_time.load(std::memory_order_relaxed) == 0) next_ = exposed - 1;
+      if (bench_.virtual_time.load(std::memory_order_relaxed) == 0) {
+        next_ = exposed - 1;
+      }
       if (bench_.exposures.read(next_, out) == hal::Read::ok) {
         deliver_ns_ = out.deliver_ns;
         taken_ = true;
         return hal::Status::ok;
       }
-      next_ = exposed - 1;  // the writer has been round: go on with the newest
-      bench_.camera_delivered.store(next_, std::memory_order_release);
+      next_ = exposed - 1;  // overwritten meanwhile: continue with the newest
+      answers_.delivered.store(next_, std::memory_order_release);
     } else if (finished) {
       return hal::Status::disconnected;
     }
-    if (!waiting.pause()) return hal::Status::no_data;
+    if (!waiting.pause()) {
+      return hal::Status::no_data;
+    }
   }
 }
 
 void ExposureTaker::release() noexcept {
-  if (!taken_) return;
+  if (!taken_) {
+    return;
+  }
   taken_ = false;
-  // In virtual time the plant stands still from here until camera_delivered moves, so what is taken next does
-  // not depend on how fast anybody was.
-  if (bench_.virtual_time.load(std::memory_order_relaxed) != 0)
+  // In virtual time the plant stands still from here until `delivered` moves, so what is taken next does
+  // not depend on how fast any program ran.
+  if (bench_.virtual_time.load(std::memory_order_relaxed) != 0) {
     BenchClock(bench_).sleep_until_ns(deliver_ns_);
+  }
   const std::uint64_t exposed = bench_.exposed.load(std::memory_order_acquire);
   next_ = exposed > next_ + 1 ? exposed - 1 : next_ + 1;
-  bench_.camera_delivered.store(next_, std::memory_order_release);
+  answers_.delivered.store(next_, std::memory_order_release);
 }
 
 void SnapshotTaker::attach() noexcept {
-  cursor_ = bench_.snapshots.head();
-  bench_.recorder_cursor.store(cursor_, std::memory_order_release);
+  follower_ = hal::Follower(bench_.snapshots, bench_.snapshots.head());
+  bench_.recorder_cursor.store(follower_.position(), std::memory_order_release);
   bench_.recorder_attached.store(1, std::memory_order_release);
   attached_ = true;
 }
 
 void SnapshotTaker::detach() noexcept {
-  if (!attached_) return;
+  if (!attached_) {
+    return;
+  }
   bench_.recorder_attached.store(0, std::memory_order_release);
   attached_ = false;
 }
 
 bool SnapshotTaker::next(Snapshot& out) noexcept {
-  for (;;) {
-    const hal::Read got = bench_.snapshots.read(cursor_, out);
-    if (got == hal::Read::not_yet) return false;
-    if (got == hal::Read::ok) {
-      ++cursor_;
-      bench_.recorder_cursor.store(cursor_, std::memory_order_release);
-      return true;
-    }
-    const std::uint64_t head = bench_.snapshots.head();
-    const std::uint64_t safe = head > kSnapshots * 3 / 4 ? head - kSnapshots * 3 / 4 : 0;
-    const std::uint64_t to = safe > cursor_ ? safe : cursor_ + 1;
-    lost_ += to - cursor_;
-    cursor_ = to;
+  if (follower_.next(out) != hal::Read::ok) {
+    return false;
   }
+  bench_.recorder_cursor.store(follower_.position(), std::memory_order_release);
+  return true;
 }
 
 }  // namespace punctum::sim

@@ -10,22 +10,22 @@
 #include <cstdint>
 #include <type_traits>
 
-#include "hal/exchange.hpp"
-#include "hal/sim/cell.hpp"
+#include "hal/ipc/exchange.hpp"
 #include "hal/sim/config.hpp"
-#include "hal/sim/estop.hpp"
 #include "hal/sim/failures.hpp"
-#include "hal/sim/force_sensor.hpp"
-#include "hal/sim/hand.hpp"
-#include "hal/sim/injector.hpp"
-#include "hal/sim/operator.hpp"
+#include "hal/sim/operator/operator.hpp"
+#include "hal/sim/plant/cell.hpp"
+#include "hal/sim/plant/estop.hpp"
+#include "hal/sim/plant/force_sensor.hpp"
+#include "hal/sim/plant/hand.hpp"
+#include "hal/sim/plant/injector.hpp"
+#include "hal/sim/plant/stage.hpp"
+#include "hal/sim/plant/vacuum.hpp"
 #include "hal/sim/point.hpp"
-#include "hal/sim/stage.hpp"
-#include "hal/sim/vacuum.hpp"
 
 namespace punctum::sim {
 
-// The cell at one instant, as what cannot be had without its tables; plain copies of sim::CellForce.
+// What the cell's tables give at one instant: plain copies of sim::CellForce.
 struct CellReading {
   Point centre_m;        // of this individual, where it is now, undeformed
   double R_m = 0;        // its outer face
@@ -47,14 +47,14 @@ struct CellReading {
   std::uint32_t aims_at_cell = 0;
 };
 
-// The whole state of the plant after one tick, before the core answers: enough to go on from
-// (World::restore). What it means is in truth.hpp.
+// The whole state of the plant after one tick, before the core answers: enough to continue from
+// (World::restore). truth.hpp says what it means.
 struct Snapshot {
   std::int64_t t_ns = 0;      // station clock
   std::int64_t start_ns = 0;  // of the run
   std::uint64_t tick = 0;     // counts from 1
   HandPlantState hand;
-  PersonState person;
+  OperatorState operator_state;
   StagePlantState stage;
   CellState cell;            // valid if has_cell
   CellReading cell_reading;  // likewise
@@ -67,7 +67,7 @@ struct Snapshot {
   std::uint64_t cell_index = 0;  // counts cells of this run from 0
   std::uint32_t has_cell = 0;
   std::uint32_t next_cell_was_down = 0;
-  std::array<Failure, 8> failure{};  // per Device, now
+  std::array<Failing, kDevices> failure{};  // per Device, now
 };
 static_assert(std::is_trivially_copyable_v<Snapshot>);
 
@@ -85,24 +85,20 @@ inline constexpr std::uint64_t kExposures = 8;
 
 struct Bench {
   static constexpr std::uint64_t kMagic = 0x0068636e65625350ULL;  // "Psbench"
-  static constexpr std::uint64_t kVersion = 1;                    // raise when a meaning changes
+  static constexpr std::uint64_t kVersion = 2;                    // raise when a meaning changes
   static const std::uint64_t kLayout;                             // version, sizes and offsets
 
   hal::SegmentHeader header;
 
   // Virtual clock.
   std::atomic<std::int64_t> now_ns{0};         // time of the newest tick, in either kind of time
-  std::atomic<std::uint64_t> virtual_time{0};  // 1: time goes on when everybody attached is ready
+  std::atomic<std::uint64_t> virtual_time{0};  // 1: time advances when everybody attached is ready
   std::atomic<std::uint64_t> finished{0};      // 1: the plant will not be stepped any more
 
-  // Camera handshake. Exposure i is delivered once camera_delivered > i.
-  std::atomic<std::uint64_t> camera_pid{0};  // 0 = none attached; the supervisor clears it when it dies
-  std::atomic<std::uint64_t> camera_delivered{0};
-  std::atomic<std::uint64_t> camera_gave_up{0};  // how often the clock stopped waiting for one
-  std::atomic<std::uint64_t> exposed{0};         // exposures pushed
+  std::atomic<std::uint64_t> exposed{0};  // exposures pushed
   std::array<std::atomic<std::int64_t>, kExposures> deliver_ns{};
 
-  // Recorder handshake: it has taken all snapshots before recorder_cursor.
+  // Recorder handshake: the recorder has taken all snapshots before recorder_cursor.
   std::atomic<std::uint64_t> recorder_attached{0};
   std::atomic<std::uint64_t> recorder_cursor{0};
   std::atomic<std::uint64_t> recorder_gave_up{0};
@@ -118,12 +114,28 @@ inline constexpr std::uint64_t Bench::kLayout = hal::fingerprint(
     offsetof(Bench, failures), offsetof(Bench, snapshots), offsetof(Bench, exposures));
 static_assert(std::is_standard_layout_v<Bench> && std::is_trivially_destructible_v<Bench>);
 
+// The camera's answers to the bench: a segment of its own, so that whoever sees the pictures can write no
+// word of the world. Exposure i is delivered once `delivered` > i.
+struct CameraAnswers {
+  static constexpr std::uint64_t kMagic = 0x00006172656d6350ULL;  // "Pcmera"
+  static constexpr std::uint64_t kVersion = 1;
+  static const std::uint64_t kLayout;
+
+  hal::SegmentHeader header;
+  std::atomic<std::uint64_t> pid{0};  // 0 = none attached; the supervisor clears it when it dies
+  std::atomic<std::uint64_t> delivered{0};
+  std::atomic<std::uint64_t> gave_up{0};  // how often the clock stopped waiting for one
+};
+inline constexpr std::uint64_t CameraAnswers::kLayout =
+    hal::fingerprint(CameraAnswers::kVersion, sizeof(CameraAnswers), offsetof(CameraAnswers, delivered));
+static_assert(std::is_standard_layout_v<CameraAnswers> && std::is_trivially_destructible_v<CameraAnswers>);
+
 // Takes exposures from the bench, for a camera. In virtual time the choice of the next frame depends on
 // virtual time alone: frames that fell due while one was being worked on are skipped, except the newest.
 // May block; not for the tick.
 class ExposureTaker {
  public:
-  explicit ExposureTaker(Bench& bench) : bench_(bench) {}
+  ExposureTaker(const Bench& bench, CameraAnswers& answers) : bench_(bench), answers_(answers) {}
   ~ExposureTaker() { detach(); }
   ExposureTaker(const ExposureTaker&) = delete;
   ExposureTaker& operator=(const ExposureTaker&) = delete;
@@ -137,31 +149,30 @@ class ExposureTaker {
   void release() noexcept;
 
  private:
-  Bench& bench_;
+  const Bench& bench_;
+  CameraAnswers& answers_;
   std::uint64_t next_ = 0;
   bool attached_ = false;
   bool taken_ = false;
-  std::int64_t deliver_ns_ = 0;  // of what is taken
+  std::int64_t deliver_ns_ = 0;  // of the exposure that is taken
 };
 
 // Takes every snapshot in order, for a recorder: in virtual time the clock waits for it.
 class SnapshotTaker {
  public:
-  explicit SnapshotTaker(Bench& bench) : bench_(bench) {}
+  explicit SnapshotTaker(Bench& bench) : bench_(bench), follower_(bench.snapshots) {}
   ~SnapshotTaker() { detach(); }
   SnapshotTaker(const SnapshotTaker&) = delete;
   SnapshotTaker& operator=(const SnapshotTaker&) = delete;
 
   void attach() noexcept;  // from the next snapshot on
   void detach() noexcept;
-  [[nodiscard]] bool next(Snapshot& out) noexcept;                     // false: none now
-  [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }  // overruns, in snapshots
-  [[nodiscard]] std::uint64_t cursor() const noexcept { return cursor_; }
+  [[nodiscard]] bool next(Snapshot& out) noexcept;  // false: none now
+  [[nodiscard]] std::uint64_t lost() const noexcept { return follower_.lost(); }
 
  private:
   Bench& bench_;
-  std::uint64_t cursor_ = 0;
-  std::uint64_t lost_ = 0;
+  hal::Follower<hal::SeqRing<Snapshot, kSnapshots>> follower_;
   bool attached_ = false;
 };
 

@@ -5,6 +5,7 @@
 #include <type_traits>
 
 #include "hal/devices.hpp"
+#include "hal/realtime.hpp"
 
 namespace punctum::sim {
 
@@ -27,11 +28,7 @@ struct Point {
 };
 static_assert(std::is_trivially_copyable_v<Point>);
 
-// World from hand: rotation by pi about x. Its own inverse.
-[[nodiscard]] inline Vec3 world_from_hand(const Vec3& v) noexcept { return {v.x(), -v.y(), -v.z()}; }
-[[nodiscard]] inline Vec3 hand_from_world(const Vec3& v) noexcept { return {v.x(), -v.y(), -v.z()}; }
-
-[[nodiscard]] constexpr std::int64_t to_ns(double seconds) noexcept {
+[[nodiscard]] constexpr std::int64_t to_ns(double seconds) NONBLOCKING {
   const double ns = seconds * 1e9;
   return static_cast<std::int64_t>(ns < 0 ? ns - 0.5 : ns + 0.5);
 }

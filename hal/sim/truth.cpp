@@ -8,8 +8,12 @@ constexpr double kBareMouth_m = -100e-6;  // of a holder that holds nothing
 }
 
 std::optional<Vec3> holder_mouth(const SimConfig& config) noexcept {
-  if (!config.holder) return std::nullopt;
-  if (!config.cell) return Vec3(kBareMouth_m, config.holder->drop_m, 0);
+  if (!config.holder) {
+    return std::nullopt;
+  }
+  if (!config.cell) {
+    return Vec3(kBareMouth_m, config.holder->drop_m, 0);
+  }
   return Vec3(config.cell->centre_m + Vec3(-config.cell->R_m, config.holder->drop_m, 0));
 }
 
@@ -20,7 +24,9 @@ Truth truth_of(const SimConfig& config, const Snapshot& s) noexcept {
   t.tip_m = s.stage.tip_m;
   t.axis = s.stage.axis;
   t.holder_mouth_m = holder_mouth(config);
-  if (s.has_cell == 0) return t;
+  if (s.has_cell == 0) {
+    return t;
+  }
   const CellReading& r = s.cell_reading;
   t.cell = true;
   t.force_N = r.force_N;
@@ -44,8 +50,12 @@ Truth truth_of(const SimConfig& config, const Snapshot& s) noexcept {
   t.contact = r.contact != 0;
   t.zona_punctured = s.cell.outer.punctured;
   t.punctured = s.puncture_ns != 0;
-  if (s.puncture_ns != 0) t.puncture_s = seconds(s.puncture_ns);
-  if (s.zona_puncture_ns != 0) t.zona_puncture_s = seconds(s.zona_puncture_ns);
+  if (s.puncture_ns != 0) {
+    t.puncture_s = seconds(s.puncture_ns);
+  }
+  if (s.zona_puncture_ns != 0) {
+    t.zona_puncture_s = seconds(s.zona_puncture_ns);
+  }
   t.held = s.cell.attached;
   t.lost = s.cell.lost();
   return t;

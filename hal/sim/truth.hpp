@@ -1,4 +1,5 @@
-// What is really so, read off a snapshot: for the observer that needs no picture, and for the report.
+// The truth of the simulated world, read from a snapshot: for the observer that needs no picture, and for
+// the report.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +11,7 @@
 
 namespace punctum::sim {
 
-// Words as everywhere: w_d = depth along the needle axis from the undeformed membrane, a = half-width of the
+// w_d = depth along the needle axis from the undeformed membrane, a = half-width of the
 // dimple where its depth is 1 % of w_d, outer = the outer face of the zona, entry = where the needle's axis
 // meets the undeformed outer membrane.
 struct Truth {

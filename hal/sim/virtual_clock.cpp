@@ -9,37 +9,44 @@
 namespace punctum::sim {
 namespace {
 
-// An attached camera still owes an exposure that is due at t.
-bool owes_exposure(const Bench& bench, std::int64_t t_ns) noexcept {
+// An exposure that is due by t has not been delivered by the camera.
+bool exposure_is_due(const Bench& bench, const CameraAnswers& camera, std::int64_t t_ns) NONBLOCKING {
   const std::uint64_t exposed = bench.exposed.load(std::memory_order_relaxed);  // written by this thread
-  const std::uint64_t delivered = bench.camera_delivered.load(std::memory_order_acquire);
+  const std::uint64_t delivered = camera.delivered.load(std::memory_order_acquire);
   std::uint64_t i = exposed > kExposures ? exposed - kExposures : 0;
   for (i = delivered > i ? delivered : i; i < exposed; ++i) {
-    if (bench.deliver_ns[i % kExposures].load(std::memory_order_relaxed) <= t_ns) return true;
+    if (bench.deliver_ns[i % kExposures].load(std::memory_order_relaxed) <= t_ns) {
+      return true;
+    }
   }
   return false;
 }
 
 }  // namespace
 
-VirtualClock::VirtualClock(Bench& bench, std::int64_t start_ns, std::int64_t bail_out_ns) noexcept
-    : bench_(bench), bail_out_ns_(bail_out_ns) {
+VirtualClock::VirtualClock(Bench& bench, CameraAnswers& camera, std::int64_t start_ns,
+                           std::int64_t bail_out_ns) noexcept
+    : bench_(bench), camera_(camera), bail_out_ns_(bail_out_ns) {
   bench_.now_ns.store(start_ns, std::memory_order_release);
   bench_.virtual_time.store(1, std::memory_order_release);
 }
 
 VirtualClock::~VirtualClock() { bench_.finished.store(1, std::memory_order_release); }
 
-std::int64_t VirtualClock::now_ns() const noexcept { return bench_.now_ns.load(std::memory_order_relaxed); }
+std::int64_t VirtualClock::now_ns() const NONBLOCKING {
+  return bench_.now_ns.load(std::memory_order_relaxed);
+}
 
 void VirtualClock::sleep_until_ns(std::int64_t t_ns) noexcept {
-  if (t_ns > now_ns()) bench_.now_ns.store(t_ns, std::memory_order_release);
+  if (t_ns > now_ns()) {
+    bench_.now_ns.store(t_ns, std::memory_order_release);
+  }
   Waiting for_camera(bail_out_ns_);
-  while (!stop_.load(std::memory_order_relaxed) && bench_.camera_pid.load(std::memory_order_acquire) != 0 &&
-         owes_exposure(bench_, t_ns)) {
+  while (!stop_.load(std::memory_order_relaxed) && camera_.pid.load(std::memory_order_acquire) != 0 &&
+         exposure_is_due(bench_, camera_, t_ns)) {
     if (!for_camera.pause()) {
-      bench_.camera_pid.store(0, std::memory_order_release);
-      bench_.camera_gave_up.fetch_add(1, std::memory_order_relaxed);
+      camera_.pid.store(0, std::memory_order_release);
+      camera_.gave_up.fetch_add(1, std::memory_order_relaxed);
     }
   }
   Waiting for_recorder(bail_out_ns_);
@@ -55,8 +62,10 @@ void VirtualClock::sleep_until_ns(std::int64_t t_ns) noexcept {
 
 bool VirtualClock::await_camera() noexcept {
   Waiting waiting(bail_out_ns_);
-  while (bench_.camera_pid.load(std::memory_order_acquire) == 0) {
-    if (stop_.load(std::memory_order_relaxed) || !waiting.pause()) return false;
+  while (camera_.pid.load(std::memory_order_acquire) == 0) {
+    if (stop_.load(std::memory_order_relaxed) || !waiting.pause()) {
+      return false;
+    }
   }
   return true;
 }
@@ -64,13 +73,17 @@ bool VirtualClock::await_camera() noexcept {
 bool VirtualClock::await_recorder() noexcept {
   Waiting waiting(bail_out_ns_);
   while (bench_.recorder_attached.load(std::memory_order_acquire) == 0) {
-    if (stop_.load(std::memory_order_relaxed) || !waiting.pause()) return false;
+    if (stop_.load(std::memory_order_relaxed) || !waiting.pause()) {
+      return false;
+    }
   }
   return true;
 }
 
-std::int64_t BenchClock::now_ns() const noexcept {
-  if (bench_.virtual_time.load(std::memory_order_relaxed) == 0) return real_now_ns();
+std::int64_t BenchClock::now_ns() const NONBLOCKING {
+  if (bench_.virtual_time.load(std::memory_order_relaxed) == 0) {
+    return real_now_ns();
+  }
   return bench_.now_ns.load(std::memory_order_acquire);
 }
 

@@ -1,5 +1,5 @@
-// Waiting for another process to move a word in shared memory: short sleeps, bounded. Only the clock and what
-// is not real-time wait.
+// Waiting for another process to move a word in shared memory: short sleeps, bounded. For the virtual
+// clock and the takers of the bench; nothing in real time waits.
 #pragma once
 
 #include <sched.h>
@@ -7,9 +7,14 @@
 
 #include <cstdint>
 
+#include "hal/realtime.hpp"
+
+// Answered in the calling thread from a page of the kernel's (vDSO), without a system call.
+extern "C" int clock_gettime(clockid_t, timespec*) NONBLOCKING;
+
 namespace punctum::sim {
 
-[[nodiscard]] inline std::int64_t real_now_ns() noexcept {
+[[nodiscard]] inline std::int64_t real_now_ns() NONBLOCKING {
   timespec t{};
   clock_gettime(CLOCK_MONOTONIC, &t);
   return static_cast<std::int64_t>(t.tv_sec) * 1'000'000'000 + t.tv_nsec;
@@ -19,11 +24,14 @@ class Waiting {
  public:
   explicit Waiting(std::int64_t timeout_ns) noexcept : timeout_ns_(timeout_ns) {}
 
-  // A little while; false once timeout_ns of real time have passed since the first call.
+  // Sleeps briefly; false once timeout_ns of real time have passed since the first call.
   [[nodiscard]] bool pause() noexcept {
-    if (rounds_++ < kYields) {
+    if (rounds_ < kYields) {
+      ++rounds_;
       sched_yield();
-      if (rounds_ == 1) end_ns_ = real_now_ns() + timeout_ns_;
+      if (rounds_ == 1) {
+        end_ns_ = real_now_ns() + timeout_ns_;
+      }
       return rounds_ > 1 || timeout_ns_ > 0;
     }
     timespec nap{};

@@ -1,62 +1,78 @@
-// The stage's following error as the core sees it: from the set-points it sent itself and the tip it reads,
-// whatever the drive says of its own. A drive that hangs, encoders that stand still and a needle that moves
-// by itself all show here.
+// Does the stage go where it is sent? Judged from the set-points that the core sent and the tip that it
+// reads, whatever the drive reports itself: a drive that hangs, encoders that stand still and a needle that
+// moves by itself all show here.
 #pragma once
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
+#include <cstdint>
 
 #include "hal/devices.hpp"
+#include "hal/realtime.hpp"
 
 namespace punctum::rt {
 
 class FollowingCheck {
  public:
-  // A reading may be reading_age_s old: the tip is compared with where it was sent within that time.
-  explicit FollowingCheck(double reading_age_s) noexcept : age_s_(reading_age_s) {}
+  // A reading may be reading_age_s old: the tip is compared with the path it was sent along within that time.
+  explicit FollowingCheck(double reading_age_s) NONBLOCKING : age_s_(reading_age_s) {}
 
-  void restart() noexcept { count_ = 0; }
+  void restart() NONBLOCKING { count_ = 0; }
 
-  void sent(const hal::Vec3& set_point_m) noexcept {
-    if (count_ == 0 || now_s_ - begun_s_[newest_] >= age_s_ / kPast) {
+  void sent(const hal::Vec3& set_point_m) NONBLOCKING {
+    if (count_ == 0 || since_s(newest_) >= age_s_ / kPast) {
       newest_ = (newest_ + 1) % kPoints;
       count_ = std::min(count_ + 1, kPoints);
-      begun_s_[newest_] = now_s_;
+      begun_ns_[newest_] = now_ns_;
     }
     path_[newest_] = set_point_m;
   }
   // Once per tick.
-  void step(double elapsed_s) noexcept { now_s_ += elapsed_s; }
+  void step(double elapsed_s) NONBLOCKING {
+    now_ns_ += static_cast<std::int64_t>(std::clamp(elapsed_s, 0.0, kLongest_s) * 1e9 + 0.5);
+  }
 
-  // From the tip to the nearest point of the path it was sent along; 0 before anything was sent.
-  [[nodiscard]] double error_m(const hal::Vec3& tip_m) const noexcept {
-    if (count_ == 0) return 0;
-    double nearest = (tip_m - point(0)).norm();
-    for (std::size_t ago = 1; ago < count_; ++ago) {
-      // It was sent away from the point before so long ago; the last set-point it may be coming from still.
-      if (ago > 1 && now_s_ - begun_s_[place(ago - 1)] > age_s_) break;
-      const hal::Vec3 way = point(ago) - point(ago - 1);
-      const double length2 = way.squaredNorm();
-      const double along =
-          length2 > 0 ? std::clamp((tip_m - point(ago - 1)).dot(way) / length2, 0.0, 1.0) : 0.0;
-      nearest = std::min(nearest, (tip_m - point(ago - 1) - along * way).norm());
+  // The tip is within `limit_m` of the path it was sent along; true before anything was sent.
+  [[nodiscard]] bool follows(const hal::Vec3& tip_m, double limit_m) const NONBLOCKING {
+    if (count_ == 0 || (tip_m - point(0)).norm() <= limit_m) {
+      return true;
     }
-    return nearest;
+    for (std::size_t ago = 1; ago < count_; ++ago) {
+      // The point before was left longer ago than a reading may be old: the tip cannot come from there any
+      // more.
+      if (ago > 1 && since_s(place(ago - 1)) > age_s_) {
+        break;
+      }
+      const hal::Vec3 segment = point(ago) - point(ago - 1);
+      const double length2 = segment.squaredNorm();
+      const double along =
+          length2 > 0 ? std::clamp((tip_m - point(ago - 1)).dot(segment) / length2, 0.0, 1.0) : 0.0;
+      if ((tip_m - point(ago - 1) - along * segment).norm() <= limit_m) {
+        return true;
+      }
+    }
+    return false;
   }
 
  private:
+  static constexpr double kLongest_s = 1000;  // of a tick: the path is forgotten by then anyway
   static constexpr std::size_t kPast = 16;
   static constexpr std::size_t kPoints = kPast + 2;
 
-  [[nodiscard]] std::size_t place(std::size_t ago) const noexcept {
+  [[nodiscard]] std::size_t place(std::size_t ago) const NONBLOCKING {
     return (newest_ + kPoints - ago) % kPoints;
   }
-  [[nodiscard]] const hal::Vec3& point(std::size_t ago) const noexcept { return path_[place(ago)]; }
+  [[nodiscard]] const hal::Vec3& point(std::size_t ago) const NONBLOCKING { return path_[place(ago)]; }
+
+  [[nodiscard]] double since_s(std::size_t place) const NONBLOCKING {
+    return 1e-9 * static_cast<double>(now_ns_ - begun_ns_[place]);
+  }
 
   double age_s_;
-  double now_s_ = 0;
+  std::int64_t now_ns_ = 0;  // a sum of seconds would lose its resolution over days
   std::array<hal::Vec3, kPoints> path_{};
-  std::array<double, kPoints> begun_s_{};  // when it was sent towards the point
+  std::array<std::int64_t, kPoints> begun_ns_{};  // when the tip was first sent towards the point
   std::size_t newest_ = 0;
   std::size_t count_ = 0;
 };

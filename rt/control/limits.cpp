@@ -3,28 +3,36 @@
 #include <algorithm>
 #include <cmath>
 
-#include "rt/station/telemetry.hpp"
+#include "rt/station/alarm.hpp"
 
 namespace punctum::rt {
 namespace {
 
 constexpr double kTiltSpeed_rad_s = 0.5;  // of the approach axis
 constexpr double kAtLimit_m = 0.05e-6;    // nearer to a limit than this, the needle is said to be held by it
+constexpr double kRounding_m = 1e-15;
 // Part of the acceleration that the approach to a target plans with; the rest is for what it did not foresee.
 constexpr double kPlanned = 0.8;
+constexpr double kFinestPart = 1e-3;
 
-[[nodiscard]] bool is_finite(const hal::Vec3& v) noexcept {
+[[nodiscard]] bool is_finite(const hal::Vec3& v) NONBLOCKING {
   return std::isfinite(v.x()) && std::isfinite(v.y()) && std::isfinite(v.z());
 }
 
-[[nodiscard]] hal::Vec3 shortened(const hal::Vec3& v, double longest) noexcept {
+[[nodiscard]] hal::Vec3 shortened(const hal::Vec3& v, double longest) NONBLOCKING {
   const double length = v.norm();
   return length > longest ? hal::Vec3(v * (longest / length)) : v;
 }
 
+// Samples of a window that takes this long.
+[[nodiscard]] std::size_t samples(double seconds, double dt_s) NONBLOCKING {
+  const double n = std::ceil(seconds / dt_s - 1e-9);
+  return static_cast<std::size_t>(std::clamp(n, 1.0, static_cast<double>(MovingAverage::kMost)));
+}
+
 }  // namespace
 
-double Membrane3D::depth_m(const hal::Vec3& p) const noexcept {
+double Membrane3D::depth_m(const hal::Vec3& p) const NONBLOCKING {
   const hal::Vec3 V = p - entry_m;
   const double along = axis.dot(V);
   const double r2 = std::min((V - along * axis).squaredNorm(), R_m * R_m);
@@ -32,24 +40,42 @@ double Membrane3D::depth_m(const hal::Vec3& p) const noexcept {
   return along - r2 / (R_m + std::sqrt(R_m * R_m - r2));
 }
 
-double Membrane3D::chord_m(const hal::Vec3& p) const noexcept {
+double Membrane3D::chord_m(const hal::Vec3& p) const NONBLOCKING {
   const hal::Vec3 V = p - entry_m;
   const double r2 = (V - axis.dot(V) * axis).squaredNorm();
   return 2 * std::sqrt(std::max(R_m * R_m - r2, 0.0));
 }
 
-StageLimits::StageLimits(const LimitParams& limits, const MappingParams& mapping) noexcept
-    : limits_(limits), low_m_(mapping.workspace_min_m), high_m_(mapping.workspace_max_m) {}
-
-void StageLimits::restart(const hal::Vec3& tip_m, const hal::Vec3& axis) noexcept {
-  set_point_ = {tip_m, axis};
-  velocity_m_s_.setZero();
+StageLimits::StageLimits(const LimitParams& limits, const MappingParams& mapping, double rate_Hz) NONBLOCKING
+    : limits_(limits),
+      low_m_(mapping.workspace_min_m),
+      high_m_(mapping.workspace_max_m),
+      dt_s_(1 / rate_Hz),
+      // A window as long as can be still has to bound the jerk: a stage this slow gets less acceleration.
+      hardest_m_s2_(std::min(limits.stage_acceleration_m_s2,
+                             limits.stage_jerk_m_s3* static_cast<double>(MovingAverage::kMost) * dt_s_ / 2)),
+      bounds_jerk_(samples(2 * hardest_m_s2_ / limits.stage_jerk_m_s3, dt_s_)) {
+  const double window_s = static_cast<double>(bounds_jerk_.samples()) * dt_s_;
+  // A speed turns into any other within 2 v/a.
+  reach_m_ = limits.stage_velocity_m_s * (2 * limits.stage_velocity_m_s / hardest_m_s2_ + window_s);
+  lag_s_ = window_s / 2;
 }
 
-StageLimits::Checked StageLimits::check(const hal::Vec3& wanted_m, const StageConstraint& c) const noexcept {
+void StageLimits::restart(const hal::Vec3& tip_m, const hal::Vec3& axis) NONBLOCKING {
+  set_point_ = {tip_m, axis};
+  velocity_m_s_.setZero();
+  ahead_m_ = tip_m;
+  ahead_m_s_.setZero();
+  bounds_jerk_.restart(tip_m);
+}
+
+StageLimits::Checked StageLimits::check(const hal::Vec3& wanted_m, const StageConstraint& c) const
+    NONBLOCKING {
   const hal::Vec3& here = set_point_.tip_m;
   Checked out{wanted_m, 0};
-  if (c.frozen || !is_finite(wanted_m)) return {here, 0};
+  if (c.frozen || !is_finite(wanted_m)) {
+    return {here, 0};
+  }
 
   // Workspace; a needle that is outside already may stay or come back.
   for (Eigen::Index i = 0; i < 3; ++i) {
@@ -64,30 +90,58 @@ StageLimits::Checked StageLimits::check(const hal::Vec3& wanted_m, const StageCo
   const Membrane3D& m = c.membrane;
   if (c.withdrawal_only) {
     // Outward along the axis, nothing else, and not out of the workspace.
-    double outward = std::max(-m.axis.dot(out.point_m - here), 0.0);
+    const double wanted = std::max(-m.axis.dot(wanted_m - here), 0.0);
+    double outward = wanted;
+    out.alarms = 0;
     for (Eigen::Index i = 0; i < 3; ++i) {
       const double direction = -m.axis[i];
-      if (direction == 0) continue;
+      if (direction == 0) {
+        continue;
+      }
       const double room =
           direction > 0 ? std::max(high_m_[i], here[i]) - here[i] : std::min(low_m_[i], here[i]) - here[i];
       outward = std::min(outward, room / direction);
     }
+    if (outward < wanted) {
+      out.alarms |= alarm_travel_limited;
+    }
     out.point_m = here - std::max(outward, 0.0) * m.axis;
     return out;
   }
-  if (!m.known) return out;
+  if (c.insertion) {
+    out.alarms |= keep_to_line(out.point_m, *c.insertion);
+  }
+  const double beyond = m.axis.dot(out.point_m) - std::max(c.inward_limit_m, m.axis.dot(here));
+  if (beyond > -kAtLimit_m) {
+    out.alarms |= alarm_depth_limited;
+  }
+  if (beyond > 0) {
+    out.point_m -= beyond * m.axis;
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      if (out.point_m[i] < std::min(low_m_[i], here[i]) || out.point_m[i] > std::max(high_m_[i], here[i])) {
+        out.point_m = here;
+      }
+    }
+  }
+  if (!m.known) {
+    return out;
+  }
 
   // Depth along the axis: of the penetration limit, of the far wall, of the tip force. Points outside the
   // cell pass; a needle that is beyond a limit already is held there, not driven back.
   const double depth = m.depth_m(out.point_m);
-  if (depth <= 0) return out;
+  if (depth <= 0) {
+    return out;
+  }
   const double depth_here = std::max(m.depth_m(here), 0.0);
   const auto room = [&](const hal::Vec3& p) {
     return std::max(std::min(limits_.penetration_depth_m, m.chord_m(p) - limits_.far_wall_m), 0.0);
   };
   const double excess = std::max(depth_here - room(here), 0.0);
   double deepest = room(out.point_m) + excess;
-  if (depth > deepest - kAtLimit_m) out.alarms |= alarm_depth_limited;
+  if (depth > deepest - kAtLimit_m) {
+    out.alarms |= alarm_depth_limited;
+  }
   if (c.no_deeper && depth > depth_here) {
     deepest = std::min(deepest, depth_here);
     out.alarms |= alarm_tip_force;
@@ -104,55 +158,147 @@ StageLimits::Checked StageLimits::check(const hal::Vec3& wanted_m, const StageCo
   return out;
 }
 
-const hal::StageCommand& StageLimits::step(const hal::StageCommand& target, const StageConstraint& c,
-                                           double dt_s) noexcept {
+std::uint32_t StageLimits::keep_to_line(hal::Vec3& point_m, const FixtureFrame& line) const NONBLOCKING {
+  const auto beside = [&](const hal::Vec3& p) {
+    const hal::Vec3 V = p - line.entry_m;
+    return hal::Vec3(V - line.axis.dot(V) * line.axis);
+  };
+  const hal::Vec3 wanted = beside(point_m);
+  const hal::Vec3 now = beside(set_point_.tip_m);
+  hal::Vec3 allowed = shortened(wanted, limits_.lateral_m);
+  const double now2 = now.squaredNorm();
+  if (now2 > limits_.lateral_m * limits_.lateral_m) {
+    // Beyond the limit already: it may stay or come straight back.
+    allowed = std::clamp(wanted.dot(now) / now2, 0.0, 1.0) * now;
+  }
+  if ((wanted - allowed).squaredNorm() <= kRounding_m * kRounding_m) {
+    return 0;
+  }
+  point_m += allowed - wanted;
+  return alarm_lateral_limited;
+}
+
+double StageLimits::allowed_speed_m_s(const StageConstraint& c) const NONBLOCKING {
+  const Membrane3D& m = c.membrane;
+  if (!m.known) {
+    return limits_.stage_velocity_m_s;
+  }
+  // The set-point comes after: it shall be as slow by the time that it is there.
+  const double gap_m = (ahead_m_ - m.entry_m - m.R_m * m.axis).norm() - m.R_m - reach_m_;
+  double speed_m_s = limits_.stage_velocity_m_s;
+  if (gap_m < limits_.near_m) {
+    speed_m_s = std::min(speed_m_s, limits_.stage_velocity_near_m_s);
+  }
+  if (gap_m < 0) {
+    speed_m_s = std::min(speed_m_s, limits_.stage_velocity_inside_m_s);
+  }
+  return speed_m_s;
+}
+
+hal::Vec3 StageLimits::stop_of(const hal::Vec3& point_m, const hal::Vec3& velocity_m_s) const NONBLOCKING {
+  return point_m + velocity_m_s * (velocity_m_s.norm() / (2 * hardest_m_s2_));
+}
+
+bool StageLimits::may_be_at(const hal::Vec3& point_m, const StageConstraint& c) const NONBLOCKING {
+  return (check(point_m, c).point_m - point_m).squaredNorm() <= kRounding_m * kRounding_m;
+}
+
+void StageLimits::advance(const hal::Vec3& goal_m, const StageConstraint& c) NONBLOCKING {
+  const hal::Vec3 way = goal_m - ahead_m_;
+  const double distance_m = way.norm();
+  const double braking_m_s2 = kPlanned * hardest_m_s2_;
+  // Speed v from which braking over whole ticks ends at the goal: v^2/(2b) + v dt/2 = distance.
+  const double stoppable_m_s =
+      braking_m_s2 * dt_s_ * (std::sqrt(0.25 + 2 * distance_m / (braking_m_s2 * dt_s_ * dt_s_)) - 0.5);
+  const double allowed_m_s = allowed_speed_m_s(c);
+  const double speed_m_s = std::min({allowed_m_s, stoppable_m_s, distance_m / dt_s_});
+  if (speed_m_s >= allowed_m_s && distance_m > allowed_m_s * dt_s_ * 1.001) {
+    alarms_ |= alarm_travel_limited;
+  }
+  const hal::Vec3 wanted = distance_m > 0 ? hal::Vec3(way * (speed_m_s / distance_m)) : hal::Vec3::Zero();
+  const double change_m_s = hardest_m_s2_ * dt_s_;
+  const hal::Vec3 towards =
+      shortened(ahead_m_s_ + shortened(wanted - ahead_m_s_, change_m_s), limits_.stage_velocity_m_s);
+  hal::Vec3 next = towards;
+  const auto ends_well = [&](const hal::Vec3& velocity_m_s) {
+    return may_be_at(stop_of(ahead_m_ + velocity_m_s * dt_s_, velocity_m_s), c);
+  };
+  if (!ends_well(towards) && may_be_at(stops_at_m(), c)) {
+    // Braking along the way ends well: as near to what is wanted as ends well too.
+    const hal::Vec3 braking = ahead_m_s_ - shortened(ahead_m_s_, change_m_s);
+    double part = 0;
+    for (double half = 0.5; half > kFinestPart; half /= 2) {
+      if (ends_well(braking + (part + half) * (towards - braking))) {
+        part += half;
+      }
+    }
+    next = braking + part * (towards - braking);
+  }
+  ahead_m_s_ = next;
+  ahead_m_ += next * dt_s_;
+}
+
+// Nothing is left to be made up for when the limit goes.
+void StageLimits::settle(const hal::Vec3& wanted_m, const hal::Vec3& held_m) NONBLOCKING {
+  const hal::Vec3 held_back = held_m - wanted_m;
+  const double length_m = held_back.norm();
+  if (!(length_m > kRounding_m)) {
+    return;
+  }
+  const hal::Vec3 normal = held_back / length_m;
+  const auto along_the_limit = [&](const hal::Vec3& v) { return hal::Vec3(v - normal.dot(v) * normal); };
+  bounds_jerk_.flatten(wanted_m, held_m, normal);
+  ahead_m_ = held_m + along_the_limit(ahead_m_ - wanted_m);
+  ahead_m_s_ = along_the_limit(ahead_m_s_);
+}
+
+const hal::StageCommand& StageLimits::step(const hal::StageCommand& target, const StageConstraint& c)
+    NONBLOCKING {
   alarms_ = 0;
   finite_ = is_finite(target.tip_m) && is_finite(target.axis);
-  if (!finite_ || c.frozen || !(dt_s > 0)) {
-    velocity_m_s_.setZero();
+  if (c.frozen) {
+    restart(set_point_.tip_m, set_point_.axis);
+    return set_point_;
+  }
+  const hal::Vec3 here = set_point_.tip_m;
+  const Checked goal = check(finite_ ? target.tip_m : stops_at_m(), c);
+  alarms_ |= goal.alarms;
+  advance(goal.point_m, c);
+
+  // Position last: what momentum would carry across a limit stops at it.
+  const hal::Vec3 wanted_m = bounds_jerk_.step(ahead_m_);
+  Checked next = check(wanted_m, c);
+  alarms_ |= next.alarms;
+  const double longest_m = limits_.stage_velocity_m_s * dt_s_ * (1 + 1e-9);
+  if ((next.point_m - here).norm() > longest_m) {
+    next = check(here + shortened(next.point_m - here, limits_.stage_velocity_m_s * dt_s_), c);
+    if ((next.point_m - here).norm() > longest_m) {
+      next.point_m = here;
+    }
+  }
+  settle(wanted_m, next.point_m);
+  set_point_.tip_m = next.point_m;
+  velocity_m_s_ = (next.point_m - here) / dt_s_;
+  if (!finite_) {
     return set_point_;
   }
 
-  const hal::Vec3 here = set_point_.tip_m;
-  const Checked goal = check(target.tip_m, c);
-  alarms_ |= goal.alarms;
-
-  // Towards the goal as fast as the limits let it and still stop there.
-  const hal::Vec3 way = goal.point_m - here;
-  const double distance = way.norm();
-  const double braking = kPlanned * limits_.stage_acceleration_m_s2;
-  // Speed v from which braking over whole ticks ends at the goal: v^2/(2b) + v dt/2 = distance.
-  const double stoppable = braking * dt_s * (std::sqrt(0.25 + 2 * distance / (braking * dt_s * dt_s)) - 0.5);
-  const double speed = std::min(std::min(limits_.stage_velocity_m_s, stoppable), distance / dt_s);
-  const hal::Vec3 wanted = distance > 0 ? hal::Vec3(way * (speed / distance)) : hal::Vec3::Zero();
-  const hal::Vec3 change = wanted - velocity_m_s_;
-  const hal::Vec3 possible = shortened(change, limits_.stage_acceleration_m_s2 * dt_s);
-  hal::Vec3 velocity = shortened(velocity_m_s_ + possible, limits_.stage_velocity_m_s);
-  if (distance > limits_.stage_velocity_m_s * dt_s * 1.001 && speed >= limits_.stage_velocity_m_s) {
-    alarms_ |= alarm_travel_limited;
-  }
-
-  // Position last: what momentum would carry across a limit stops at it.
-  Checked next = check(here + velocity * dt_s, c);
-  alarms_ |= next.alarms;
-  if ((next.point_m - here).norm() > limits_.stage_velocity_m_s * dt_s * (1 + 1e-9)) next.point_m = here;
-  set_point_.tip_m = next.point_m;
-  velocity_m_s_ = (next.point_m - here) / dt_s;
-
-  const hal::Vec3 turn = shortened(target.axis - set_point_.axis, kTiltSpeed_rad_s * dt_s);
+  const hal::Vec3 turn = shortened(target.axis - set_point_.axis, kTiltSpeed_rad_s * dt_s_);
   const hal::Vec3 axis = set_point_.axis + turn;
   const double length = axis.norm();
-  if (length > 0.5) set_point_.axis = axis / length;
+  if (length > 0.5) {
+    set_point_.axis = axis / length;
+  }
   return set_point_;
 }
 
-LimitedForce limit_hand_force(const hal::Vec3& wanted_N, double max_N) noexcept {
+LimitedForce limit_hand_force(const hal::Vec3& wanted_N, double max_N) NONBLOCKING {
   LimitedForce out;
-  const double largest = wanted_N.cwiseAbs().maxCoeff();
   if (!is_finite(wanted_N)) {
     out.finite = false;
     return out;
   }
+  const double largest = std::max({std::abs(wanted_N.x()), std::abs(wanted_N.y()), std::abs(wanted_N.z())});
   out.force_N = wanted_N;
   if (largest > 0) {
     // Scaled first, so that a huge but finite force does not overflow in the norm.

@@ -1,12 +1,49 @@
-// What the needle and the hand may do. Checked on every set-point and on every force, last of all.
+// What the needle and the hand may do. Checked on every set-point and on every force, after everything else.
 #pragma once
 
 #include <cstdint>
+#include <limits>
+#include <optional>
 
 #include "hal/devices.hpp"
-#include "rt/control/config.hpp"
+#include "hal/parameters.hpp"
+#include "hal/realtime.hpp"
+#include "rt/control/master_to_stage.hpp"
+#include "rt/control/moving_average.hpp"
+#include "rt/forces/fixture.hpp"
 
 namespace punctum::rt {
+
+struct LimitParams {
+  double hand_force_N = 3.0;
+  double stage_velocity_m_s = 400e-6;
+  double stage_velocity_near_m_s = 200e-6;    // nearer to the undeformed membrane than near_m
+  double stage_velocity_inside_m_s = 100e-6;  // past it
+  double near_m = 20e-6;
+  double stage_acceleration_m_s2 = 20e-3;
+  double stage_jerk_m_s3 = 4;
+  double penetration_depth_m = 90e-6;  // past the undeformed outer membrane
+  double far_wall_m = 20e-6;           // smallest distance to the far wall
+  double lateral_m = 5e-6;             // inside, from the line that the needle went in by
+  double tip_force_soft_N = 30e-6;     // the needle is not pushed further
+  double tip_force_hard_N = 60e-6;     // latched fault
+  double following_error_m = 10e-6;
+};
+constexpr auto keys_of(const LimitParams*) {
+  return hal::keys(hal::real("hand_force_N", &LimitParams::hand_force_N, 0, 40),
+                   hal::micro("stage_velocity_um_s", &LimitParams::stage_velocity_m_s, 1, 1e5),
+                   hal::micro("stage_velocity_near_um_s", &LimitParams::stage_velocity_near_m_s, 1, 1e5),
+                   hal::micro("stage_velocity_inside_um_s", &LimitParams::stage_velocity_inside_m_s, 1, 1e5),
+                   hal::micro("near_um", &LimitParams::near_m, 0, 5000),
+                   hal::milli("stage_acceleration_mm_s2", &LimitParams::stage_acceleration_m_s2, 0.1, 1e5),
+                   hal::real("stage_jerk_m_s3", &LimitParams::stage_jerk_m_s3, 0.01, 1e5),
+                   hal::micro("penetration_depth_um", &LimitParams::penetration_depth_m, 1, 5000),
+                   hal::micro("far_wall_um", &LimitParams::far_wall_m, 0, 5000),
+                   hal::micro("lateral_um", &LimitParams::lateral_m, 0.1, 5000),
+                   hal::micro("tip_force_soft_uN", &LimitParams::tip_force_soft_N, 0.1, 1e5),
+                   hal::micro("tip_force_hard_uN", &LimitParams::tip_force_hard_N, 0.1, 1e5),
+                   hal::micro("following_error_um", &LimitParams::following_error_m, 0.1, 1000));
+}
 
 // Where the needle is in the cell, for the depth limits.
 struct Membrane3D {
@@ -16,9 +53,9 @@ struct Membrane3D {
   double R_m = 0;
 
   // Depth of a point past the undeformed membrane along the axis; < 0 outside.
-  [[nodiscard]] double depth_m(const hal::Vec3& p) const noexcept;
+  [[nodiscard]] double depth_m(const hal::Vec3& p) const NONBLOCKING;
   // Depth of the far wall on the same line.
-  [[nodiscard]] double chord_m(const hal::Vec3& p) const noexcept;
+  [[nodiscard]] double chord_m(const hal::Vec3& p) const NONBLOCKING;
 };
 
 struct StageConstraint {
@@ -26,37 +63,70 @@ struct StageConstraint {
   bool withdrawal_only = false;  // vision is stale: only outward along the axis
   bool no_deeper = false;        // soft tip-force limit
   bool frozen = false;           // no motion at all
+  // The needle goes no further along the axis than this, whatever vision says of the membrane.
+  double inward_limit_m = std::numeric_limits<double>::infinity();
+  std::optional<FixtureFrame> insertion;  // the needle is in the cell, along this line: not sideways
 };
 
-// Set-points for the stage: never faster, never outside, never deeper, never NaN. A limit that the needle is
-// already beyond holds it, it never pushes it back by itself. Position limits win over the acceleration
-// limit: a needle may always stop at once.
+// Set-points for the stage, one per tick: never faster, never outside, never deeper than the limits, never
+// NaN. A limit that the needle is already beyond holds the needle; it does not push it back.
+//
+// A point goes to the target with bounds on its velocity and acceleration, and always so that braking along
+// its way would end where it may be; the set-point is the mean of that point over a window 2 a/j long, which
+// bounds the jerk. So velocity, acceleration and jerk are bounded whatever the targets are, and where the
+// region that is allowed is convex and stands still, no set-point leaves it. Where it is not (a depth limit
+// that vision's correction moves under the needle, a way that closes when vision is lost), the position wins:
+// the set-point stops there at once and may break the bounds of acceleration and jerk, never that of
+// velocity; it goes on from rest. Steps count nominal ticks: a late tick moves the set-point no further than
+// another.
 class StageLimits {
  public:
-  StageLimits(const LimitParams& limits, const MappingParams& mapping) noexcept;
+  StageLimits(const LimitParams& limits, const MappingParams& mapping, double rate_Hz) NONBLOCKING;
 
-  void restart(const hal::Vec3& tip_m, const hal::Vec3& axis) noexcept;  // at rest there
+  void restart(const hal::Vec3& tip_m, const hal::Vec3& axis) NONBLOCKING;  // at rest there
 
-  // Where the hand's own point may be: the same position limits without dynamics. The alarms say which bit.
+  // Where the hand's own point may be: the same position limits without dynamics. The alarms name the limits
+  // that hold it.
   struct Checked {
     hal::Vec3 point_m;
     std::uint32_t alarms;
   };
-  [[nodiscard]] Checked check(const hal::Vec3& wanted_m, const StageConstraint& c) const noexcept;
+  [[nodiscard]] Checked check(const hal::Vec3& wanted_m, const StageConstraint& c) const NONBLOCKING;
 
   // The next set-point. A target that is not finite leaves it where it is.
-  const hal::StageCommand& step(const hal::StageCommand& target, const StageConstraint& c,
-                                double dt_s) noexcept;
+  const hal::StageCommand& step(const hal::StageCommand& target, const StageConstraint& c) NONBLOCKING;
 
-  [[nodiscard]] const hal::StageCommand& set_point() const noexcept { return set_point_; }
-  [[nodiscard]] const hal::Vec3& velocity() const noexcept { return velocity_m_s_; }
-  [[nodiscard]] std::uint32_t alarms() const noexcept { return alarms_; }  // of the last step
-  [[nodiscard]] bool finite() const noexcept { return finite_; }           // the last target was
+  // Where the set-point comes to rest from here on.
+  [[nodiscard]] hal::Vec3 stops_at_m() const NONBLOCKING { return stop_of(ahead_m_, ahead_m_s_); }
+  // What the needle may do on its way through this constraint now.
+  [[nodiscard]] double allowed_speed_m_s(const StageConstraint& c) const NONBLOCKING;
+  // How long the set-point is behind a target that moves steadily.
+  [[nodiscard]] double lag_s() const NONBLOCKING { return lag_s_; }
+
+  [[nodiscard]] const hal::StageCommand& set_point() const NONBLOCKING { return set_point_; }
+  [[nodiscard]] const hal::Vec3& velocity() const NONBLOCKING { return velocity_m_s_; }
+  [[nodiscard]] std::uint32_t alarms() const NONBLOCKING { return alarms_; }  // of the last step
+  [[nodiscard]] bool finite() const NONBLOCKING { return finite_; }           // the last target was
 
  private:
+  // The set-point was held at held_m instead: its way across that limit begins from rest.
+  void settle(const hal::Vec3& wanted_m, const hal::Vec3& held_m) NONBLOCKING;
+  void advance(const hal::Vec3& goal_m, const StageConstraint& c) NONBLOCKING;
+  // Where braking from there ends.
+  [[nodiscard]] hal::Vec3 stop_of(const hal::Vec3& point_m, const hal::Vec3& velocity_m_s) const NONBLOCKING;
+  [[nodiscard]] bool may_be_at(const hal::Vec3& point_m, const StageConstraint& c) const NONBLOCKING;
+  [[nodiscard]] std::uint32_t keep_to_line(hal::Vec3& point_m, const FixtureFrame& line) const NONBLOCKING;
+
   LimitParams limits_;
   hal::Vec3 low_m_;
   hal::Vec3 high_m_;
+  double dt_s_;
+  double hardest_m_s2_;  // of which the window bounds the jerk
+  double reach_m_;       // on its way to a new speed the needle gets no further
+  double lag_s_;
+  hal::Vec3 ahead_m_ = hal::Vec3::Zero();  // goes to the target, its jerk not bounded
+  hal::Vec3 ahead_m_s_ = hal::Vec3::Zero();
+  MovingAverage bounds_jerk_;
   hal::StageCommand set_point_;
   hal::Vec3 velocity_m_s_ = hal::Vec3::Zero();
   std::uint32_t alarms_ = 0;
@@ -69,6 +139,6 @@ struct LimitedForce {
   bool limited = false;
   bool finite = true;
 };
-[[nodiscard]] LimitedForce limit_hand_force(const hal::Vec3& wanted_N, double max_N) noexcept;
+[[nodiscard]] LimitedForce limit_hand_force(const hal::Vec3& wanted_N, double max_N) NONBLOCKING;
 
 }  // namespace punctum::rt

@@ -1,8 +1,9 @@
 // Where the membrane is between two frames, in the stage's frame.
 //
-// The stage's encoders and the picture differ by a registration nobody knows, so only differences are used:
-// an observation is compared with the tip's pose at its exposure (a short history), and what it says moves
-// the model's parameters at a bounded rate. Between frames the depth follows the tip of every tick. One
+// The stage's encoders and the picture differ by an unknown registration, so only differences are used: an
+// observation is compared with the tip's pose at its exposure (a short history), and it corrects the model's
+// parameters at a bounded rate and, counted from how the cell was first seen and first touched, by a bounded
+// sum: a claim beyond that is refused. Between frames the depth follows the tip of every tick. One
 // picture tells no depth: the entry's z is the tip's when the cell was first seen, and is never corrected.
 #pragma once
 
@@ -10,12 +11,43 @@
 #include <cstdint>
 
 #include "hal/devices.hpp"
-#include "rt/control/config.hpp"
+#include "hal/parameters.hpp"
+#include "hal/realtime.hpp"
 #include "rt/control/limits.hpp"
 #include "rt/forces/ramp.hpp"
 #include "rt/station/observation.hpp"
 
 namespace punctum::rt {
+
+// The membrane between two frames, and what happens when vision falls silent.
+struct LocalModelParams {
+  double disagree_m = 8e-6;  // stage and picture may move apart by this before the picture is not believed
+  double gain = 0.3;         // of one observation
+  double max_rate_m_s = 100e-6;  // bounded correction of the membrane's position
+  double stale_after_s = 0.30;   // age from which the rendered force fades
+  double fade_s = 0.15;
+  double return_s = 0.4;  // the force returns over this once vision is back
+  // The paper's law wants the width of the dimple itself: a = c + dimple_scale sqrt(2 R w_d) follows the
+  // simulated cell's force within 0.4 uN. Vision's 1 % width spans a whole sagging cell; a rate above 0 lets
+  // it correct the scale.
+  double dimple_scale = 0.6;
+  double dimple_scale_rate_1_s = 0;
+  double dimple_min_m = 2e-6;  // w_d from which a dimple's width is believed
+  // Radius of a cell that vision looks for, by the scene.
+  double R_min_m = 0;
+  double R_max_m = 2e-3;
+};
+constexpr auto keys_of(const LocalModelParams*) {
+  return hal::keys(hal::real("gain", &LocalModelParams::gain, 0.01, 1),
+                   hal::micro("max_rate_um_s", &LocalModelParams::max_rate_m_s, 1, 1e5),
+                   hal::micro("disagree_um", &LocalModelParams::disagree_m, 1, 1000),
+                   hal::real("stale_after_s", &LocalModelParams::stale_after_s, 0.01, 5),
+                   hal::real("fade_s", &LocalModelParams::fade_s, 0.01, 2),
+                   hal::real("return_s", &LocalModelParams::return_s, 0.01, 5),
+                   hal::real("dimple_scale", &LocalModelParams::dimple_scale, 0.01, 5),
+                   hal::real("dimple_scale_rate_1_s", &LocalModelParams::dimple_scale_rate_1_s, 0, 50),
+                   hal::micro("dimple_min_um", &LocalModelParams::dimple_min_m, 0.1, 500));
+}
 
 struct TipPose {
   std::int64_t t_ns = 0;
@@ -27,10 +59,13 @@ struct TipPose {
 class PoseHistory {
  public:
   static constexpr std::size_t kSize = 8192;
-  void push(const TipPose& pose) noexcept;  // t_ns rises; where it does not, the history begins anew
+  void push(const TipPose& pose) NONBLOCKING;  // t_ns rises; where it does not, the history begins anew
   // Interpolated; false if t_ns is older than the history or newer than its newest pose.
-  [[nodiscard]] bool at(std::int64_t t_ns, TipPose& out) const noexcept;
-  [[nodiscard]] std::size_t size() const noexcept { return size_; }
+  [[nodiscard]] bool at(std::int64_t t_ns, TipPose& out) const NONBLOCKING;
+  [[nodiscard]] std::size_t size() const NONBLOCKING { return size_; }
+  [[nodiscard]] std::int64_t newest_ns() const NONBLOCKING {  // of a history that is not empty
+    return poses_[(next_ + kSize - 1) % kSize].t_ns;
+  }
 
  private:
   std::array<TipPose, kSize> poses_{};
@@ -38,40 +73,75 @@ class PoseHistory {
   std::size_t size_ = 0;
 };
 
-class LocalMembraneModel {
+// A flag that two observations in a row must change: one frame may be mistaken.
+class ConfirmedFlag {
  public:
-  LocalMembraneModel(const LocalModelParams& params, double c_m, double R_m) noexcept;
-
-  void push_pose(const TipPose& pose) noexcept { history_.push(pose); }
-
-  // A new observation: true if it could be used (finite, plausible, exposed within the history, after the
-  // last restart, its needle where the stage has it). inside: past the puncture, where a frame that shows the
-  // needle is enough to count as sight.
-  bool observe(const Observation& seen, bool inside) noexcept;
-
-  // Bounded-rate correction, age, fade.
-  void step(std::int64_t now_ns, const hal::Vec3& axis, double dt_s) noexcept;
-
-  // A fresh cell: forget the old one; observations exposed before now do not count.
-  void restart(std::int64_t now_ns) noexcept;
-
-  [[nodiscard]] const Membrane3D& membrane() const noexcept { return membrane_; }
-  [[nodiscard]] double depth_m(const hal::Vec3& tip_m) const noexcept { return membrane_.depth_m(tip_m); }
-  [[nodiscard]] double R_m() const noexcept { return membrane_.R_m; }
-  [[nodiscard]] double dimple_scale() const noexcept { return dimple_scale_; }
-  [[nodiscard]] bool stale() const noexcept { return stale_; }
-  [[nodiscard]] bool overdue() const noexcept { return overdue_; }           // stale, and not just starting
-  [[nodiscard]] double force_gain() const noexcept { return fade_.gain(); }  // 0 while stale
-  [[nodiscard]] double age_s() const noexcept { return age_s_; }             // -1: nothing seen yet
-  [[nodiscard]] bool contact_seen() const noexcept { return contact_; }
-  [[nodiscard]] bool puncture_seen() const noexcept { return punctured_; }
-  [[nodiscard]] double seen_gap_m() const noexcept { return seen_gap_m_; }
-  [[nodiscard]] std::uint64_t used() const noexcept { return used_; }
+  static constexpr int kFrames = 2;
+  void see(bool now) NONBLOCKING {
+    others_ = now == value_ ? 0 : others_ + 1;
+    if (others_ >= kFrames) {
+      value_ = now;
+      others_ = 0;
+    }
+  }
+  [[nodiscard]] bool value() const NONBLOCKING { return value_; }
 
  private:
-  // The picture lies beside the stage's frame, nobody knows how far, but it stays there. A picture that
-  // stands still while the needle moves would drag the membrane along, and no depth limit would ever bite.
-  [[nodiscard]] bool agrees(const TipPose& pose, const hal::Vec3& seen_tip_m) noexcept;
+  bool value_ = false;
+  int others_ = 0;
+};
+
+class LocalMembraneModel {
+ public:
+  LocalMembraneModel(const LocalModelParams& params, double c_m, double R_m) NONBLOCKING;
+
+  void push_pose(const TipPose& pose) NONBLOCKING { history_.push(pose); }
+
+  // A new observation: true if it could be used (finite, plausible, exposed within the history and not too
+  // long ago, after the last restart, its needle where the stage has it, its cell where and as large as it
+  // can be). inside: past the puncture, where a frame that shows the needle is enough to count as sight.
+  bool observe(const Observation& seen, bool inside) NONBLOCKING;
+
+  // Bounded-rate correction, age, fade.
+  void step(std::int64_t now_ns, const hal::Vec3& axis, double dt_s) NONBLOCKING;
+
+  // The needle touches the cell: from here on the undeformed membrane stays where it is, but for disagree_m.
+  void touch() NONBLOCKING;
+  void let_go() NONBLOCKING { touched_ = false; }
+
+  // A fresh cell: forget the old one; observations exposed before now do not count.
+  void restart(std::int64_t now_ns) NONBLOCKING;
+
+  [[nodiscard]] const Membrane3D& membrane() const NONBLOCKING { return membrane_; }
+  [[nodiscard]] double depth_m(const hal::Vec3& tip_m) const NONBLOCKING { return membrane_.depth_m(tip_m); }
+  [[nodiscard]] double R_m() const NONBLOCKING { return membrane_.R_m; }
+  [[nodiscard]] double dimple_scale() const NONBLOCKING { return dimple_scale_; }
+  [[nodiscard]] bool stale() const NONBLOCKING { return stale_; }
+  [[nodiscard]] bool overdue() const NONBLOCKING { return overdue_; }  // stale, and not just starting
+  [[nodiscard]] double force_gain() const NONBLOCKING { return fade_.gain(); }  // 0 while stale
+  [[nodiscard]] double age_s() const NONBLOCKING { return age_s_; }             // -1: nothing seen yet
+  [[nodiscard]] bool contact_seen() const NONBLOCKING { return contact_; }
+  // In two usable observations in a row.
+  [[nodiscard]] bool puncture_seen() const NONBLOCKING { return punctured_.value(); }
+  [[nodiscard]] bool inner_puncture_seen() const NONBLOCKING { return inner_punctured_.value(); }
+  // The newest observation claims what cannot be.
+  [[nodiscard]] bool implausible() const NONBLOCKING { return implausible_; }
+  // This cell as the first frames showed it: what later ones are held against.
+  [[nodiscard]] const Membrane3D& first_seen() const NONBLOCKING { return first_; }
+  [[nodiscard]] double seen_gap_m() const NONBLOCKING { return seen_gap_m_; }
+  [[nodiscard]] std::uint64_t used() const NONBLOCKING { return used_; }
+
+ private:
+  static constexpr std::size_t kFirstFrames = 5;  // one of them may be mistaken, or two alike
+
+  [[nodiscard]] Membrane3D claimed_by(const Observation& seen, const TipPose& pose) NONBLOCKING;
+  [[nodiscard]] bool in_order(const Observation& seen) NONBLOCKING;
+  void remember_first(const Membrane3D& claim) NONBLOCKING;
+  [[nodiscard]] bool can_be(const Membrane3D& claim) const NONBLOCKING;
+
+  // The offset between the picture and the stage's frame is unknown but constant. A picture that stands still
+  // while the needle moves would move the membrane with the needle, and no depth limit would hold it.
+  [[nodiscard]] bool agrees(const TipPose& pose, const hal::Vec3& seen_tip_m) NONBLOCKING;
 
   LocalModelParams params_;
   double c_m_;
@@ -82,7 +152,14 @@ class LocalMembraneModel {
   double R_correction_m_ = 0;
   double scale_correction_ = 0;
   double dimple_scale_;
+  std::array<Membrane3D, kFirstFrames> first_claims_{};
+  std::size_t first_frames_ = 0;
+  Membrane3D first_;
+  bool touched_ = false;
+  hal::Vec3 touched_entry_m_ = hal::Vec3::Zero();
+  bool implausible_ = false;
   std::int64_t newest_exposure_ns_ = 0;
+  std::uint64_t newest_frame_ = 0;
   std::int64_t not_before_ns_ = 0;
   bool seen_ = false;
   bool stale_ = true;
@@ -99,7 +176,8 @@ class LocalMembraneModel {
   double age_s_ = -1;
   Ramp fade_;
   bool contact_ = false;
-  bool punctured_ = false;
+  ConfirmedFlag punctured_;
+  ConfirmedFlag inner_punctured_;
   double seen_gap_m_ = 0;
   std::uint64_t used_ = 0;
 };

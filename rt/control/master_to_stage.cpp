@@ -3,7 +3,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "rt/control/frames.hpp"
+#include "hal/frames.hpp"
+#include "hal/math/elementary.hpp"
 
 namespace punctum::rt {
 namespace {
@@ -11,7 +12,7 @@ namespace {
 constexpr double kButterworth = std::numbers::sqrt2 / 2;  // damping ratio
 
 // One step of x'' = w^2 (u - x) - 2 zeta w x' by the implicit mid-point rule: stable for every dt.
-void low_pass(hal::Vec3& x, hal::Vec3& v, const hal::Vec3& u, double cutoff_Hz, double dt_s) noexcept {
+void low_pass(hal::Vec3& x, hal::Vec3& v, const hal::Vec3& u, double cutoff_Hz, double dt_s) NONBLOCKING {
   if (!(cutoff_Hz > 0)) {
     x = u;
     v.setZero();
@@ -26,32 +27,38 @@ void low_pass(hal::Vec3& x, hal::Vec3& v, const hal::Vec3& u, double cutoff_Hz, 
 }
 
 // The handle's rotation vector in world axes, without its part along `axis`.
-[[nodiscard]] hal::Vec3 tilt_of(const hal::Quat& q, const hal::Vec3& axis) noexcept {
+[[nodiscard]] hal::Vec3 tilt_of(const hal::Quat& q, const hal::Vec3& axis) NONBLOCKING {
   const hal::Vec3 vec = q.w() < 0 ? hal::Vec3(-q.vec()) : hal::Vec3(q.vec());
   const double sine = vec.norm();
-  if (!(sine > 1e-12)) return hal::Vec3::Zero();
-  const double angle = 2 * std::atan2(sine, std::abs(q.w()));
+  if (!(sine > 1e-12)) {
+    return hal::Vec3::Zero();
+  }
+  const double angle = 2 * math::atan2(sine, std::abs(q.w()));
   const hal::Vec3 turn = world_from_hand(vec * (angle / sine));
   return turn - axis.dot(turn) * axis;
 }
 
-[[nodiscard]] hal::Vec3 bounded(const hal::Vec3& v, double longest) noexcept {
+[[nodiscard]] hal::Vec3 bounded(const hal::Vec3& v, double longest) NONBLOCKING {
   const double length = v.norm();
   return length > longest ? hal::Vec3(v * (longest / length)) : v;
 }
 
 // `axis` turned by the rotation vector `tilt`, which stands across it.
-[[nodiscard]] hal::Vec3 turned(const hal::Vec3& axis, const hal::Vec3& tilt) noexcept {
+[[nodiscard]] hal::Vec3 turned(const hal::Vec3& axis, const hal::Vec3& tilt) NONBLOCKING {
   const double angle = tilt.norm();
-  if (!(angle > 1e-12)) return axis;
-  return (std::cos(angle) * axis + std::sin(angle) / angle * tilt.cross(axis)).normalized();
+  if (!(angle > 1e-12)) {
+    return axis;
+  }
+  return (math::cos(angle) * axis + math::sin(angle) / angle * tilt.cross(axis)).normalized();
 }
 
 }  // namespace
 
-void MasterToStage::anchor(const hal::HandState& hand, const hal::Vec3& tip_m,
-                           const hal::Vec3& axis) noexcept {
-  if (!anchored_) base_axis_ = axis;
+void MasterToStage::anchor(const hal::HandState& hand, const hal::Vec3& tip_m, const hal::Vec3& axis)
+    NONBLOCKING {
+  if (!anchored_) {
+    base_axis_ = axis;
+  }
   anchored_ = true;
   anchor_hand_m_ = hand.position_m;
   anchor_tip_m_ = tip_m;
@@ -62,21 +69,25 @@ void MasterToStage::anchor(const hal::HandState& hand, const hal::Vec3& tip_m,
   // The tilt that the needle has now.
   const hal::Vec3 across = base_axis_.cross(axis);
   const double sine = across.norm();
-  tilt_rad_ = sine > 1e-12 ? hal::Vec3(across * (std::atan2(sine, base_axis_.dot(axis)) / sine))
+  tilt_rad_ = sine > 1e-12 ? hal::Vec3(across * (math::atan2(sine, base_axis_.dot(axis)) / sine))
                            : hal::Vec3(hal::Vec3::Zero());
   tilt_wanted_rad_ = tilt_rad_;
   tilt_velocity_rad_s_.setZero();
-  if (has_tilted_) tilt_anchor_rad_ = tilt_rad_ - tilt_of(hand.orientation, base_axis_);
+  if (has_tilted_) {
+    tilt_anchor_rad_ = tilt_rad_ - tilt_of(hand.orientation, base_axis_);
+  }
 }
 
-void MasterToStage::step(const hal::HandState& hand, bool coupled, bool tilting) noexcept {
+void MasterToStage::step(const hal::HandState& hand, bool coupled, bool tilting) NONBLOCKING {
   if (!coupled) {
     anchor_hand_m_ = hand.position_m;
     anchor_tip_m_ = hand_point_m_;
   }
   hand_point_m_ = anchor_tip_m_ + world_from_hand(hand.position_m - anchor_hand_m_) / params_.position_scale;
 
-  if (!(params_.max_tilt_rad > 0)) return;
+  if (!(params_.max_tilt_rad > 0)) {
+    return;
+  }
   const hal::Vec3 handle = tilt_of(hand.orientation, base_axis_);
   if (coupled && tilting) {
     has_tilted_ = true;
@@ -84,17 +95,26 @@ void MasterToStage::step(const hal::HandState& hand, bool coupled, bool tilting)
   } else {
     tilt_wanted_rad_ = tilt_rad_;
     tilt_velocity_rad_s_.setZero();
-    if (has_tilted_) tilt_anchor_rad_ = tilt_rad_ - handle;
+    if (has_tilted_) {
+      tilt_anchor_rad_ = tilt_rad_ - handle;
+    }
   }
 }
 
-void MasterToStage::slip(const hal::Vec3& to) noexcept {
+void MasterToStage::slip(const hal::Vec3& to) NONBLOCKING {
   anchor_tip_m_ += to - hand_point_m_;
   hand_point_m_ = to;
 }
 
-const hal::StageCommand& MasterToStage::filter(double dt_s) noexcept {
-  if (!(dt_s > 0)) return set_point_;
+double MasterToStage::lag_s() const NONBLOCKING {
+  const double cutoff_Hz = params_.tremor_cutoff_Hz;
+  return cutoff_Hz > 0 ? 2 * kButterworth / (2 * std::numbers::pi * cutoff_Hz) : 0;
+}
+
+const hal::StageCommand& MasterToStage::filter(double dt_s) NONBLOCKING {
+  if (!(dt_s > 0)) {
+    return set_point_;
+  }
   low_pass(set_point_.tip_m, filter_velocity_m_s_, hand_point_m_, params_.tremor_cutoff_Hz, dt_s);
   if (params_.max_tilt_rad > 0) {
     low_pass(tilt_rad_, tilt_velocity_rad_s_, tilt_wanted_rad_, params_.tremor_cutoff_Hz, dt_s);

@@ -6,32 +6,54 @@
 #pragma once
 
 #include "hal/devices.hpp"
-#include "rt/control/config.hpp"
+#include "hal/parameters.hpp"
+#include "hal/realtime.hpp"
 
 namespace punctum::rt {
 
+struct MappingParams {
+  double position_scale = 500;    // k_p: hand metres per needle metre
+  double force_scale = 1e5;       // k_f: hand newtons per needle newton
+  double tremor_cutoff_Hz = 3.0;  // second-order low-pass on the set-point; 0 = off
+  double coupling_s = 0.3;        // forces return over this after a start, a clutch, a reset
+  double max_tilt_rad = 0.1;      // the handle's orientation tilts the approach axis up to this; 0 = off
+  hal::Vec3 workspace_min_m{-280e-6, -180e-6, -60e-6};  // of the needle tip, world frame
+  hal::Vec3 workspace_max_m{280e-6, 180e-6, 60e-6};
+};
+constexpr auto keys_of(const MappingParams*) {
+  return hal::keys(hal::real("position_scale", &MappingParams::position_scale, 1, 1e5),
+                   hal::real("force_scale", &MappingParams::force_scale, 0, 1e7),
+                   hal::real("tremor_cutoff_hz", &MappingParams::tremor_cutoff_Hz, 0, 100),
+                   hal::real("max_tilt_rad", &MappingParams::max_tilt_rad, 0, 0.5),
+                   hal::real("coupling_s", &MappingParams::coupling_s, 0, 5),
+                   hal::micro_vector("workspace_min_um", &MappingParams::workspace_min_m, -1e5, 1e5),
+                   hal::micro_vector("workspace_max_um", &MappingParams::workspace_max_m, -1e5, 1e5));
+}
+
 class MasterToStage {
  public:
-  explicit MasterToStage(const MappingParams& params) noexcept : params_(params) {}
+  explicit MasterToStage(const MappingParams& params) NONBLOCKING : params_(params) {}
 
   // The needle stands still at tip_m; from here on the hand moves it relative to where the hand is now. Until
   // the needle has been tilted once, the handle's orientation counts from the identity; later from the axis
   // given.
-  void anchor(const hal::HandState& hand, const hal::Vec3& tip_m, const hal::Vec3& axis) noexcept;
-  [[nodiscard]] bool anchored() const noexcept { return anchored_; }
+  void anchor(const hal::HandState& hand, const hal::Vec3& tip_m, const hal::Vec3& axis) NONBLOCKING;
+  [[nodiscard]] bool anchored() const NONBLOCKING { return anchored_; }
 
   // One tick. coupled = false (clutch): the hand moves freely, hand_point() stays. tilting = false: the axis
   // stays.
-  void step(const hal::HandState& hand, bool coupled, bool tilting) noexcept;
+  void step(const hal::HandState& hand, bool coupled, bool tilting) NONBLOCKING;
 
   // Moves the anchor so that hand_point() is `to`: at a limit the hand slips, nothing winds up.
-  void slip(const hal::Vec3& to) noexcept;
+  void slip(const hal::Vec3& to) NONBLOCKING;
 
   // Advances the tremor filter towards hand_point() and returns it. Call once per tick, after slip().
-  const hal::StageCommand& filter(double dt_s) noexcept;
+  const hal::StageCommand& filter(double dt_s) NONBLOCKING;
 
-  [[nodiscard]] const hal::Vec3& hand_point() const noexcept { return hand_point_m_; }
-  [[nodiscard]] const hal::StageCommand& set_point() const noexcept { return set_point_; }
+  // How long set_point() is behind a hand_point() that moves steadily.
+  [[nodiscard]] double lag_s() const NONBLOCKING;
+  [[nodiscard]] const hal::Vec3& hand_point() const NONBLOCKING { return hand_point_m_; }
+  [[nodiscard]] const hal::StageCommand& set_point() const NONBLOCKING { return set_point_; }
 
  private:
   MappingParams params_;

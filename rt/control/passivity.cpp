@@ -3,50 +3,86 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hal/math/elementary.hpp"
 #include "rt/control/device_limits.hpp"
 
 namespace punctum::rt {
 namespace {
 
-constexpr double kCompensation = 2;    // of K (T/2 + t_d): half of it may be lost to the velocity's delay
-constexpr double kDamperShare = 0.5;   // of the damping that the device can render
-constexpr double kForget_s = 0.1;      // dissipation counts this long
-constexpr double kSurplusStays_s = 5;  // and surplus this long
-constexpr double kRest_s = 0.3;        // or this long while the handle is given nothing
-constexpr double kTakeBack_s = 0.02;   // the damper aims to take surplus back within this
+// Of K (T/2 + t_d): the rest makes up for the velocity's lag; more of it would cost a hand over 1 % of its
+// work.
+constexpr double kCompensation = 1.1;
+// As much more of the velocity above the hand's own motion, 10 Hz: a chatter between two counts of the
+// encoder is seen late and by half.
+constexpr double kFastCompensation = 0.9;
+constexpr double kSlow_s = 0.016;
+// Of the damping that the device can render: the limit leaves out quantisation and a spring beside it.
+constexpr double kDamperShare = 0.5;
+// Dissipation counts as long as the slowest oscillation that it may belong to takes for a turn, 10 Hz.
+constexpr double kForget_s = 0.1;
+// Surplus is remembered over several turns of a handle that swings to and fro between a push and a wall ...
+constexpr double kSurplusStays_s = 5;
+// ... and over a pause between two motions of a hand that is given nothing.
+constexpr double kRest_s = 0.3;
+// The damper takes surplus back within a quarter of a turn of the 10 Hz above.
+constexpr double kTakeBack_s = 0.02;
+// A handle that has rested goes its first step at the end of the time: the force lately acted.
+constexpr double kStep_s = 0.002;
+// It rises over a few ticks: a step of the damper is a step of the force.
 constexpr double kDamperRise_s = 0.002;
-constexpr double kLower_s = 0.5;     // the gain falls over this while surplus stays
-constexpr double kMeanPeriod_s = 5;  // over which the kept period is averaged
-constexpr double kSingleDelay = 8;   // periods: a longer one is an event of its own, not a rate
-constexpr double kLate = 1.5;        // kept periods: from here on an interval's surplus is kept apart
+// The gain falls more slowly than the damper works, so that it falls only where the damper does not suffice.
+constexpr double kLower_s = 0.5;
+// The mean period holds some tens of lost ticks, so that each of them moves the stiffness by a percent at
+// most.
+constexpr double kMeanPeriod_s = 5;
+// Periods: a longer interval is an event of its own, not a rate.
+constexpr double kSingleDelay = 8;
+// The kept period steps up when its mean exceeds it by more than the mean's own ripple ...
+constexpr double kPeriodUp = 1.03;
+// ... to this above the mean, so that it rarely steps again: more than the jitter of the ticks (20 %), ...
+constexpr double kPeriodReserve = 1.25;
+// ... steps back when the mean is so far below that it will not step up at once (kPeriodReserve squared), ...
+constexpr double kPeriodDown = 1.6;
+// ... and to the nominal one when hardly a tick is late.
+constexpr double kOnTime = 1.005;
+// The stiffness that follows from it moves within this, without a click.
+constexpr double kPeriodUp_s = 0.1;
+// Periods, halfway between one and two: the surplus of a longer interval is kept apart until it is taken.
+constexpr double kLate = 1.5;
+// The velocity is hardly known just after it: the damper aims at half as much again.
 constexpr double kLateReserve = 1.5;
-constexpr double kPeriodUp = 1.03;       // the kept period steps up when its mean exceeds it by this ...
-constexpr double kPeriodReserve = 1.25;  // ... to this above the mean, so that it rarely steps again,
-constexpr double kPeriodDown = 1.6;      // steps back when the mean is this far below
-constexpr double kOnTime = 1.005;        // or the nominal one, to this
-constexpr double kPeriodUp_s = 0.1;      // the stiffness that follows from it moves without a click
-constexpr double kPhase = 0.6;           // rad
-constexpr double kFaster = 2.5;          // poles of the guard's velocity, over the fastest oscillation
+// A force that changes more slowly, as it fades in, is not held up by a limit of its rate.
+constexpr double kSlowest_N_s = 200;
+// Of kAllowed_J: so much the handle is left; at the other end as much is kept for what is on its way.
+constexpr double kUnnoticed = 0.25;
+// Rad of lag, 35 degrees: a damper with more of it hardly damps.
+constexpr double kPhase = 0.6;
+// Poles of the guard's velocity over the fastest oscillation, so that its lag there is within kPhase.
+constexpr double kFaster = 2.5;
+// Below what a finger feels: the work of such a force within an encoder step is no surplus.
 constexpr double kSteadyForce_N = 0.02;
 
-[[nodiscard]] bool finite(const GuardInput& in) noexcept {
+[[nodiscard]] bool finite(const GuardInput& in) NONBLOCKING {
   bool good = in.position_m.allFinite() && in.dissipative_N.allFinite() && in.active_N.allFinite() &&
               std::isfinite(in.stiffness_N_m) && std::isfinite(in.damping_Ns_m) &&
-              std::isfinite(in.elapsed_s) && in.elapsed_s > 0;
-  for (const Storing& s : in.storing) good = good && s.force_N.allFinite() && s.point_m.allFinite();
+              std::isfinite(in.elapsed_s) && in.elapsed_s > 0 && std::isfinite(in.stored_J) &&
+              std::isfinite(in.between_s);
+  for (const StoringForce& s : in.storing) {
+    good = good && s.force_N.allFinite() && s.point_m.allFinite();
+  }
   return good;
 }
 
-[[nodiscard]] double square(double x) noexcept { return x * x; }
-[[nodiscard]] double cube(double x) noexcept { return x * x * x; }
+[[nodiscard]] double square(double x) NONBLOCKING { return x * x; }
+[[nodiscard]] double cube(double x) NONBLOCKING { return x * x * x; }
 
 // Where the Kalman filter's poles are, and the jerk that puts them there; velocity.hpp.
-[[nodiscard]] double poles_rad_s(const VelocityParams& velocity, double T_s) noexcept {
-  return std::cbrt(velocity.jerk_m_s3_rtHz / velocity.d_m * std::sqrt(12 / T_s));
+[[nodiscard]] double poles_rad_s(const VelocityParams& velocity, double T_s) NONBLOCKING {
+  return math::cbrt(velocity.jerk_m_s3_rtHz / velocity.d_m * std::sqrt(12 / T_s));
 }
 
 // Up to here the effects' velocity is some 45 degrees behind at most, and damps a spring.
-[[nodiscard]] double in_phase_rad_s(const VelocityParams& velocity, double T_s) noexcept {
+[[nodiscard]] double in_phase_rad_s(const VelocityParams& velocity, double T_s) NONBLOCKING {
   const bool foaw = velocity.method == VelocityParams::Method::foaw;
   const double lag_s = velocity.smooth_s + (foaw ? 0.5 * at_rate(velocity, 1 / T_s).window * T_s
                                                  : 1 / poles_rad_s(velocity, T_s));
@@ -54,8 +90,8 @@ constexpr double kSteadyForce_N = 0.02;
 }
 
 // The guard's own velocity follows the fastest oscillation that the passive stiffness allows.
-[[nodiscard]] VelocityParams fast_enough(const HandDevice& device, double T_s,
-                                         double stiffness_N_m) noexcept {
+[[nodiscard]] VelocityParams fast_enough(const HandDevice& device, double T_s, double stiffness_N_m)
+    NONBLOCKING {
   VelocityParams own;
   own.d_m = std::max(device.encoder_step_m, 1e-6);
   const double wanted_rad_s = kFaster * std::sqrt(stiffness_N_m / device.mass_kg);
@@ -64,78 +100,68 @@ constexpr double kSteadyForce_N = 0.02;
 }
 
 // Moves towards `to` with time constant tau_s.
-void approach(double& x, double to, double dt_s, double tau_s) noexcept {
+template <class T>
+void approach(T& x, const T& to, double dt_s, double tau_s) NONBLOCKING {
   x += (to - x) * std::min(1.0, dt_s / tau_s);
 }
 
 }  // namespace
 
-PassivityGuard::PassivityGuard(const GuardParams& params, const HandDevice& device,
-                               const VelocityParams& velocity, double rate_Hz) noexcept
-    : params_(params),
-      device_(device),
-      T_s_(1 / rate_Hz),
-      own_(fast_enough(device, T_s_, params.margin * passive_stiffness_N_m(device, T_s_))),
-      velocity_(own_, T_s_),
-      own_stable_Ns_m_(stable_damping_Ns_m(device, T_s_, own_)),
-      stable_Ns_m_(stable_damping_Ns_m(device, T_s_, velocity)),
-      in_phase_N_m_(device.mass_kg * square(in_phase_rad_s(velocity, T_s_))),
-      reserved_s_(T_s_),
-      kept_s_(T_s_),
-      mean_s_(T_s_) {
-  written_N_.fill(hal::Vec3::Zero());
+PassivityGuard::Period::Period(double nominal_s) NONBLOCKING : nominal_s_(nominal_s),
+                                                               mean_s_(nominal_s),
+                                                               reserved_s_(nominal_s),
+                                                               kept_s_(nominal_s) {
+  last_s_.fill(0);
 }
 
-double PassivityGuard::delay_s() const noexcept { return (0.5 + device_.delay_ticks) * kept_s_; }
+void PassivityGuard::Period::follow(double interval_s, double recover_s) NONBLOCKING {
+  // A period that is never kept is another period, at once.
+  newest_ = (newest_ + 1) % last_s_.size();
+  last_s_[newest_] = interval_s;
+  const double least_s = *std::min_element(last_s_.begin(), last_s_.end());
+  if (least_s > kPeriodReserve * mean_s_) {
+    mean_s_ = reserved_s_ = least_s;
+    kept_s_ = std::max(kept_s_, least_s);
+  }
 
-double PassivityGuard::allowed_stiffness_N_m() const noexcept {
-  return params_.margin * passive_stiffness_N_m(device_, kept_s_);
-}
-
-// What a few encoder steps come to.
-double PassivityGuard::real_J(const GuardInput& in) const noexcept {
-  return device_.encoder_step_m * (2 * gain_ * in.stored_N().norm() + kSteadyForce_N);
-}
-
-void PassivityGuard::follow_period(double elapsed_s) noexcept {
-  const double counted_s = std::min(elapsed_s, kSingleDelay * T_s_);
+  const double counted_s = std::min(interval_s, kSingleDelay * mean_s_);
   approach(mean_s_, counted_s, counted_s, kMeanPeriod_s);
-  if (mean_s_ < kOnTime * T_s_) {
-    reserved_s_ = T_s_;
+  if (mean_s_ < kOnTime * nominal_s_) {
+    reserved_s_ = nominal_s_;
   } else if (mean_s_ > kPeriodUp * reserved_s_ || kPeriodDown * mean_s_ < reserved_s_) {
     reserved_s_ = kPeriodReserve * mean_s_;
   }
-  approach(kept_s_, reserved_s_, counted_s, reserved_s_ > kept_s_ ? kPeriodUp_s : params_.recover_s);
+  approach(kept_s_, reserved_s_, counted_s, reserved_s_ > kept_s_ ? kPeriodUp_s : recover_s);
 }
 
-// The exact work of the held force over the last interval, less what the storing effects took up in it (the
-// trapezoid of their force as rendered, which no path or parameter of theirs enters), less what half an
-// encoder step of error at either end can pretend.
-void PassivityGuard::observe(const GuardInput& in) noexcept {
-  const auto ago = static_cast<std::size_t>(device_.delay_ticks);
-  const hal::Vec3& acted_N = written_N_[(newest_ + kRing - ago) % kRing];
-  const double given_J = acted_N.dot(in.position_m - position_m_);
-  double more_J = given_J;
-  for (std::size_t i = 0; i < in.storing.size(); ++i) {
-    const hal::Vec3 force_N = 0.5 * (stored_[i].force_N + gain_ * in.storing[i].force_N);
-    more_J -= force_N.dot(in.storing[i].point_m - stored_[i].point_m);
-  }
-  more_J -= 0.5 * device_.encoder_step_m * (acted_N - acted_N_).lpNorm<1>();
-  if (surplus_J_ < 0) approach(surplus_J_, 0, in.elapsed_s, kForget_s);
-  acted_N_ = acted_N;
-  if (!std::isfinite(more_J)) return;
-  approach(given_J_, 0, in.elapsed_s, kForget_s);
-  given_J_ += given_J;
-  surplus_J_ += more_J;
-  if (in.elapsed_s > kLate * kept_s_) late_J_ += kLateReserve * std::max(more_J, 0.0);
+PassivityGuard::PassivityGuard(const GuardParams& params, const HandDevice& device,
+                               const VelocityParams& velocity, double rate_Hz) NONBLOCKING
+    : params_(params),
+      device_(device),
+      T_s_(1 / rate_Hz),
+      own_(fast_enough(device, T_s_, params.margin* passive_stiffness_N_m(device, T_s_))),
+      velocity_(own_, T_s_),
+      own_stable_Ns_m_(stable_damping_Ns_m(device, T_s_, own_)),
+      stable_Ns_m_(stable_damping_Ns_m(device, T_s_, velocity)),
+      in_phase_N_m_(device.mass_kg* square(in_phase_rad_s(velocity, T_s_))),
+      tick_(T_s_),
+      sample_(T_s_) {}
+
+// A position is held for the samples' period and its force comes late by ticks.
+double PassivityGuard::delay_s() const NONBLOCKING {
+  return 0.5 * sample_.kept_s() + device_.delay_ticks * tick_.kept_s();
 }
 
-hal::Vec3 PassivityGuard::step(const GuardInput& in) noexcept {
-  active_N_.setZero();
-  if (!finite(in)) return in.wanted_N();
-  active_N_ = in.active_N;
-  follow_period(in.elapsed_s);
+double PassivityGuard::allowed_stiffness_N_m() const NONBLOCKING {
+  return params_.margin * device_.damping_Ns_m / delay_s();
+}
 
+// What a few encoder steps come to.
+double PassivityGuard::real_J(const GuardInput& in) const NONBLOCKING {
+  return device_.encoder_step_m * (2 * gain_ * in.stored_N().norm() + kSteadyForce_N);
+}
+
+void PassivityGuard::lower_gain(const GuardInput& in) NONBLOCKING {
   const double stiffness = std::max(in.stiffness_N_m, 0.0);
   const double passive = allowed_stiffness_N_m();
   const double passive_gain = stiffness > passive ? passive / stiffness : 1;
@@ -144,53 +170,207 @@ hal::Vec3 PassivityGuard::step(const GuardInput& in) noexcept {
   } else {
     approach(stiff_gain_, passive_gain, in.elapsed_s, params_.recover_s);
   }
-  gain_ = std::min(stiff_gain_, surplus_gain_);
-  if (!first_) observe(in);
+  gain_ = std::min(stiff_gain_ * net_gain_, surplus_gain_);
+}
 
-  const hal::Vec3 v = velocity_.step(in.position_m, in.elapsed_s);
-  const double rendered = gain_ * stiffness;
-  const double reserve = kDamperShare * (T_s_ / kept_s_);
+void PassivityGuard::forget_interval() NONBLOCKING {
+  since_s_ = 0;
+  acted_Ns_ = {};
+  taken_up_J_ = 0;
+}
 
-  // Effects' damping that the device can render, and that a spring of this stiffness leaves in phase.
-  const double in_phase = rendered > in_phase_N_m_ ? square(in_phase_N_m_ / rendered) : 1;
-  const double most = reserve * stable_Ns_m_ * in_phase;
-  const double share = in.damping_Ns_m > most ? most / in.damping_Ns_m : 1;
+// What the storing effects took up in the last interval: the trapezoid of their force as rendered, which no
+// path or parameter of theirs enters.
+void PassivityGuard::observe_tick(const GuardInput& in) NONBLOCKING {
+  const auto ago = static_cast<std::size_t>(device_.delay_ticks);
+  const Forces& acted = written_[(newest_ + kRing - ago) % kRing];
+  acted_Ns_.passive_N += in.elapsed_s * acted.passive_N;
+  acted_Ns_.active_N += in.elapsed_s * acted.active_N;
+  acted_Ns_.stored_J = acted.stored_J;
+  for (std::size_t i = 0; i < in.storing.size(); ++i) {
+    const hal::Vec3 force_N = 0.5 * (last_storing_[i].force_N + gain_ * in.storing[i].force_N);
+    taken_up_J_ += force_N.dot(in.storing[i].point_m - last_storing_[i].point_m);
+  }
+}
 
-  const double bound = reserve * own_stable_Ns_m_;
-  const double compensation = std::min(kCompensation * rendered * delay_s(), bound);
-  const double room = std::max(0.0, bound - share * in.damping_Ns_m - compensation);
+// The work of the written forces between two samples, less what half an encoder step of error at either end
+// can pretend: it is surplus where it exceeds what the storing effects took up, and goes to the net account.
+void PassivityGuard::observe_sample(const GuardInput& in) NONBLOCKING {
+  const hal::Vec3 moved_m = in.position_m - position_m_;
+  const hal::Vec3 acted_N = acted_Ns_.passive_N / since_s_;
+  const double given_J = acted_N.dot(moved_m);
+  const double pretended_J = 0.5 * device_.encoder_step_m * (acted_N - acted_N_).lpNorm<1>();
+  const double more_J = given_J - taken_up_J_ - pretended_J;
+  const double active_J = acted_Ns_.active_N.dot(moved_m) / since_s_;
+  if (surplus_J_ < 0) {
+    approach(surplus_J_, 0.0, since_s_, kForget_s);
+  }
+  acted_N_ = acted_N;
+  if (!std::isfinite(more_J) || !std::isfinite(active_J)) {
+    return;
+  }
+  approach(given_J_, 0.0, since_s_, kForget_s);
+  given_J_ += given_J;
+  surplus_J_ += more_J;
+  if (since_s_ > kLate * sample_.kept_s()) {
+    late_J_ += kLateReserve * std::max(more_J, 0.0);
+  }
+
+  account(in, moved_m, acted_N);
+
+  active_J_ = std::max(0.0, active_J_ + active_J - kActive_W * since_s_);
+  active_gain_ = std::clamp(2 * (1 - active_J_ / kActive_J), 0.0, 1.0);
+}
+
+// The net account. Between two steps of a coordinate the mean force acted on the way between the places where
+// it stepped. An encoder that steps by one count after a while is where two counts meet, not in the middle of
+// the new one: a handle that trembles about that place goes no way and gets nothing.
+void PassivityGuard::account(const GuardInput& in, const hal::Vec3& moved_m, const hal::Vec3& acted_N)
+    NONBLOCKING {
+  double given_J = 0, given_W = 0;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    Way& way = way_[static_cast<std::size_t>(i)];
+    way.since_s += since_s_;
+    ++way.samples;
+    approach(way.acted_N, acted_N[i], since_s_, std::min(way.since_s, kStep_s));
+    const double step_m = moved_m[i];
+    if (step_m == 0) {
+      continue;
+    }
+    const bool by_one = std::abs(step_m) < 1.5 * device_.encoder_step_m;
+    const double at_m = in.position_m[i] - (by_one ? 0.5 * step_m * (1 - 1.0 / way.samples) : 0);
+    const double work_J = (by_one ? way.acted_N : acted_N[i]) * (at_m - way.at_m);
+    given_J += work_J;
+    given_W += work_J / way.since_s;
+    way = {at_m};
+  }
+  net_J_ = std::min(net_J_ - given_J, std::max(gain_ * in.stored_J, acted_Ns_.stored_J));
+  if (net_J_ < 0) {
+    net_J_ = std::min(0.0, net_J_ + kAllowed_W * since_s_);
+  }
+  // As much again, over hold and delay, is on its way already, and what a limit of the force's rate leaves.
+  const double falls_s = slowness_s_N_ * written_[newest_].passive_N.norm();
+  const double coming_s = sample_.kept_s() + device_.delay_ticks * tick_.kept_s() + 0.5 * falls_s;
+  const double soon_J = net_J_ - std::max(given_W, 0.0) * coming_s;
+  const double most = std::clamp(2 * (1 - kUnnoticed + soon_J / kAllowed_J), 0.0, 1.0);
+  approach(net_gain_, 1.0, since_s_, params_.recover_s);
+  // A handle that presses in meets the passive stiffness from where it is: no effect falls away under it.
+  const double wanted_N = in.stored_N().norm();
+  const double room_N_m = allowed_stiffness_N_m() - gain_ * std::max(in.stiffness_N_m, 0.0);
+  if (given_J < 0 && room_N_m > 0 && wanted_N > 0) {
+    net_gain_ += room_N_m * moved_m.norm() / (stiff_gain_ * wanted_N);
+  }
+  net_gain_ = std::min(net_gain_, most);
+}
+
+// The damper beside the springs and against surplus, of a new sample. share: of the effects' damping that is
+// rendered.
+void PassivityGuard::damp(const GuardInput& in, double share) NONBLOCKING {
+  const hal::Vec3 v = velocity_.step(in.position_m, in.between_s > 0 ? in.between_s : since_s_);
+  const double bound = kDamperShare * (T_s_ / sample_.kept_s()) * own_stable_Ns_m_;
+  const double stiffness = gain_ * std::max(in.stiffness_N_m, 0.0);
+  const double compensation = std::min(kCompensation * stiffness * delay_s(), bound);
+  const double fast = std::min(kFastCompensation / kCompensation * compensation, bound - compensation);
+  const double room = std::max(0.0, bound - share * in.damping_Ns_m - compensation - fast);
+  approach(slow_m_s_, v, since_s_, kSlow_s);
   const double speed2 = v.squaredNorm();
-  const double to_take_J = std::max(surplus_J_ - kSteadyForce_N * device_.encoder_step_m, late_J_);
+  const double to_take_J = std::max(
+      {surplus_J_ - kSteadyForce_N * device_.encoder_step_m, late_J_, -net_J_ - kUnnoticed * kAllowed_J});
   const double wanted = to_take_J > 0 && speed2 > 0 ? to_take_J / (kTakeBack_s * speed2) : 0;
-  approach(taking_Ns_m_, std::min(wanted, room), in.elapsed_s, kDamperRise_s);
+  approach(taking_Ns_m_, std::min(wanted, room), since_s_, kDamperRise_s);
   taking_Ns_m_ = std::min(taking_Ns_m_, room);
-  late_J_ = std::max(0.0, late_J_ - taking_Ns_m_ * speed2 * in.elapsed_s);
+  late_J_ = std::max(0.0, late_J_ - taking_Ns_m_ * speed2 * since_s_);
 
   // Where the damper cannot suffice, stiffness falls. A late needle leaves surplus at a handle that rests:
   // the stage has paid for it, and nothing is given back yet.
   const bool at_its_bound = wanted > room && taking_Ns_m_ >= 0.95 * (room - 0.05 * bound);
   const bool gives = given_J_ > real_J(in);
   if (surplus_J_ > real_J(in) && at_its_bound && gives) {
-    surplus_gain_ *= 1 - std::min(0.5, in.elapsed_s / kLower_s);
+    surplus_gain_ *= 1 - std::min(0.5, since_s_ / kLower_s);
   } else {
-    approach(surplus_gain_, 1, in.elapsed_s, params_.recover_s);
+    approach(surplus_gain_, 1.0, since_s_, params_.recover_s);
   }
   const double stays_s = gives ? kSurplusStays_s : kRest_s;
-  if (surplus_J_ > 0) approach(surplus_J_, 0, in.elapsed_s, stays_s);
-  approach(late_J_, 0, in.elapsed_s, stays_s);
+  if (surplus_J_ > 0) {
+    approach(surplus_J_, 0.0, since_s_, stays_s);
+  }
+  approach(late_J_, 0.0, since_s_, stays_s);
 
-  first_ = false;
-  position_m_ = in.position_m;
-  stored_ = in.storing;
-  for (Storing& s : stored_) s.force_N *= gain_;
-  damper_Ns_m_ = compensation + taking_Ns_m_;
-  damper_N_ = -damper_Ns_m_ * v;
-  return gain_ * in.stored_N() + share * in.dissipative_N + in.active_N + damper_N_;
+  damper_Ns_m_ = compensation + fast + taking_Ns_m_;
+  damper_N_ = -damper_Ns_m_ * v + fast * slow_m_s_;
 }
 
-void PassivityGuard::wrote(const hal::Vec3& force_N) noexcept {
+hal::Vec3 PassivityGuard::step(const GuardInput& in) NONBLOCKING {
+  asked_ = {};
+  if (!finite(in)) {
+    return in.wanted_N();
+  }
+  if (in.begins) {
+    first_ = true;
+    velocity_.restart();
+    forget_interval();
+  }
+  elapsed_s_ = in.elapsed_s;
+  tick_.follow(in.elapsed_s, params_.recover_s);
+  since_s_ += in.elapsed_s;
+  if (in.fresh) {
+    sample_.follow(in.between_s > 0 ? in.between_s : since_s_, params_.recover_s);
+  }
+  lower_gain(in);
+  if (!first_) {
+    observe_tick(in);
+    if (in.fresh) {
+      observe_sample(in);
+    }
+  }
+
+  // Effects' damping that the device can render, and that a spring of this stiffness leaves in phase.
+  const double rendered = gain_ * std::max(in.stiffness_N_m, 0.0);
+  const double in_phase = rendered > in_phase_N_m_ ? square(in_phase_N_m_ / rendered) : 1;
+  const double most = kDamperShare * (T_s_ / sample_.kept_s()) * stable_Ns_m_ * in_phase;
+  const double share = in.damping_Ns_m > most ? most / in.damping_Ns_m : 1;
+  if (in.fresh) {
+    damp(in, share);
+    if (first_) {
+      way_ = {Way{in.position_m.x()}, Way{in.position_m.y()}, Way{in.position_m.z()}};
+    }
+    first_ = false;
+    position_m_ = in.position_m;
+    forget_interval();
+  }
+
+  last_storing_ = in.storing;
+  for (StoringForce& s : last_storing_) {
+    s.force_N *= gain_;
+  }
+  asked_.passive_N = gain_ * in.stored_N() + share * in.dissipative_N + damper_N_;
+  asked_.active_N = active_gain_ * in.active_N;
+  asked_.stored_J = gain_ * in.stored_J;
+  return asked_.passive_N + asked_.active_N;
+}
+
+void PassivityGuard::wrote(const hal::Vec3& force_N) NONBLOCKING {
+  const hal::Vec3 before_N = written_[newest_].passive_N + written_[newest_].active_N;
   newest_ = (newest_ + 1) % kRing;
-  written_N_[newest_] = force_N.allFinite() ? hal::Vec3(force_N - active_N_) : hal::Vec3::Zero();
+  written_[newest_] = {};
+  if (force_N.allFinite()) {
+    // More than a step behind what was asked, at the same rate twice: that is its limit.
+    const double step_N = (force_N - before_N).norm();
+    const bool behind = (asked_.passive_N + asked_.active_N - force_N).norm() > step_N;
+    const double rate_N_s = behind && step_N > kSlowest_N_s * elapsed_s_ ? step_N / elapsed_s_ : 0;
+    if (rate_N_s > 0 && std::abs(rate_N_s - rate_N_s_) < 0.01 * rate_N_s) {
+      slowness_s_N_ = 1 / rate_N_s;
+    } else {
+      approach(slowness_s_N_, 0.0, elapsed_s_, params_.recover_s);
+    }
+    rate_N_s_ = rate_N_s;
+    // A limit takes the same part of both.
+    const double asked_N = (asked_.passive_N + asked_.active_N).norm();
+    const double written_N = force_N.norm();
+    const hal::Vec3 active_N =
+        written_N < asked_N ? hal::Vec3(written_N / asked_N * asked_.active_N) : asked_.active_N;
+    written_[newest_] = {force_N - active_N, active_N, asked_.stored_J};
+  }
 }
 
 }  // namespace punctum::rt

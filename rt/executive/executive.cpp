@@ -7,12 +7,12 @@ namespace {
 
 constexpr auto kRelaxed = std::memory_order_relaxed;
 
-void bump(Word& word, std::uint64_t by = 1) noexcept { word.store(word.load(kRelaxed) + by, kRelaxed); }
+void bump(Word& word, std::uint64_t by = 1) NONBLOCKING { word.store(word.load(kRelaxed) + by, kRelaxed); }
 
 }  // namespace
 
 Executive::Executive(hal::Clock& clock, const hal::Clock& stopwatch, const ExecutiveConfig& config,
-                     std::span<const Slot> slots, CoreStatus& status) noexcept
+                     std::span<const Slot> slots, CoreStatus& status) NONBLOCKING
     : clock_(clock),
       stopwatch_(stopwatch),
       config_(config),
@@ -20,14 +20,16 @@ Executive::Executive(hal::Clock& clock, const hal::Clock& stopwatch, const Execu
       status_(status),
       window_(config.overrun_window_ticks) {}
 
-bool Executive::valid() const noexcept {
-  if (config_.period_ns <= 0 || slots_.empty() || slots_.size() > kMaxSlots) return false;
+bool Executive::valid() const NONBLOCKING {
+  if (config_.period_ns <= 0 || slots_.empty() || slots_.size() > kMaxSlots) {
+    return false;
+  }
   return std::all_of(slots_.begin(), slots_.end(), [](const Slot& s) {
     return s.run != nullptr && s.divisor >= 1 && s.offset < s.divisor;
   });
 }
 
-void Executive::announce() noexcept {
+void Executive::announce() NONBLOCKING {
   for (std::size_t i = 0; i < slots_.size(); ++i) {
     status_.slots[i].name.set(slots_[i].name);
     status_.slots[i].divisor.store(slots_[i].divisor, kRelaxed);
@@ -39,23 +41,29 @@ void Executive::announce() noexcept {
 }
 
 // The release this wake-up stands for: the newest one that has passed.
-std::uint64_t Executive::index_after_wake(std::uint64_t planned, std::int64_t wake_ns) const noexcept {
-  if (wake_ns < release_ns(planned)) return planned;
+std::uint64_t Executive::index_after_wake(std::uint64_t planned, std::int64_t wake_ns) const NONBLOCKING {
+  if (wake_ns < release_ns(planned)) {
+    return planned;
+  }
   return static_cast<std::uint64_t>((wake_ns - start_ns_) / config_.period_ns);
 }
 
 // The first release that still lies ahead: one that passed while the slots ran is skipped, not made up for.
-std::uint64_t Executive::next_release_after(std::uint64_t index, std::int64_t now_ns) const noexcept {
-  if (now_ns <= release_ns(index + 1)) return index + 1;
+std::uint64_t Executive::next_release_after(std::uint64_t index, std::int64_t now_ns) const NONBLOCKING {
+  if (now_ns <= release_ns(index + 1)) {
+    return index + 1;
+  }
   return static_cast<std::uint64_t>((now_ns - start_ns_ + config_.period_ns - 1) / config_.period_ns);
 }
 
-After Executive::run_slots(Tick& tick) noexcept {
+After Executive::run_slots(Tick& tick) NONBLOCKING {
   After after = After::go_on;
   for (std::size_t i = 0; i < slots_.size(); ++i) {
     const Slot& slot = slots_[i];
     Progress& progress = progress_[i];
-    if (tick.index < progress.due) continue;
+    if (tick.index < progress.due) {
+      continue;
+    }
     const std::uint64_t skipped = (tick.index - progress.due) / slot.divisor;
     progress.due += (skipped + 1) * slot.divisor;
     tick.period_ns = progress.ran ? std::max<std::int64_t>(tick.wake_ns - progress.last_wake_ns, 1)
@@ -66,16 +74,22 @@ After Executive::run_slots(Tick& tick) noexcept {
     SlotStatus& status = status_.slots[i];
     status.wake.add(clock_.now_ns() - tick.release_ns);
     const std::int64_t begin = stopwatch_.now_ns();
-    if (slot.run(slot.self, tick) == After::end) after = After::end;
+    if (slot.run(slot.self, tick) == After::end) {
+      after = After::end;
+    }
     status.execution.add(stopwatch_.now_ns() - begin);
     bump(status.runs);
-    if (skipped > 0) bump(status.skipped, skipped);
+    if (skipped > 0) {
+      bump(status.skipped, skipped);
+    }
   }
   return after;
 }
 
 Executive::Ended Executive::run(const std::atomic<bool>& stop) noexcept {
-  if (!valid()) return Ended::invalid;
+  if (!valid()) {
+    return Ended::invalid;
+  }
   start_ns_ = config_.start_ns ? *config_.start_ns : clock_.now_ns() + config_.period_ns;
   announce();
 
@@ -83,7 +97,9 @@ Executive::Ended Executive::run(const std::atomic<bool>& stop) noexcept {
   std::int64_t worst_ns = 0;
   for (;;) {
     clock_.sleep_until_ns(release_ns(planned));
-    if (stop.load(kRelaxed)) return Ended::by_stop_flag;
+    if (stop.load(kRelaxed)) {
+      return Ended::by_stop_flag;
+    }
 
     Tick tick;
     tick.wake_ns = clock_.now_ns();
@@ -106,7 +122,9 @@ Executive::Ended Executive::run(const std::atomic<bool>& stop) noexcept {
 
     const After after = run_slots(tick);
     status_.tick.add(stopwatch_.now_ns() - begin);
-    if (after == After::end) return Ended::by_slot;
+    if (after == After::end) {
+      return Ended::by_slot;
+    }
 
     planned = next_release_after(tick.index, clock_.now_ns());
     missed_ += planned - (tick.index + 1);

@@ -10,8 +10,9 @@
 #include <span>
 
 #include "hal/devices.hpp"
+#include "hal/realtime.hpp"
 #include "rt/executive/missed_window.hpp"
-#include "rt/station/station.hpp"
+#include "rt/station/core_status.hpp"
 
 namespace punctum::rt {
 
@@ -32,7 +33,7 @@ enum class After : std::uint8_t { go_on, end };  // end: the loop ends when this
 // slot of even indices without any run at all.
 struct Slot {
   const char* name = "";
-  After (*run)(void* self, const Tick& tick) noexcept = nullptr;
+  After (*run)(void* self, const Tick& tick) NONBLOCKING = nullptr;
   void* self = nullptr;
   std::uint32_t divisor = 1;
   std::uint32_t offset = 0;
@@ -41,11 +42,11 @@ struct Slot {
 // A slot that calls a member function: slot<&Servo::tick>("servo", servo).
 template <auto Method, class Self>
 [[nodiscard]] constexpr Slot slot(const char* slot_name, Self& self, std::uint32_t divisor = 1,
-                                  std::uint32_t offset = 0) noexcept {
-  return {
-      slot_name,
-      [](void* me, const Tick& tick) noexcept -> After { return (static_cast<Self*>(me)->*Method)(tick); },
-      &self, divisor, offset};
+                                  std::uint32_t offset = 0) NONBLOCKING {
+  return {slot_name,
+          [](void* me, const Tick& tick)
+              NONBLOCKING -> After { return (static_cast<Self*>(me)->*Method)(tick); },
+          &self, divisor, offset};
 }
 
 struct ExecutiveConfig {
@@ -61,22 +62,22 @@ class Executive {
   // The clock releases the ticks; the stopwatch times the slots (the same clock, or the machine's own clock
   // when the first is virtual). The slots must outlive the executive.
   Executive(hal::Clock& clock, const hal::Clock& stopwatch, const ExecutiveConfig& config,
-            std::span<const Slot> slots, CoreStatus& status) noexcept;
+            std::span<const Slot> slots, CoreStatus& status) NONBLOCKING;
 
   // Whole divisors and offsets, no empty slot, not too many, a period above zero.
-  [[nodiscard]] bool valid() const noexcept;
+  [[nodiscard]] bool valid() const NONBLOCKING;
 
   // The loop. A stop flag ends it before the slots of the next tick.
   Ended run(const std::atomic<bool>& stop) noexcept;
 
  private:
-  [[nodiscard]] std::int64_t release_ns(std::uint64_t index) const noexcept {
+  [[nodiscard]] std::int64_t release_ns(std::uint64_t index) const NONBLOCKING {
     return start_ns_ + static_cast<std::int64_t>(index) * config_.period_ns;
   }
-  void announce() noexcept;
-  [[nodiscard]] std::uint64_t index_after_wake(std::uint64_t planned, std::int64_t wake_ns) const noexcept;
-  [[nodiscard]] std::uint64_t next_release_after(std::uint64_t index, std::int64_t now_ns) const noexcept;
-  [[nodiscard]] After run_slots(Tick& tick) noexcept;
+  void announce() NONBLOCKING;
+  [[nodiscard]] std::uint64_t index_after_wake(std::uint64_t planned, std::int64_t wake_ns) const NONBLOCKING;
+  [[nodiscard]] std::uint64_t next_release_after(std::uint64_t index, std::int64_t now_ns) const NONBLOCKING;
+  [[nodiscard]] After run_slots(Tick& tick) NONBLOCKING;
 
   struct Progress {                 // of one slot
     std::uint64_t due = 0;          // its next release on the grid

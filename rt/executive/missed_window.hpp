@@ -5,30 +5,34 @@
 #include <array>
 #include <cstdint>
 
+#include "hal/realtime.hpp"
+
 namespace punctum::rt {
 
 class MissedWindow {
  public:
   static constexpr std::uint32_t kMaxTicks = 16384;  // 2 s at 8 kHz
 
-  explicit MissedWindow(std::uint32_t ticks) noexcept : ticks_(std::clamp(ticks, 1U, kMaxTicks)) {}
+  explicit MissedWindow(std::uint32_t ticks) NONBLOCKING : ticks_(std::clamp(ticks, 1U, kMaxTicks)) {}
 
   // Tick `index` takes place; every index since the last call was missed. Returns the count in the window
   // (index - W, index]. Indices must rise.
-  std::uint32_t advance(std::uint64_t index) noexcept {
+  std::uint32_t advance(std::uint64_t index) NONBLOCKING {
     if (index - next_ >= ticks_) {  // longer than the window: whatever was before is gone
       next_ = index - (ticks_ - 1);
     }
-    for (; next_ < index; ++next_) mark(next_, true);
+    for (; next_ < index; ++next_) {
+      mark(next_, true);
+    }
     mark(next_++, false);
     return count_;
   }
 
-  [[nodiscard]] std::uint32_t count() const noexcept { return count_; }
-  [[nodiscard]] std::uint32_t ticks() const noexcept { return ticks_; }
+  [[nodiscard]] std::uint32_t count() const NONBLOCKING { return count_; }
+  [[nodiscard]] std::uint32_t ticks() const NONBLOCKING { return ticks_; }
 
  private:
-  void mark(std::uint64_t index, bool missed) noexcept {
+  void mark(std::uint64_t index, bool missed) NONBLOCKING {
     const auto place = static_cast<std::uint32_t>(index % ticks_);  // holds index - W until now
     const std::uint64_t bit = std::uint64_t{1} << (place % 64);
     std::uint64_t& word = bits_[place / 64];

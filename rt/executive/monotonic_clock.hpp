@@ -2,12 +2,13 @@
 #pragma once
 
 #include "hal/devices.hpp"
+#include "hal/realtime.hpp"
 
 namespace punctum::rt {
 
 class MonotonicClock final : public hal::Clock {
  public:
-  [[nodiscard]] std::int64_t now_ns() const noexcept override;
+  [[nodiscard]] std::int64_t now_ns() const NONBLOCKING override;
   void sleep_until_ns(std::int64_t t_ns) noexcept override;  // signals do not shorten it
 };
 

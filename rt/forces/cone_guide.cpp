@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hal/math/elementary.hpp"
+
 namespace punctum::rt {
 namespace {
 
@@ -15,15 +17,19 @@ struct Widening {
   double value;
   double slope;
 };
-[[nodiscard]] Widening widening(double d, double e) noexcept {
+[[nodiscard]] Widening widening(double d, double e) NONBLOCKING {
   const double t = d / e;
-  if (t <= 0) return {0, 0};
-  if (t >= 1) return {d - e / 2, 1};
+  if (t <= 0) {
+    return {0, 0};
+  }
+  if (t >= 1) {
+    return {d - e / 2, 1};
+  }
   return {e * t * t * t * t * (t * (t - 3) + 2.5), smooth_step(t)};
 }
 
 // 1 in front and down to d0 behind the membrane, 0 from 2 d0 behind it.
-[[nodiscard]] Widening weight(double d, double d0) noexcept {
+[[nodiscard]] Widening weight(double d, double d0) NONBLOCKING {
   const double u = d / d0;
   const double f = 1 / (1 + u * u);
   const double slope = -2 * u / d0 * f * f;
@@ -32,17 +38,26 @@ struct Widening {
   return {f * window, slope * window + f * smooth_step_slope(t) / d0};
 }
 
+// Moves a frame towards another with time constant tau_s, without a step; the axis stays a unit vector.
+void follow_frame(FixtureFrame& frame, const FixtureFrame& target, double tau_s, double dt_s) NONBLOCKING {
+  const double part = low_pass_part(dt_s, tau_s);
+  frame.entry_m += part * (target.entry_m - frame.entry_m);
+  const hal::Vec3 turned = frame.axis + part * (target.axis - frame.axis);
+  const double length = turned.norm();
+  frame.axis = length > 1e-3 ? hal::Vec3(turned / length) : target.axis;
+}
+
 }  // namespace
 
-Pull cone_pull(const ConeParams& params, double position_scale, const FixtureFrame& frame,
-               const hal::Vec3& tip_m) noexcept {
+PotentialForce cone_pull(const ConeParams& params, double position_scale, const FixtureFrame& frame,
+                         const hal::Vec3& tip_m) NONBLOCKING {
   const hal::Vec3 V = tip_m - frame.entry_m;
   const double along = frame.axis.dot(V);
   const hal::Vec3 lateral = V - along * frame.axis;  // V - V_proj, eq. 6
   const double d = -along;
   const double r = lateral.norm();
 
-  Pull pull;
+  PotentialForce pull;
   if (params.method == ConeParams::Method::paper) {
     const double f = params.d0_m / (params.d0_m + std::max(d, 0.0));
     pull.force_N = -params.K_N_m * f * position_scale * lateral;
@@ -51,12 +66,16 @@ Pull cone_pull(const ConeParams& params, double position_scale, const FixtureFra
   }
 
   const Widening f = weight(d, params.d0_m);
-  if (f.value == 0 && f.slope == 0) return pull;
+  if (f.value == 0 && f.slope == 0) {
+    return pull;
+  }
   const Widening core = widening(d, kCoreBlend * params.d0_m);
-  const double cos_alpha = std::cos(params.alpha_rad);
-  const double tan_alpha = std::tan(params.alpha_rad);
+  const double cos_alpha = math::cos(params.alpha_rad);
+  const double tan_alpha = math::tan(params.alpha_rad);
   const double delta = (r - params.r0_m - tan_alpha * core.value) * cos_alpha;
-  if (delta <= 0) return pull;
+  if (delta <= 0) {
+    return pull;
+  }
 
   const double spring = soft_spring(delta, params.eps_m);
   const double energy = soft_spring_energy(delta, params.eps_m);
@@ -81,8 +100,10 @@ Pull cone_pull(const ConeParams& params, double position_scale, const FixtureFra
 // and f Phi' cos(alpha)/r <= 1 round the axis, where C(t) = Phi'/reach <= sqrt(t) (1-t)^(3/2) and
 // -(4t-1)(1-t)^2 <= Phi'' <= (1-3t)(1-t)^2 as far as these are < 0, > 0 (psi^2 <= 2 Phi of the plain spring,
 // >= 3/2 of it behind its ramp). s' is the slope of the core's widening, in 0 .. d0/4 only.
-double cone_stiffness_bound_N_m(const ConeParams& params) noexcept {
-  if (params.method == ConeParams::Method::paper) return params.K_N_m;
+double cone_stiffness_bound_N_m(const ConeParams& params) NONBLOCKING {
+  if (params.method == ConeParams::Method::paper) {
+    return params.K_N_m;
+  }
   struct Part {
     double f_slope;  // largest |f'| d0, and |f''| d0^2
     double f_bend;
@@ -91,7 +112,7 @@ double cone_stiffness_bound_N_m(const ConeParams& params) noexcept {
   constexpr Part kParts[] = {{0.444, 2.0, 1.875 / kCoreBlend}, {0.811, 2.0, 0}};  // 0 < d < d0/4; elsewhere
   constexpr int kSteps = 512;  // of sqrt(t), in which everything is smooth
   const double c = params.reach_m / params.d0_m;
-  const double sin_alpha = std::sin(params.alpha_rad);
+  const double sin_alpha = math::sin(params.alpha_rad);
   double largest = 1;
   for (const Part& part : kParts) {
     // No factor changes faster with sqrt(t) than this: what a maximum between two steps may be missed by.
@@ -113,33 +134,35 @@ double cone_stiffness_bound_N_m(const ConeParams& params) noexcept {
   return params.K_N_m * largest;
 }
 
-hal::Vec3 ConeGuide::step(const hal::Vec3& tip_m, const FixtureFrame& target, bool on, double dt_s) noexcept {
-  const double gain_before = ramp_.gain();
-  if (!on && gain_before == 0) {
+EffectOutput ConeGuide::step(const EffectInput& in) NONBLOCKING {
+  EffectOutput out;
+  out.point = EnergyPoint::fixture_point;
+  const bool on = in.cell_known && !in.punctured;
+  const double last_gain = ramp_.gain();
+  if (!on && last_gain == 0) {
     stored_J_ = 0;
     ramp_.set(0);
-    return hal::Vec3::Zero();
+    return out;
   }
-  double energy_before = 0;
-  if (gain_before == 0) {
+  const FixtureFrame& target = in.cell_known ? in.entry : frame_;
+  double last_energy_J = 0;
+  if (last_gain == 0) {
     frame_ = target;
   } else {
-    energy_before = gain_before * cone_pull(params_, scale_, frame_, tip_m).energy_J;
-    follow_frame(frame_, target, params_.ramp_s / 4, dt_s);
+    last_energy_J = last_gain * cone_pull(params_, scale_, frame_, in.fixture_point_m).energy_J;
+    follow_frame(frame_, target, params_.ramp_s / 4, in.dt_s);
   }
-  ramp_.step(on, params_.ramp_s, params_.ramp_s, dt_s);
-  const Pull pull = cone_pull(params_, scale_, frame_, tip_m);
+  ramp_.step(on, params_.ramp_s, params_.ramp_s, in.dt_s);
+  const PotentialForce pull = cone_pull(params_, scale_, frame_, in.fixture_point_m);
   stored_J_ = ramp_.gain() * pull.energy_J;
-  injected_J_ += stored_J_ - energy_before;
-  return ramp_.gain() * pull.force_N;
-}
+  const double last_injected_J = injected_J_;
+  injected_J_ += stored_J_ - last_energy_J;
 
-void follow_frame(FixtureFrame& frame, const FixtureFrame& target, double tau_s, double dt_s) noexcept {
-  const double part = tau_s > 0 ? 1 - std::exp(-dt_s / tau_s) : 1.0;
-  frame.entry_m += part * (target.entry_m - frame.entry_m);
-  const hal::Vec3 turned = frame.axis + part * (target.axis - frame.axis);
-  const double length = turned.norm();
-  frame.axis = length > 1e-3 ? hal::Vec3(turned / length) : target.axis;
+  out.storing_N = ramp_.gain() * pull.force_N;
+  out.stored_J = stored_J_;
+  out.injected_J = injected_J_ - last_injected_J;
+  out.stiffness_N_m = ramp_.gain() * stiffness_bound_N_m_;
+  return out;
 }
 
 }  // namespace punctum::rt

@@ -6,7 +6,7 @@
 //   U = K k_p^2 f(d) Phi(delta),  delta = (r - r_c(d)) cos(alpha),  r_c = r0 + d tan(alpha) for d > 0, r0
 //   inside
 //
-// f = 1/(1+(d/d0)^2); Phi is a soft spring over the free core that lets go far from it (half-width reach_m),
+// f = 1/(1+(d/d0)^2); Phi is a soft spring round the free core that fades far from it (half-width reach_m),
 // so that every eigenvalue of its Hessian is bounded by a small multiple of K. Being a gradient, it does no
 // work round a loop while it stands still; what it injects when it moves or is switched is counted. Exactly
 // zero deeper than 2 d0 behind the membrane. `paper` is the printed law -K f(d) r with f = d0/(d0+d), lateral
@@ -14,48 +14,61 @@
 #pragma once
 
 #include "hal/devices.hpp"
-#include "rt/control/config.hpp"
+#include "hal/parameters.hpp"
+#include "hal/realtime.hpp"
+#include "rt/forces/effect.hpp"
 #include "rt/forces/ramp.hpp"
 
 namespace punctum::rt {
 
-// Where a fixture stands: stage frame, needle scale.
-struct FixtureFrame {
-  hal::Vec3 entry_m = hal::Vec3::Zero();
-  hal::Vec3 axis = -hal::Vec3::UnitX();  // unit, into the cell
+// Cone-shaped attractive guide, eq. 6 and fig. 13.
+struct ConeParams {
+  enum class Method : std::uint8_t { potential, paper };
+  Method method = Method::potential;
+  double K_N_m =
+      150;  // at the hand, on the membrane: with the membrane's own, below 0.9 of what keeps passive
+  double d0_m = 40e-6;     // distance from the membrane at which the pull has halved (needle scale)
+  double r0_m = 1e-6;      // free radius at the membrane (needle scale)
+  double alpha_rad = 0.2;  // half-angle of the free core
+  double eps_m = 2e-6;     // width of the C1 ramp (needle scale)
+  double ramp_s = 0.2;     // moving or switching
+  double reach_m = 40e-6;  // half-width of the attraction; it fades further off (needle scale)
 };
+constexpr auto keys_of(const ConeParams*) {
+  return hal::keys(
+      hal::choice("method", &ConeParams::method, "potential", "paper"),
+      hal::real("K_N_m", &ConeParams::K_N_m, 0, 3000), hal::micro("d0_um", &ConeParams::d0_m, 0.1, 2000),
+      hal::micro("r0_um", &ConeParams::r0_m, 0, 100), hal::real("alpha_rad", &ConeParams::alpha_rad, 0, 1.2),
+      hal::micro("eps_um", &ConeParams::eps_m, 0.01, 100), hal::real("ramp_s", &ConeParams::ramp_s, 0.001, 5),
+      hal::micro("reach_um", &ConeParams::reach_m, 0.1, 5000));
+}
 
-// A hand force in world axes, and the energy stored at the hand.
-struct Pull {
-  hal::Vec3 force_N = hal::Vec3::Zero();
-  double energy_J = 0;
-};
-
-// The standing fields: pure functions of the tip (needle scale, stage frame).
-[[nodiscard]] Pull cone_pull(const ConeParams& params, double position_scale, const FixtureFrame& frame,
-                             const hal::Vec3& tip_m) noexcept;
+// The standing field: a pure function of the tip (needle scale, stage frame).
+[[nodiscard]] PotentialForce cone_pull(const ConeParams& params, double position_scale,
+                                       const FixtureFrame& frame, const hal::Vec3& tip_m) NONBLOCKING;
 
 // N/m at the hand: no eigenvalue of the standing field's Hessian is larger in magnitude. Grows as
 // (reach/d0)^2 once the attraction reaches further than it decays. Of `paper`, which has no Hessian: K, the
 // largest eigenvalue of its Jacobian. Not for the tick.
-[[nodiscard]] double cone_stiffness_bound_N_m(const ConeParams& params) noexcept;
+[[nodiscard]] double cone_stiffness_bound_N_m(const ConeParams& params) NONBLOCKING;
 
 class ConeGuide {
  public:
-  ConeGuide(const ConeParams& params, double position_scale) noexcept
-      : params_(params), scale_(position_scale), stiffness_bound_N_m_(cone_stiffness_bound_N_m(params)) {}
+  using Params = ConeParams;
 
-  // One tick: the frame follows `target` and the gain follows `on`, both ramped over ramp_s. The frame is
-  // taken over at once while the gain is zero.
-  [[nodiscard]] hal::Vec3 step(const hal::Vec3& tip_m, const FixtureFrame& target, bool on,
-                               double dt_s) noexcept;
+  ConeGuide(const ConeParams& params, const EffectSetup& setup) NONBLOCKING
+      : params_(params),
+        scale_(setup.position_scale),
+        stiffness_bound_N_m_(cone_stiffness_bound_N_m(params)) {}
 
-  [[nodiscard]] double stored_energy_J() const noexcept { return stored_J_; }
-  [[nodiscard]] double injected_energy_J() const noexcept { return injected_J_; }  // signed, cumulative
-  [[nodiscard]] const FixtureFrame& frame() const noexcept { return frame_; }
-  [[nodiscard]] double gain() const noexcept { return ramp_.gain(); }
-  // Upper bound now, at the hand, of the Hessian's eigenvalues in magnitude.
-  [[nodiscard]] double stiffness_N_m() const noexcept { return ramp_.gain() * stiffness_bound_N_m_; }
+  // On while the cell is known and not punctured: the frame follows the entry point and the gain rises or
+  // falls, both over ramp_s. The frame is taken over at once while the gain is zero.
+  [[nodiscard]] EffectOutput step(const EffectInput& in) NONBLOCKING;
+
+  [[nodiscard]] double stored_energy_J() const NONBLOCKING { return stored_J_; }
+  [[nodiscard]] double injected_energy_J() const NONBLOCKING { return injected_J_; }  // signed, cumulative
+  [[nodiscard]] const FixtureFrame& frame() const NONBLOCKING { return frame_; }
+  [[nodiscard]] double gain() const NONBLOCKING { return ramp_.gain(); }
 
  private:
   ConeParams params_;
@@ -66,8 +79,5 @@ class ConeGuide {
   double stored_J_ = 0;
   double injected_J_ = 0;
 };
-
-// Moves a frame towards another with time constant tau_s, without a step; the axis stays a unit vector.
-void follow_frame(FixtureFrame& frame, const FixtureFrame& target, double tau_s, double dt_s) noexcept;
 
 }  // namespace punctum::rt

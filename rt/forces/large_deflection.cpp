@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hal/math/elementary.hpp"
+
 namespace punctum::rt {
 namespace {
 
@@ -16,21 +18,21 @@ constexpr std::array<Coefficients, kDeflectionTerms> kCoefficients{{
 
 // From the box to -1 .. 1, by a function that is even over it.
 template <class Function>
-[[nodiscard]] double mapped(double x, double low, double high, Function even) noexcept {
+[[nodiscard]] double mapped(double x, double low, double high, Function even) NONBLOCKING {
   const double from = even(low);
   return 2 * (even(std::clamp(x, low, high)) - from) / (even(high) - from) - 1;
 }
 
-[[nodiscard]] bool between(double x, double low, double high) noexcept { return x >= low && x <= high; }
+[[nodiscard]] bool between(double x, double low, double high) NONBLOCKING { return x >= low && x <= high; }
 
 constexpr double kDeepest = 1e100;  // over R; farther counts as this
 
 }  // namespace
 
-std::array<DeflectionTerm, kDeflectionTerms> deflection_terms(const DeflectionInput& at) noexcept {
+std::array<DeflectionTerm, kDeflectionTerms> deflection_terms(const DeflectionInput& at) NONBLOCKING {
   const DeflectionInput& low = kDeflectionMin;
   const DeflectionInput& high = kDeflectionMax;
-  const auto log = [](double x) { return std::log(x); };
+  const auto log = [](double x) { return math::log(x); };
   const auto root = [](double x) { return std::sqrt(x); };
   const auto itself = [](double x) { return x; };
   const double u[] = {mapped(at.c, low.c, high.c, log),
@@ -47,7 +49,9 @@ std::array<DeflectionTerm, kDeflectionTerms> deflection_terms(const DeflectionIn
       for (int d = 0; d <= seat_top && b + c + d <= kDeflectionDegree; ++d, of_seat *= u[2]) {
         double value = of_seat;
         for (int e = 0; e <= nu_top && b + c + d + e <= kDeflectionDegree; ++e, value *= u[3]) {
-          for (int a = 0; a <= top && a + b + c + d + e <= kDeflectionDegree; ++a) terms[i++] = {a, value};
+          for (int a = 0; a <= top && a + b + c + d + e <= kDeflectionDegree; ++a) {
+            terms[i++] = {a, value};
+          }
         }
       }
     }
@@ -55,7 +59,7 @@ std::array<DeflectionTerm, kDeflectionTerms> deflection_terms(const DeflectionIn
   return terms;
 }
 
-Deflection large_deflection(const DeflectionInput& at) noexcept {
+Deflection large_deflection(const DeflectionInput& at) NONBLOCKING {
   const DeflectionInput& low = kDeflectionMin;
   const DeflectionInput& high = kDeflectionMax;
   constexpr std::size_t kPowers = kDeflectionDegrees[0] + 1;

@@ -10,6 +10,8 @@
 #include <array>
 #include <cstddef>
 
+#include "hal/realtime.hpp"
+
 namespace punctum::rt {
 
 struct DeflectionInput {
@@ -20,7 +22,8 @@ struct DeflectionInput {
   double prestrain = 0.2;  // of the undeformed sphere: turgor, and the bending a membrane has not got
 };
 
-// Calibrated between these; outside, the edge's value counts, and beyond w_max force goes on straight.
+// Calibrated between these. Outside, the value at the edge counts; beyond w_max the force goes on as a
+// straight line.
 inline constexpr DeflectionInput kDeflectionMin{0, 0.01, 0.3, 0.3, 0.05};
 inline constexpr DeflectionInput kDeflectionMax{0.6, 0.12, 0.7, 0.5, 0.4};
 
@@ -35,7 +38,7 @@ struct Deflection {
 
 // w > 0. Force, stiffness and energy are each other's exact integrals, force rises, is C1 in w > 0 and goes
 // to zero in proportion to w, as that of the full equations does.
-[[nodiscard]] Deflection large_deflection(const DeflectionInput& at) noexcept;
+[[nodiscard]] Deflection large_deflection(const DeflectionInput& at) NONBLOCKING;
 
 // The terms of the polynomials: powers of sqrt(w/w_max), and of ln c, sqrt(prestrain), seat and nu, each
 // mapped from the box to -1 .. 1; up to the fourth degree together.
@@ -49,7 +52,7 @@ struct DeflectionTerm {
   int w_power = 0;
   double value = 0;  // without the power of sqrt(w/w_max)
 };
-[[nodiscard]] std::array<DeflectionTerm, kDeflectionTerms> deflection_terms(
-    const DeflectionInput& at) noexcept;
+[[nodiscard]] std::array<DeflectionTerm, kDeflectionTerms> deflection_terms(const DeflectionInput& at)
+    NONBLOCKING;
 
 }  // namespace punctum::rt

@@ -17,12 +17,12 @@ constexpr double kSinMax = 0.999;
 constexpr double kReachMax_m = 1e150;
 constexpr double kLargest = 1e100;  // of E h and R in the corrected law: no product of theirs overflows
 
-[[nodiscard]] double saturated(double x) noexcept {
+[[nodiscard]] double saturated(double x) NONBLOCKING {
   constexpr double most = std::numeric_limits<double>::max();
   return std::clamp(x, -most, most);
 }
 
-void saturate(MembraneState& s) noexcept {
+void saturate(MembraneState& s) NONBLOCKING {
   for (double* x : {&s.force_N, &s.a_m, &s.sigma_d_Pa, &s.pressure_Pa, &s.slope, &s.pull_N, &s.stiffness_N_m,
                     &s.energy_J}) {
     *x = saturated(*x);
@@ -34,8 +34,8 @@ struct PaperPoint {
   double c, reach, a, force;
   MembraneShape<double> shape;
 };
-[[nodiscard]] PaperPoint paper_point(const MembraneParams& params, double w, double R_m,
-                                     double scale) noexcept {
+[[nodiscard]] PaperPoint paper_point(const MembraneParams& params, double w, double R_m, double scale)
+    NONBLOCKING {
   PaperPoint p{};
   p.c = std::clamp(params.c_m, kSmallest, kReachMax_m);
   p.reach = std::clamp(dimple_reach(R_m, w, scale), kSmallest, kReachMax_m);
@@ -46,7 +46,8 @@ struct PaperPoint {
 }
 
 // Integral of F dw from contact, by Gauss' rule in sqrt(w): of the closure there is no closed form.
-[[nodiscard]] double paper_energy(const MembraneParams& params, double w, double R_m, double scale) noexcept {
+[[nodiscard]] double paper_energy(const MembraneParams& params, double w, double R_m, double scale)
+    NONBLOCKING {
   constexpr double node[] = {0.04691007703066802, 0.23076534494715845, 0.5, 0.76923465505284155,
                              0.95308992296933198};
   constexpr double weight[] = {0.11846344252809454, 0.23931433524968323, 0.28444444444444444,
@@ -59,8 +60,8 @@ struct PaperPoint {
   return w * sum;
 }
 
-[[nodiscard]] MembraneState paper_law(const MembraneParams& params, double wd_m, double R_m,
-                                      double scale) noexcept {
+[[nodiscard]] MembraneState paper_law(const MembraneParams& params, double wd_m, double R_m, double scale)
+    NONBLOCKING {
   const double w = std::max(wd_m, kLinearBelow_m);
   const PaperPoint at = paper_point(params, w, R_m, scale);
   const double to_zero = wd_m / w;
@@ -85,8 +86,8 @@ struct PaperPoint {
   return s;
 }
 
-[[nodiscard]] MembraneState large_deflection_law(const MembraneParams& params, double wd_m,
-                                                 double R_m) noexcept {
+[[nodiscard]] MembraneState large_deflection_law(const MembraneParams& params, double wd_m, double R_m)
+    NONBLOCKING {
   const double R = std::clamp(R_m, kSmallest, kLargest);
   const double c = std::clamp(params.c_m / R, kSmallest, kLargest);
   const Deflection at = large_deflection({wd_m / R, c, params.seat_m / R, params.nu, params.prestrain});
@@ -112,11 +113,11 @@ struct PaperPoint {
 
 }  // namespace
 
-double dimple_reach(double R_m, double wd_m, double scale) noexcept {
+double dimple_reach(double R_m, double wd_m, double scale) NONBLOCKING {
   return scale * std::sqrt(std::clamp(2 * R_m * wd_m, 0.0, std::numeric_limits<double>::max()));
 }
 
-MembraneState membrane_law(const MembraneParams& params, double wd_m, double R_m, double scale) noexcept {
+MembraneState membrane_law(const MembraneParams& params, double wd_m, double R_m, double scale) NONBLOCKING {
   MembraneState s;
   for (const double x :
        {params.E_Pa, params.nu, params.h_m, params.c_m, params.seat_m, params.prestrain, wd_m, R_m, scale}) {
@@ -127,50 +128,80 @@ MembraneState membrane_law(const MembraneParams& params, double wd_m, double R_m
     }
   }
   s.valid = true;
-  if (wd_m <= 0) return s;
+  if (wd_m <= 0) {
+    return s;
+  }
   s = params.law == MembraneParams::Law::paper ? paper_law(params, wd_m, R_m, scale)
                                                : large_deflection_law(params, wd_m, R_m);
   saturate(s);
   return s;
 }
 
-RimForces rim_forces(const MembraneState& state, double force_N, const hal::Vec3& axis) noexcept {
+RimForces rim_forces(const MembraneState& state, double force_N, const hal::Vec3& axis) NONBLOCKING {
   RimForces out;
-  for (hal::Vec3& f : out) f.setZero();
-  if (!(force_N > 0) || !(state.force_N > 0)) return out;
+  for (hal::Vec3& f : out) {
+    f.setZero();
+  }
+  if (!(force_N > 0) || !(state.force_N > 0)) {
+    return out;
+  }
   const hal::Vec3 aside = std::abs(axis.z()) < 0.9 ? hal::Vec3::UnitZ() : hal::Vec3::UnitY();
   const hal::Vec3 e1 = axis.cross(aside).normalized();
   const hal::Vec3 e2 = axis.cross(e1);
   const double share = force_N / kRimPoints;
   const double pull = share * (state.pull_N / state.force_N);
   const std::array<hal::Vec3, kRimPoints> radial{e1, e2, -e1, -e2};
-  for (std::size_t i = 0; i < out.size(); ++i) out[i] = -share * axis + pull * radial[i];
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    out[i] = -share * axis + pull * radial[i];
+  }
   return out;
 }
 
-void Membrane::step(double wd_m, double R_m, double scale, bool punctured, double dt_s) noexcept {
-  if (punctured && !punctured_) {
+EffectOutput Membrane::step(const EffectInput& in) NONBLOCKING {
+  if (in.new_cell) {
+    punctured_ = false;
+    state_ = MembraneState{};
+  }
+  advance(in.cell_known ? in.depth_m : 0, in);
+
+  const double scale = in.fixture_gain * setup_.force_scale * in.commanded_scale;
+  double force_N = scale * state_.force_N;
+  // After the puncture the hand's force only falls, even while fixture_gain and force_fade return.
+  if (punctured_) {
+    const double last_N = last_force_N_.norm() * std::min(in.last_force_fade, in.force_fade);
+    force_N = in.force_fade > 0 ? std::min(force_N, last_N / in.force_fade) : 0;
+  }
+  last_force_N_ = -force_N * in.approach_axis;
+  rim_ = rim_forces(state_, force_N, in.approach_axis);
+
+  const double k_p = setup_.position_scale;
+  EffectOutput out;
+  out.point = EnergyPoint::needle;
+  out.storing_N = last_force_N_;
+  out.stored_J = scale * state_.energy_J * k_p;
+  out.injected_J = force_N * in.depth_correction_m * k_p;
+  out.stiffness_N_m = in.fixture_gain * in.commanded_scale * setup_.force_scale / k_p * state_.stiffness_N_m;
+  return out;
+}
+
+void Membrane::advance(double depth_m, const EffectInput& in) NONBLOCKING {
+  if (in.punctured && !punctured_) {
     punctured_ = true;
     at_puncture_ = state_;
     dropped_J_ = state_.energy_J;
     since_puncture_s_ = 0;
   }
   if (!punctured_) {
-    state_ = membrane_law(params_, wd_m, R_m, scale);
+    state_ = membrane_law(params_, depth_m, in.cell_radius_m, in.dimple_scale);
     return;
   }
-  since_puncture_s_ += std::max(dt_s, 0.0);
+  since_puncture_s_ += std::max(in.dt_s, 0.0);
   const double left = 1 - smooth_step(since_puncture_s_ / kRelease_s);
   state_ = MembraneState{};
   state_.valid = true;
   state_.force_N = at_puncture_.force_N * left;
   state_.pull_N = at_puncture_.pull_N * left;  // the vectors keep their directions while they fade
   state_.slope = at_puncture_.slope;
-}
-
-void Membrane::rearm() noexcept {
-  punctured_ = false;
-  state_ = MembraneState{};
 }
 
 }  // namespace punctum::rt

@@ -20,11 +20,35 @@
 #include <cmath>
 #include <limits>
 
-#include "hal/devices.hpp"
-#include "rt/control/config.hpp"
+#include "hal/math/elementary.hpp"
+#include "hal/parameters.hpp"
+#include "hal/realtime.hpp"
+#include "rt/forces/effect.hpp"
 #include "rt/forces/ramp.hpp"
 
 namespace punctum::rt {
+
+// With the values of the paper (Sun & Nelson 2003).
+struct MembraneParams {
+  enum class Law : std::uint8_t { large_deflection, paper };
+  Law law = Law::large_deflection;
+  double E_Pa = 35.3e3;     // elastic modulus
+  double nu = 0.5;          // Poisson ratio
+  double h_m = 4.6e-6;      // thickness
+  double c_m = 3.8e-6;      // pipette radius
+  double R_m = 60e-6;       // undeformed cell, until vision has measured it
+  double prestrain = 0.2;   // large deflection: of the undeformed membrane, by turgor
+  double seat_m = 29.5e-6;  // large deflection: radius of the patch that rests in the holding pipette or dish
+};
+constexpr auto keys_of(const MembraneParams*) {
+  return hal::keys(
+      hal::choice("law", &MembraneParams::law, "large_deflection", "paper"),
+      hal::kilo("E_kPa", &MembraneParams::E_Pa, 0.1, 1e5), hal::real("nu", &MembraneParams::nu, 0, 0.5),
+      hal::micro("h_um", &MembraneParams::h_m, 0.05, 100), hal::micro("c_um", &MembraneParams::c_m, 0.2, 50),
+      hal::micro("R_um", &MembraneParams::R_m, 5, 2000),
+      hal::real("prestrain", &MembraneParams::prestrain, 0.002, 1),
+      hal::micro("seat_um", &MembraneParams::seat_m, 1, 2000));
+}
 
 // f(zeta) and -D(zeta)/2 from s = (1-zeta^2)/(1+zeta^2) and atanh s = -ln zeta.
 template <class Real>
@@ -37,7 +61,7 @@ struct MembraneShape {
 // c > 0, reach = a - c > 0, in the same unit. Pass the difference itself: a - c of rounded numbers is what
 // limits the result near zeta = 1. A reach below 1e-70 a (float: 1e-9 a) counts as that.
 template <class Real>
-[[nodiscard]] MembraneShape<Real> membrane_shape(Real c, Real reach) noexcept {
+[[nodiscard]] MembraneShape<Real> membrane_shape(Real c, Real reach) NONBLOCKING {
   const Real a = c + reach;
   constexpr Real least = std::numeric_limits<Real>::digits > 24 ? Real(1e-70) : Real(1e-9);
   const Real zeta = std::max(c / a, std::numeric_limits<Real>::min());
@@ -60,7 +84,7 @@ template <class Real>
     }
     T = (sum[0] + s2 * sum[1]) + s4 * (sum[2] + s2 * sum[3]);
   } else {
-    T = (-std::log(zeta) - s) / (s * s * s);
+    T = (-static_cast<Real>(math::log(static_cast<double>(zeta))) - s) / (s * s * s);
   }
   const Real p = 1 + s * q * T;
   const Real s2 = s * s;
@@ -72,7 +96,7 @@ template <class Real>
 
 // 2 pi E h w^3 f / (a^2 (1-nu)), f of membrane_shape; no partial product overflows or is lost.
 template <class Real>
-[[nodiscard]] Real eq5(Real E_Pa, Real nu, Real h_m, Real wd_m, Real a_m, Real f) noexcept {
+[[nodiscard]] Real eq5(Real E_Pa, Real nu, Real h_m, Real wd_m, Real a_m, Real f) NONBLOCKING {
   int exponent = 0;
   const auto mantissa = [&exponent](Real x, int power) {
     int e = 0;
@@ -92,9 +116,13 @@ template <class Real>
 
 // Eq. 5 for a dimple of depth w and radius a, both measured. 0 for w <= 0.
 template <class Real>
-[[nodiscard]] Real membrane_force(Real E_Pa, Real nu, Real h_m, Real c_m, Real wd_m, Real a_m) noexcept {
-  if (wd_m <= 0) return 0;
-  if (a_m <= c_m || c_m < 0) return std::numeric_limits<Real>::max();
+[[nodiscard]] Real membrane_force(Real E_Pa, Real nu, Real h_m, Real c_m, Real wd_m, Real a_m) NONBLOCKING {
+  if (wd_m <= 0) {
+    return 0;
+  }
+  if (a_m <= c_m || c_m < 0) {
+    return std::numeric_limits<Real>::max();
+  }
   return eq5(E_Pa, nu, h_m, wd_m, a_m, membrane_shape(c_m, a_m - c_m).f);
 }
 
@@ -117,42 +145,53 @@ inline constexpr double kMembraneSlopeMax = 0.7;
 
 // The paper's law where only the depth is known: a = c + scale sqrt(2 R w), which makes F ~ w at contact (an
 // exponent of 3/4 or more would give a force that does not vanish there). scale may be observed by vision.
-[[nodiscard]] double dimple_reach(double R_m, double wd_m, double scale) noexcept;
+[[nodiscard]] double dimple_reach(double R_m, double wd_m, double scale) NONBLOCKING;
 
 // By params.law; `scale` is for the paper's. Exactly 0 for wd_m <= 0. R_m, scale > 0. Paper: valid = small
 // slope, thin film (h <= c), dimple smaller than the cell; large deflection: within its calibration.
-[[nodiscard]] MembraneState membrane_law(const MembraneParams& params, double wd_m, double R_m,
-                                         double scale) noexcept;
+[[nodiscard]] MembraneState membrane_law(const MembraneParams& params, double wd_m, double R_m, double scale)
+    NONBLOCKING;
 
 // The force as vectors at points of the pipette's rim, spread evenly round the axis: each has its share of
 // the axial force and of the outward pull of the membrane. Their sum is -F b.
 inline constexpr int kRimPoints = 4;
 using RimForces = std::array<hal::Vec3, kRimPoints>;
-[[nodiscard]] RimForces rim_forces(const MembraneState& state, double force_N,
-                                   const hal::Vec3& axis) noexcept;
+[[nodiscard]] RimForces rim_forces(const MembraneState& state, double force_N, const hal::Vec3& axis)
+    NONBLOCKING;
 
 // The law as it is rendered: follows the depth until the membrane is punctured, then falls monotonically to
 // zero from what it was and stays there, whatever the depth does: the energy in the dimple is dropped, never
-// given back. rearm() for a fresh membrane.
+// given back. A new cell has a new membrane.
 class Membrane {
  public:
-  explicit Membrane(const MembraneParams& params) noexcept : params_(params) {}
+  using Params = MembraneParams;
 
-  void step(double wd_m, double R_m, double scale, bool punctured, double dt_s) noexcept;
-  void rearm() noexcept;
+  Membrane(const MembraneParams& params, const EffectSetup& setup) NONBLOCKING : params_(params),
+                                                                                 setup_(setup) {
+    rim_.fill(hal::Vec3::Zero());
+  }
 
-  [[nodiscard]] const MembraneState& state() const noexcept { return state_; }  // force_N as rendered
-  [[nodiscard]] bool punctured() const noexcept { return punctured_; }
-  [[nodiscard]] double stored_energy_J() const noexcept { return state_.energy_J; }
-  [[nodiscard]] double dropped_energy_J() const noexcept { return dropped_J_; }  // at the last puncture
+  [[nodiscard]] EffectOutput step(const EffectInput& in) NONBLOCKING;
+
+  [[nodiscard]] const MembraneState& state() const NONBLOCKING {
+    return state_;
+  }  // at the needle, as rendered
+  [[nodiscard]] const RimForces& rim() const NONBLOCKING { return rim_; }  // at the hand
+  [[nodiscard]] bool punctured() const NONBLOCKING { return punctured_; }
+  [[nodiscard]] double dropped_energy_J() const NONBLOCKING { return dropped_J_; }  // at the last puncture
 
  private:
+  void advance(double depth_m, const EffectInput& in) NONBLOCKING;
+
   MembraneParams params_;
+  EffectSetup setup_;
   MembraneState state_;
   bool punctured_ = false;
   MembraneState at_puncture_;
   double since_puncture_s_ = 0;
   double dropped_J_ = 0;
+  hal::Vec3 last_force_N_ = hal::Vec3::Zero();  // at the hand
+  RimForces rim_;
 };
 
 }  // namespace punctum::rt

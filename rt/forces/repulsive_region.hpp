@@ -1,4 +1,4 @@
-// Repulsive region: a hill of potential that keeps the needle away from a place in the cell, as from the
+// Repulsive region: a hill of potential that keeps the needle away from a place in the cell, for example the
 // spindle under the polar body.
 //
 // With r the distance from its centre and rho its radius, both at needle scale, x = r^2/rho^2, at the hand:
@@ -11,33 +11,47 @@
 #pragma once
 
 #include "hal/devices.hpp"
-#include "rt/control/config.hpp"
-#include "rt/forces/cone_guide.hpp"
+#include "hal/parameters.hpp"
+#include "hal/realtime.hpp"
+#include "rt/forces/effect.hpp"
 #include "rt/forces/ramp.hpp"
 
 namespace punctum::rt {
 
+// A hill of potential that keeps the needle away from a place in the cell.
+struct RepulsiveParams {
+  hal::Vec3 offset_m{0, -40e-6, 0};  // of its centre from the cell's, world frame, needle scale
+  double radius_m = 15e-6;           // needle scale
+  double K_N_m = 150;                // at the hand, its largest stiffness
+  double ramp_s = 0.2;               // moving or switching
+};
+constexpr auto keys_of(const RepulsiveParams*) {
+  return hal::keys(hal::micro_vector("offset_um", &RepulsiveParams::offset_m, -2000, 2000),
+                   hal::micro("radius_um", &RepulsiveParams::radius_m, 0.5, 2000),
+                   hal::real("K_N_m", &RepulsiveParams::K_N_m, 0, 3000),
+                   hal::real("ramp_s", &RepulsiveParams::ramp_s, 0.001, 5));
+}
+
 // The standing field: a pure function of the tip (needle scale, stage frame).
-[[nodiscard]] Pull repulsive_push(const RepulsiveParams& params, double position_scale,
-                                  const hal::Vec3& centre_m, const hal::Vec3& tip_m) noexcept;
+[[nodiscard]] PotentialForce repulsive_push(const RepulsiveParams& params, double position_scale,
+                                            const hal::Vec3& centre_m, const hal::Vec3& tip_m) NONBLOCKING;
 
 class RepulsiveRegion {
  public:
-  RepulsiveRegion(const RepulsiveParams& params, double position_scale) noexcept
-      : params_(params), scale_(position_scale) {}
+  using Params = RepulsiveParams;
 
-  // One tick: the region follows its place in the cell and its gain follows `on`, both ramped over ramp_s.
-  [[nodiscard]] hal::Vec3 step(const hal::Vec3& tip_m, const hal::Vec3& cell_centre_m, bool on,
-                               double dt_s) noexcept;
+  RepulsiveRegion(const RepulsiveParams& params, const EffectSetup& setup) NONBLOCKING
+      : params_(params),
+        scale_(setup.position_scale) {}
 
-  [[nodiscard]] double stored_energy_J() const noexcept { return stored_J_; }
-  [[nodiscard]] double injected_energy_J() const noexcept { return injected_J_; }  // signed, cumulative
-  [[nodiscard]] double gain() const noexcept { return ramp_.gain(); }
-  [[nodiscard]] const hal::Vec3& centre_m() const noexcept { return centre_m_; }
-  // Upper bound now, at the hand, of the Hessian's eigenvalues in magnitude: 0 outside.
-  [[nodiscard]] double stiffness_N_m() const noexcept {
-    return stored_J_ > 0 ? ramp_.gain() * params_.K_N_m : 0;
-  }
+  // On while the cell is known: the region follows its place in the cell and its gain rises or falls, both
+  // over ramp_s.
+  [[nodiscard]] EffectOutput step(const EffectInput& in) NONBLOCKING;
+
+  [[nodiscard]] double stored_energy_J() const NONBLOCKING { return stored_J_; }
+  [[nodiscard]] double injected_energy_J() const NONBLOCKING { return injected_J_; }  // signed, cumulative
+  [[nodiscard]] double gain() const NONBLOCKING { return ramp_.gain(); }
+  [[nodiscard]] const hal::Vec3& centre_m() const NONBLOCKING { return centre_m_; }
 
  private:
   RepulsiveParams params_;

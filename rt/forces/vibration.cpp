@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "hal/math/elementary.hpp"
+
 namespace punctum::rt {
 namespace {
 
@@ -11,37 +13,41 @@ constexpr double kDecays = 7;  // a burst ends after as many: a thousandth is le
 
 }  // namespace
 
-Vibration::Vibration(const VibrationParams& params, int delay_ticks) noexcept
-    : params_(params), delay_(static_cast<std::size_t>(std::clamp(delay_ticks, 0, kKept - 1))) {
+Vibration::Vibration(const VibrationParams& params, const EffectSetup& setup) NONBLOCKING
+    : params_(params),
+      delay_(static_cast<std::size_t>(std::clamp(setup.force_delay_ticks, 0, kKept - 1))) {
   given_N_.fill(hal::Vec3::Zero());
 }
 
-hal::Vec3 Vibration::step(const hal::Vec3& hand_m, const hal::Vec3& axis, bool begins, double gain,
-                          double dt_s) noexcept {
-  if (seen_) {
-    const double work_J = given_N_[delay_].dot(hand_m - hand_before_m_);
+EffectOutput Vibration::step(const EffectInput& in) NONBLOCKING {
+  const double last_injected_J = injected_J_;
+  if (stepped_) {
+    const double work_J = given_N_[delay_].dot(in.handle_m - last_handle_m_);
     injected_J_ += work_J;
     burst_J_ += work_J;
   }
-  hand_before_m_ = hand_m;
-  seen_ = true;
+  last_handle_m_ = in.handle_m;
+  stepped_ = true;
 
-  since_s_ += dt_s;
-  if (begins) {
+  since_s_ += in.dt_s;
+  if (in.contact_or_puncture_begins) {
     running_ = true;
     since_s_ = 0;
     burst_J_ = 0;
   }
-  if (since_s_ > kDecays * params_.decay_s || burst_J_ > params_.energy_J) running_ = false;
+  if (since_s_ > kDecays * params_.decay_s || burst_J_ > params_.energy_J) {
+    running_ = false;
+  }
 
-  hal::Vec3 force_N = hal::Vec3::Zero();
+  EffectOutput out;
   if (running_) {
-    const double swing = std::sin(2 * std::numbers::pi * params_.frequency_Hz * since_s_);
-    force_N = params_.amplitude_N * std::exp(-since_s_ / params_.decay_s) * swing * axis;
+    const double swing = math::sin(2 * std::numbers::pi * params_.frequency_Hz * since_s_);
+    out.active_N = params_.amplitude_N * math::exp(-since_s_ / params_.decay_s) * swing * in.approach_axis;
   }
   std::copy_backward(given_N_.begin(), given_N_.end() - 1, given_N_.end());
-  given_N_.front() = gain * force_N;
-  return force_N;
+  given_N_.front() = in.force_fade * out.active_N;
+  out.injected_J = injected_J_ - last_injected_J;
+  return out;
 }
 
 }  // namespace punctum::rt

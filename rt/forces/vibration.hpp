@@ -8,21 +8,36 @@
 
 #include <array>
 
-#include "hal/devices.hpp"
-#include "rt/control/config.hpp"
+#include "hal/parameters.hpp"
+#include "hal/realtime.hpp"
+#include "rt/forces/effect.hpp"
 
 namespace punctum::rt {
 
+// A burst that marks contact and puncture.
+struct VibrationParams {
+  double frequency_Hz = 150;
+  double amplitude_N = 0.15;
+  double decay_s = 0.03;
+  double energy_J = 50e-6;  // of one burst: it ends once it has given more
+};
+constexpr auto keys_of(const VibrationParams*) {
+  return hal::keys(hal::real("frequency_hz", &VibrationParams::frequency_Hz, 5, 2000),
+                   hal::real("amplitude_N", &VibrationParams::amplitude_N, 0, 5),
+                   hal::milli("decay_ms", &VibrationParams::decay_s, 1, 1000),
+                   hal::micro("energy_uJ", &VibrationParams::energy_J, 0, 1e5));
+}
+
 class Vibration {
  public:
-  Vibration(const VibrationParams& params, int delay_ticks) noexcept;
+  using Params = VibrationParams;
 
-  // One tick. begins: a burst starts here, in place of one that may still run. gain: what the force is
-  // multiplied by before it reaches the hand.
-  [[nodiscard]] hal::Vec3 step(const hal::Vec3& hand_m, const hal::Vec3& axis, bool begins, double gain,
-                               double dt_s) noexcept;
+  Vibration(const VibrationParams& params, const EffectSetup& setup) NONBLOCKING;
 
-  [[nodiscard]] double injected_energy_J() const noexcept { return injected_J_; }  // signed, cumulative
+  // When contact or puncture begins a burst starts, in place of one that may still run.
+  [[nodiscard]] EffectOutput step(const EffectInput& in) NONBLOCKING;
+
+  [[nodiscard]] double injected_energy_J() const NONBLOCKING { return injected_J_; }  // signed, cumulative
 
  private:
   static constexpr int kKept = 8;  // forces; more than the longest delay
@@ -30,11 +45,11 @@ class Vibration {
   VibrationParams params_;
   std::size_t delay_;
   bool running_ = false;
-  double since_s_ = 0;  // the burst began
-  double burst_J_ = 0;  // given by it
+  double since_s_ = 0;  // since the burst began
+  double burst_J_ = 0;  // given by this burst
   double injected_J_ = 0;
-  hal::Vec3 hand_before_m_ = hal::Vec3::Zero();
-  bool seen_ = false;
+  hal::Vec3 last_handle_m_ = hal::Vec3::Zero();
+  bool stepped_ = false;
   std::array<hal::Vec3, kKept> given_N_;  // newest first
 };
 

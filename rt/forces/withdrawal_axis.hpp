@@ -6,33 +6,45 @@
 #pragma once
 
 #include "hal/devices.hpp"
-#include "rt/control/config.hpp"
-#include "rt/forces/cone_guide.hpp"
+#include "hal/parameters.hpp"
+#include "hal/realtime.hpp"
+#include "rt/forces/effect.hpp"
 #include "rt/forces/ramp.hpp"
 
 namespace punctum::rt {
 
-[[nodiscard]] Pull axis_pull(const AxisParams& params, double position_scale, const FixtureFrame& frame,
-                             const hal::Vec3& tip_m) noexcept;
+// Withdrawal along the insertion axis only.
+struct AxisParams {
+  double K_N_m = 150;   // lateral, at the hand
+  double eps_m = 1e-6;  // width of the C1 ramp (needle scale)
+  double ramp_s = 0.2;
+  double B_inward_Ns_m = 5;  // in withdrawal, against motion back into the cell; 0 = off
+};
+constexpr auto keys_of(const AxisParams*) {
+  return hal::keys(hal::real("K_N_m", &AxisParams::K_N_m, 0, 3000),
+                   hal::micro("eps_um", &AxisParams::eps_m, 0.01, 100),
+                   hal::real("ramp_s", &AxisParams::ramp_s, 0.001, 5),
+                   hal::real("B_inward_Ns_m", &AxisParams::B_inward_Ns_m, 0, 100));
+}
+
+[[nodiscard]] PotentialForce axis_pull(const AxisParams& params, double position_scale,
+                                       const FixtureFrame& frame, const hal::Vec3& tip_m) NONBLOCKING;
 
 class WithdrawalAxis {
  public:
-  WithdrawalAxis(const AxisParams& params, double position_scale) noexcept
-      : params_(params), scale_(position_scale) {}
+  using Params = AxisParams;
 
-  // One tick. `line` is taken over while the gain is zero and stays until the gain is zero again. velocity:
-  // of the hand, world axes. outward_only: the one-way damper acts.
-  [[nodiscard]] hal::Vec3 step(const hal::Vec3& tip_m, const hal::Vec3& velocity_m_s,
-                               const FixtureFrame& line, bool on, bool outward_only, double dt_s) noexcept;
+  WithdrawalAxis(const AxisParams& params, const EffectSetup& setup) NONBLOCKING
+      : params_(params),
+        scale_(setup.position_scale) {}
 
-  [[nodiscard]] double stored_energy_J() const noexcept { return stored_J_; }
-  [[nodiscard]] double injected_energy_J() const noexcept { return injected_J_; }  // signed, cumulative
-  [[nodiscard]] const FixtureFrame& frame() const noexcept { return frame_; }
-  // Upper bound now, at the hand, of the well's Hessian: K psi' and K psi/r are at most K.
-  [[nodiscard]] double stiffness_N_m() const noexcept { return ramp_.gain() * params_.K_N_m; }
-  // Of the one-way damper, now; and its part of the force.
-  [[nodiscard]] double B_Ns_m() const noexcept { return one_way_.gain() * params_.B_inward_Ns_m; }
-  [[nodiscard]] const hal::Vec3& one_way_N() const noexcept { return one_way_N_; }
+  // On while the needle is inside a known cell. The line of insertion is taken over while the gain is zero
+  // and stays until the gain is zero again.
+  [[nodiscard]] EffectOutput step(const EffectInput& in) NONBLOCKING;
+
+  [[nodiscard]] double stored_energy_J() const NONBLOCKING { return stored_J_; }
+  [[nodiscard]] double injected_energy_J() const NONBLOCKING { return injected_J_; }  // signed, cumulative
+  [[nodiscard]] const FixtureFrame& frame() const NONBLOCKING { return frame_; }
 
  private:
   AxisParams params_;
@@ -40,7 +52,6 @@ class WithdrawalAxis {
   FixtureFrame frame_;
   Ramp ramp_;
   Ramp one_way_;
-  hal::Vec3 one_way_N_ = hal::Vec3::Zero();
   double stored_J_ = 0;
   double injected_J_ = 0;
 };

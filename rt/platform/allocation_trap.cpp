@@ -3,7 +3,8 @@
 #include <cstdlib>
 
 #if defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || \
+    __has_feature(memory_sanitizer) || __has_feature(realtime_sanitizer)
 #define PUNCTUM_SANITIZED
 #endif
 #endif
@@ -43,7 +44,9 @@ struct Watch {
 
 [[gnu::cold, gnu::noinline]] void caught(const char* call) noexcept {
   ++watch.count;
-  if (watch.on == On::allocation_count) return;
+  if (watch.on == On::allocation_count) {
+    return;
+  }
   watch.armed = false;
   for (const char* part : {"heap call in the real-time loop: ", call, "\n"}) {
     (void)!::write(STDERR_FILENO, part, std::strlen(part));
@@ -52,7 +55,9 @@ struct Watch {
 }
 
 void pass(const char* call) noexcept {
-  if (__builtin_expect(static_cast<long>(watch.armed), 0L) != 0) caught(call);
+  if (__builtin_expect(static_cast<long>(watch.armed), 0L) != 0) {
+    caught(call);
+  }
 }
 
 bool power_of_two(std::size_t n) noexcept { return n != 0 && (n & (n - 1)) == 0; }
@@ -114,9 +119,13 @@ void* aligned_alloc(std::size_t alignment, std::size_t size) noexcept {
 
 int posix_memalign(void** block, std::size_t alignment, std::size_t size) noexcept {
   pass("posix_memalign");
-  if (alignment % sizeof(void*) != 0 || !power_of_two(alignment)) return EINVAL;
+  if (alignment % sizeof(void*) != 0 || !power_of_two(alignment)) {
+    return EINVAL;
+  }
   void* made = __libc_memalign(alignment, size);
-  if (made == nullptr) return ENOMEM;
+  if (made == nullptr) {
+    return ENOMEM;
+  }
   *block = made;
   return 0;
 }
@@ -133,7 +142,9 @@ void* pvalloc(std::size_t size) noexcept {
 }
 
 void free(void* block) noexcept {
-  if (block == nullptr) return;
+  if (block == nullptr) {
+    return;
+  }
   pass("free");
   __libc_free(block);
 }

@@ -1,7 +1,7 @@
 // Catches every heap call of one thread while it is armed. A program that links this object has malloc,
 // calloc, realloc, free and the aligned kinds (and with them operator new) go through it: one thread-local
-// flag is tested, then glibc's own allocator does the work. Under address and thread sanitizer, and without
-// glibc, there is no trap: armed() then stays false, and nothing is counted.
+// flag is tested, then glibc's own allocator does the work. Under address, thread and real-time
+// sanitizer, and without glibc, there is no trap: armed() then stays false, and nothing is counted.
 #pragma once
 
 #include <cstdint>

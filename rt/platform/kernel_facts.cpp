@@ -2,10 +2,12 @@
 
 #include <sys/utsname.h>
 
-#include <cstdio>
-#include <cstdlib>
+#include <charconv>
 #include <fstream>
+#include <optional>
 #include <sstream>
+#include <string_view>
+#include <system_error>
 
 namespace punctum::rt {
 namespace {
@@ -20,9 +22,23 @@ std::string first_line(const std::string& path) {
 bool has_line(const std::string& path, const std::string& wanted) {
   std::ifstream in(path);
   for (std::string line; std::getline(in, line);) {
-    if (line == wanted) return true;
+    if (line == wanted) {
+      return true;
+    }
   }
   return false;
+}
+
+// Takes the number that `text` begins with off it; nothing if it begins otherwise.
+template <class Number>
+std::optional<Number> take_number(std::string_view& text) {
+  Number number{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc{}) {
+    return std::nullopt;
+  }
+  text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+  return number;
 }
 
 }  // namespace
@@ -31,12 +47,19 @@ std::vector<int> parse_cpu_list(const std::string& text) {
   std::vector<int> cpus;
   std::istringstream in(text);
   for (std::string part; std::getline(in, part, ',');) {
-    int first = 0;
-    int last = 0;
-    const int n = std::sscanf(part.c_str(), "%d-%d", &first, &last);
-    if (n < 1) continue;
-    if (n < 2) last = first;
-    for (int cpu = first; cpu <= last && cpu - first < 4096; ++cpu) cpus.push_back(cpu);
+    std::string_view rest = part;
+    const std::optional<int> first = take_number<int>(rest);
+    if (!first) {
+      continue;
+    }
+    int last = *first;
+    if (rest.starts_with('-')) {
+      rest.remove_prefix(1);
+      last = take_number<int>(rest).value_or(*first);
+    }
+    for (int cpu = *first; cpu <= last && cpu - *first < 4096; ++cpu) {
+      cpus.push_back(cpu);
+    }
   }
   return cpus;
 }
@@ -49,7 +72,12 @@ KernelFacts read_kernel_facts(const std::string& root, std::string release, std:
   ::uname(&name);
   facts.release = release.empty() ? std::string(name.release) : std::move(release);
   facts.version = version.empty() ? std::string(name.version) : std::move(version);
-  std::sscanf(facts.release.c_str(), "%d.%d", &facts.major, &facts.minor);
+  std::string_view rest = facts.release;
+  facts.major = take_number<int>(rest).value_or(0);
+  if (rest.starts_with('.')) {
+    rest.remove_prefix(1);
+    facts.minor = take_number<int>(rest).value_or(0);
+  }
 
   const std::vector<std::string> configurations{root + "/boot/config-" + facts.release,
                                                 root + "/lib/modules/" + facts.release + "/config"};
@@ -74,7 +102,9 @@ KernelFacts read_kernel_facts(const std::string& root, std::string release, std:
   facts.online_cpus = parse_cpu_list(first_line(root + "/sys/devices/system/cpu/online"));
   facts.isolated_cpus = parse_cpu_list(first_line(root + "/sys/devices/system/cpu/isolated"));
   facts.smt_active = first_line(root + "/sys/devices/system/cpu/smt/active") == "1";
-  facts.rt_runtime_us = std::atol(first_line(root + "/proc/sys/kernel/sched_rt_runtime_us").c_str());
+  const std::string runtime = first_line(root + "/proc/sys/kernel/sched_rt_runtime_us");
+  rest = runtime;
+  facts.rt_runtime_us = take_number<long>(rest).value_or(0);
   return facts;
 }
 
@@ -85,7 +115,8 @@ std::string governor_of(int cpu, const std::string& root) {
 long fair_server_runtime_ns(int cpu, const std::string& root) {
   const std::string text =
       first_line(root + "/sys/kernel/debug/sched/fair_server/cpu" + std::to_string(cpu) + "/runtime");
-  return text.empty() ? -1 : std::atol(text.c_str());
+  std::string_view rest = text;
+  return take_number<long>(rest).value_or(-1);
 }
 
 }  // namespace punctum::rt

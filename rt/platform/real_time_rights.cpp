@@ -1,11 +1,13 @@
 #include "rt/platform/real_time_rights.hpp"
 
 #include <fcntl.h>
+#include <linux/capability.h>
 #include <malloc.h>
 #include <sched.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -29,7 +31,9 @@ std::string reason(int error) { return std::strerror(error); }
 std::string own_status(const std::string& key) {
   std::ifstream in("/proc/self/status");
   for (std::string line; std::getline(in, line);) {
-    if (line.starts_with(key)) return line.substr(key.size());
+    if (line.starts_with(key)) {
+      return line.substr(key.size());
+    }
   }
   return "";
 }
@@ -40,13 +44,15 @@ long locked_kB() { return std::strtol(own_status("VmLck:").c_str(), nullptr, 10)
 bool has_capability(int number) {
   return ((std::strtoull(own_status("CapEff:").c_str(), nullptr, 16) >> number) & 1U) != 0;
 }
-constexpr int kCapIpcLock = 14;
-constexpr int kCapSysNice = 23;
+constexpr int kCapIpcLock = CAP_IPC_LOCK;
+constexpr int kCapSysNice = CAP_SYS_NICE;
 
 // The soft limit up to the hard one; returns the result.
 rlim_t raise_limit(__rlimit_resource which, bool apply) {
   rlimit limit = {};
-  if (::getrlimit(which, &limit) != 0) return 0;
+  if (::getrlimit(which, &limit) != 0) {
+    return 0;
+  }
   if (apply && limit.rlim_cur != limit.rlim_max) {
     limit.rlim_cur = limit.rlim_max;
     ::setrlimit(which, &limit);
@@ -54,12 +60,14 @@ rlim_t raise_limit(__rlimit_resource which, bool apply) {
   return limit.rlim_max;
 }
 
-// A deep stack is touched once, so that the loop never grows it.
+// Touches a deep stack once, so that the loop never grows it.
 [[gnu::noinline]] void prefault_stack(std::size_t bytes) {
   char page[kPage];
   std::memset(page, 1, sizeof page);
   asm volatile("" : : "r"(page) : "memory");  // the page is really written
-  if (bytes > kPage) prefault_stack(bytes - kPage);
+  if (bytes > kPage) {
+    prefault_stack(bytes - kPage);
+  }
   asm volatile("" : : "r"(page) : "memory");  // and in use until here: no tail call
 }
 
@@ -67,8 +75,17 @@ RightFound kernel(const KernelFacts& facts) {
   RightFound right{.name = "PREEMPT_RT kernel", .required = true};
   right.got = facts.preempt_rt;
   right.detail = facts.release + ": " + facts.preempt_rt_seen;
-  if (!right.got) right.remedy = "Debian: apt-get install linux-image-rt-amd64, then boot it";
+  if (!right.got) {
+    right.remedy = "Debian: apt-get install linux-image-rt-amd64, then boot it";
+  }
   return right;
+}
+
+void limit_spinning() {
+  constexpr rlim_t kSecond_us = 1'000'000;
+  const rlimit limit{.rlim_cur = static_cast<rlim_t>(kSpinLimit_s * kSecond_us),
+                     .rlim_max = static_cast<rlim_t>(kSpinKill_s * kSecond_us)};
+  ::setrlimit(RLIMIT_RTTIME, &limit);
 }
 
 RightFound priority(const RightsWanted& wanted, bool apply) {
@@ -77,6 +94,7 @@ RightFound priority(const RightsWanted& wanted, bool apply) {
   const rlim_t limit = raise_limit(RLIMIT_RTPRIO, apply);
   const std::string text = std::to_string(level);
   if (apply) {
+    limit_spinning();
     const sched_param parameter{.sched_priority = level};
     right.got = ::sched_setscheduler(0, SCHED_FIFO | SCHED_RESET_ON_FORK, &parameter) == 0;
     right.detail = right.got ? "SCHED_FIFO " + text : reason(errno);
@@ -84,7 +102,9 @@ RightFound priority(const RightsWanted& wanted, bool apply) {
     right.got = has_capability(kCapSysNice) || limit >= static_cast<rlim_t>(level);
     right.detail = right.got ? "allowed up to SCHED_FIFO " + text : "not allowed to this user";
   }
-  if (right.got) return right;
+  if (right.got) {
+    return right;
+  }
   right.remedy =
       has_capability(kCapSysNice)
           ? "the control group grants no real-time time: see cpu.rt_runtime_us of its cgroup"
@@ -93,7 +113,8 @@ RightFound priority(const RightsWanted& wanted, bool apply) {
   return right;
 }
 
-// The kernel's clock page is not part of locked memory: its first reading is a page fault.
+// The page through which the kernel shows its clock is not part of locked memory: the first reading is a
+// fault.
 void prefault_clock() {
   timespec now;
   ::clock_gettime(CLOCK_MONOTONIC, &now);
@@ -108,7 +129,7 @@ RightFound memory(bool apply) {
     ::mallopt(M_MMAP_MAX, 0);
     const bool locked = ::mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
     const int error = errno;
-    right.got = locked && locked_kB() > 0;  // a sanitizer's mlockall only says that it did
+    right.got = locked && locked_kB() > 0;  // a sanitizer replaces mlockall by a call that locks nothing
     right.detail = right.got ? "all present and future pages" : locked ? "has no effect here" : reason(error);
   } else {
     right.got = has_capability(kCapIpcLock) || limit == RLIM_INFINITY;
@@ -127,14 +148,18 @@ RightFound stack(const RightsWanted& wanted, bool apply) {
   RightFound right{.name = "stack prefaulted", .required = true};
   rlimit limit = {};
   ::getrlimit(RLIMIT_STACK, &limit);
-  // What is left of the stack is unknown; half of it is surely more than the program has used so far.
+  // How much of the stack is left is unknown; set-up has used less than half of it.
   const std::size_t bytes = limit.rlim_cur == RLIM_INFINITY
                                 ? wanted.stack_bytes
                                 : std::min<std::size_t>(wanted.stack_bytes, limit.rlim_cur / 2);
-  if (apply) prefault_stack(bytes);
+  if (apply) {
+    prefault_stack(bytes);
+  }
   right.got = bytes == wanted.stack_bytes;
   right.detail = std::to_string(bytes >> 10) + " KiB";
-  if (!right.got) right.remedy = "raise the stack limit: ulimit -s 8192";
+  if (!right.got) {
+    right.remedy = "raise the stack limit: ulimit -s 8192";
+  }
   return right;
 }
 
@@ -149,7 +174,9 @@ RightFound affinity(const RightsWanted& wanted, const KernelFacts& facts, bool a
   cpu_set_t set;
   CPU_ZERO(&set);
   bool possible = wanted.cpu < CPU_SETSIZE;
-  if (possible) CPU_SET(wanted.cpu, &set);
+  if (possible) {
+    CPU_SET(wanted.cpu, &set);
+  }
   if (apply) {
     possible = possible && ::sched_setaffinity(0, sizeof set, &set) == 0;
   } else {
@@ -219,7 +246,9 @@ RightFound frequency(const RightsWanted& wanted, const KernelFacts& facts) {
   }
   right.got = other.empty();
   right.detail = !right.got ? other : scaling ? "performance" : "no frequency scaling here";
-  if (!right.got) right.remedy = "cpupower frequency-set -g performance";
+  if (!right.got) {
+    right.remedy = "cpupower frequency-set -g performance";
+  }
   return right;
 }
 
@@ -227,7 +256,9 @@ RightFound siblings(const KernelFacts& facts) {
   RightFound right{.name = "no SMT siblings"};
   right.got = !facts.smt_active;
   right.detail = facts.smt_active ? "SMT is on: a sibling shares the CPU's units" : "SMT off or absent";
-  if (!right.got) right.remedy = "boot with nosmt, or: echo off > /sys/devices/system/cpu/smt/control";
+  if (!right.got) {
+    right.remedy = "boot with nosmt, or: echo off > /sys/devices/system/cpu/smt/control";
+  }
   return right;
 }
 
@@ -262,10 +293,11 @@ RightFound throttling(const RightsWanted& wanted, const KernelFacts& facts) {
 
 }  // namespace
 
-RealTimeRights RealTimeRights::go(const RightsWanted& wanted, bool apply) {
+RealTimeRights RealTimeRights::find(const RightsWanted& wanted, bool apply) {
   RealTimeRights rights;
   const KernelFacts facts = read_kernel_facts();
-  // Memory first: later set-up then happens in locked memory. Priority last: it is the one that can hurt.
+  // Memory first: later set-up then happens in locked memory. Priority last: a thread that has it can keep
+  // everybody else from its CPU.
   rights.table_.push_back(kernel(facts));
   rights.table_.push_back(memory(apply));
   rights.table_.push_back(stack(wanted, apply));
@@ -283,14 +315,16 @@ RealTimeRights RealTimeRights::go(const RightsWanted& wanted, bool apply) {
   return rights;
 }
 
-RealTimeRights RealTimeRights::acquire(const RightsWanted& wanted) { return go(wanted, true); }
-RealTimeRights RealTimeRights::examine(const RightsWanted& wanted) { return go(wanted, false); }
+RealTimeRights RealTimeRights::acquire(const RightsWanted& wanted) { return find(wanted, true); }
+RealTimeRights RealTimeRights::examine(const RightsWanted& wanted) { return find(wanted, false); }
 
 RealTimeRights::RealTimeRights(RealTimeRights&& other) noexcept
     : table_(std::move(other.table_)), dma_latency_fd_(std::exchange(other.dma_latency_fd_, -1)) {}
 
 RealTimeRights::~RealTimeRights() {
-  if (dma_latency_fd_ >= 0) ::close(dma_latency_fd_);
+  if (dma_latency_fd_ >= 0) {
+    ::close(dma_latency_fd_);
+  }
 }
 
 bool RealTimeRights::degraded() const {
@@ -312,9 +346,28 @@ void RealTimeRights::publish(CoreStatus& status) const {
   status.rights_count.store(count, std::memory_order_release);
 }
 
+void leave_real_time() noexcept {
+  const sched_param parameter{.sched_priority = 0};
+  // Only a privileged thread may clear the flag.
+  (void)::sched_setscheduler(0, SCHED_OTHER | SCHED_RESET_ON_FORK, &parameter);
+}
+
+bool drop_capabilities() noexcept {
+  // What is locked stays locked without the capability as long as the limit allows for it.
+  const rlimit unlimited{.rlim_cur = RLIM_INFINITY, .rlim_max = RLIM_INFINITY};
+  ::setrlimit(RLIMIT_MEMLOCK, &unlimited);
+  __user_cap_header_struct header = {.version = _LINUX_CAPABILITY_VERSION_3, .pid = 0};
+  const __user_cap_data_struct none[2] = {};
+  return ::prctl(PR_SET_NO_NEW_PRIVS, 1UL, 0UL, 0UL, 0UL) == 0 &&
+         ::prctl(PR_CAP_AMBIENT, PR_CAP_AMBIENT_CLEAR_ALL, 0UL, 0UL, 0UL) == 0 &&
+         ::syscall(SYS_capset, &header, none) == 0;
+}
+
 void prefault(const void* data, std::size_t size) {
   const auto* bytes = static_cast<const volatile char*>(data);
-  for (std::size_t i = 0; i < size; i += kPage) (void)bytes[i];
+  for (std::size_t i = 0; i < size; i += kPage) {
+    (void)bytes[i];
+  }
 }
 
 void prefault_writable(void* data, std::size_t size) {

@@ -8,9 +8,15 @@
 #include <vector>
 
 #include "rt/platform/kernel_facts.hpp"
-#include "rt/station/station.hpp"
+#include "rt/station/core_status.hpp"
 
 namespace punctum::rt {
+
+// A thread with real-time priority that spins for so long without sleeping gets SIGXCPU, and SIGKILL after
+// the longer time: it must not keep everybody else from its CPU for good. A tick that is merely late is a
+// matter of the overrun window, which acts after some 20 ms.
+inline constexpr double kSpinLimit_s = 0.1;
+inline constexpr double kSpinKill_s = 0.5;
 
 struct RightsWanted {
   int priority = 80;  // SCHED_FIFO, 1 .. 98; the interrupt threads of its devices belong above
@@ -36,7 +42,7 @@ class RealTimeRights {
 
   RealTimeRights(RealTimeRights&& other) noexcept;
   RealTimeRights& operator=(RealTimeRights&&) = delete;
-  ~RealTimeRights();  // lets the CPU sleep again
+  ~RealTimeRights();  // lets the CPUs sleep again
 
   [[nodiscard]] const std::vector<RightFound>& table() const { return table_; }
   [[nodiscard]] bool degraded() const;
@@ -44,14 +50,22 @@ class RealTimeRights {
 
  private:
   RealTimeRights() = default;
-  static RealTimeRights go(const RightsWanted& wanted, bool apply);
+  static RealTimeRights find(const RightsWanted& wanted, bool apply);
   std::vector<RightFound> table_;
-  int dma_latency_fd_ = -1;  // while open, no CPU enters a deep sleep
+  int dma_latency_fd_ = -1;  // while it is open, no CPU enters a deep sleep
 };
 
-// Touches every page of a mapping, writing nothing that changes it.
+// Gives up every capability of the calling thread, for good: once priority, locked memory and devices are
+// there, the loop needs none. A device's own threads that started before keep theirs.
+[[nodiscard]] bool drop_capabilities() noexcept;
+
+// The calling thread has ordinary priority again: what a process does at its end may take long and wait for
+// threads that a real-time one would keep from running.
+void leave_real_time() noexcept;
+
+// Touches every page of a mapping and changes nothing in it.
 void prefault(const void* data, std::size_t size);
-void prefault_writable(void* data, std::size_t size);  // shared words are left as they are, atomically
+void prefault_writable(void* data, std::size_t size);  // atomically: others may write meanwhile
 
 // Of the calling thread (getrusage RUSAGE_THREAD), since it began. A system call: not for the tick.
 struct ThreadCounters {
@@ -62,7 +76,7 @@ struct ThreadCounters {
 };
 [[nodiscard]] ThreadCounters read_thread_counters() noexcept;
 
-// Around the loop: what the thread suffered between its two calls, and its heap calls.
+// What the thread counted between the two calls, which stand around the loop, and its heap calls.
 void publish_counters(const ThreadCounters& before, const ThreadCounters& after, std::uint64_t allocations,
                       bool allocations_watched, CoreStatus& status);
 

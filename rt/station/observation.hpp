@@ -1,7 +1,9 @@
-// What one frame told: vision -> core. Plain data, lives in shared memory.
+// What vision found in one frame. Plain data, lives in shared memory.
 #pragma once
 
 #include <cstdint>
+
+#include "hal/realtime.hpp"
 
 namespace punctum::rt {
 
@@ -11,8 +13,11 @@ struct Observation {
     tip_ok = 1U << 1,
     outer_ok = 1U << 2,
     inner_ok = 1U << 3,
-    contact = 1U << 4,    // needle and cell have merged into one component
-    punctured = 1U << 5,  // latched by vision from the membrane's reversal until the needle is clear
+    contact = 1U << 4,  // needle and cell have merged into one component
+    // The outer membrane has given way: latched by vision from its reversal until the needle is clear.
+    punctured = 1U << 5,
+    // So has the inner one. Never where there is none, or where it is not followed.
+    inner_punctured = 1U << 6,
   };
 
   std::uint64_t frame = 0;       // camera sequence number
@@ -37,7 +42,7 @@ struct Observation {
   double noise_m = 0;                 // standard deviation of gap_m and wd_m, as vision estimates it
   std::uint64_t total_us = 0;         // processing time; never used by the core
 
-  [[nodiscard]] bool has(Flag f) const noexcept { return (flags & f) != 0; }
+  [[nodiscard]] bool has(Flag f) const NONBLOCKING { return (flags & f) != 0; }
 };
 
 }  // namespace punctum::rt

@@ -1,66 +1,18 @@
-// What one tick did: core -> everyone. Plain data, lives in shared memory.
+// What the core did in one tick. Plain data, lives in shared memory.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+
+#include "rt/station/alarm.hpp"
+#include "rt/station/fault.hpp"
+#include "rt/station/phase.hpp"
 
 namespace punctum::rt {
 
-// Phases of an injection, in order. One cell goes through them once.
-enum class Phase : std::uint8_t { free, contact, indentation, puncture, injection, withdrawal, clear };
-inline constexpr int kPhases = 7;
-[[nodiscard]] constexpr const char* name(Phase p) noexcept {
-  constexpr const char* names[kPhases] = {"free",      "contact",    "indentation", "puncture",
-                                          "injection", "withdrawal", "clear"};
-  return names[static_cast<int>(p)];
-}
-
-// Why the station stopped. Latched: the first cause is kept until a reset.
-enum class Fault : std::uint8_t {
-  none,
-  estop,              // an e-stop contact is open
-  estop_discrepancy,  // the two contacts disagreed for longer than the window
-  estop_lost,         // the e-stop chain cannot be read
-  hand_lost,          // haptic device disconnected or silent for longer than its limit
-  hand_invalid,       // its position is not finite or jumped further than a hand can
-  stage_lost,
-  stage_fault,
-  stage_following,  // following error above its limit
-  tip_force,        // tip force above its hard limit
-  overrun,          // too many missed ticks in the window (real actuators only)
-  not_finite,       // a force or set-point was not finite
-  command_stop,     // someone asked for a stop
-  vacuum_lost,      // holding vacuum below its limit while a cell is held
-  injector_open,    // the injector stays open although its gate is shut
-};
-inline constexpr int kFaults = 15;
-[[nodiscard]] constexpr const char* name(Fault f) noexcept {
-  constexpr const char* names[] = {
-      "none",         "estop",      "estop_discrepancy", "estop_lost",      "hand_lost",
-      "hand_invalid", "stage_lost", "stage_fault",       "stage_following", "tip_force",
-      "overrun",      "not_finite", "command_stop",      "vacuum_lost",     "injector_open"};
-  static_assert(sizeof names == kFaults * sizeof names[0]);
-  return names[static_cast<int>(f)];
-}
-
-// Conditions that do not stop the station but must be seen. Bits; they go when their cause goes.
-enum Alarm : std::uint32_t {
-  alarm_vision_stale = 1U << 0,        // force fades, only withdrawal is accepted, the gate is shut
-  alarm_force_limited = 1U << 1,       // the hand's force is at its limit
-  alarm_depth_limited = 1U << 2,       // penetration or far-wall limit holds the needle
-  alarm_travel_limited = 1U << 3,      // workspace, velocity or acceleration limit holds the needle
-  alarm_tip_force = 1U << 4,           // soft tip-force limit holds the needle
-  alarm_model_invalid = 1U << 5,       // the membrane law is outside its assumptions
-  alarm_phase_timeout = 1U << 6,       // a phase takes longer than it should
-  alarm_overrun = 1U << 7,             // too many missed ticks (simulated actuators)
-  alarm_sensor = 1U << 8,              // a device returned no or unusable data this tick
-  alarm_degraded = 1U << 9,            // running without real-time rights
-  alarm_stiffness_reduced = 1U << 10,  // the passivity guard renders less than was asked for
-};
-inline constexpr const char* kAlarmNames[] = {  // by bit
-    "vision_stale",  "force_limited", "depth_limited", "travel_limited", "tip_force",        "model_invalid",
-    "phase_timeout", "overrun",       "sensor",        "degraded",       "stiffness_reduced"};
-
 enum class StopStage : std::uint8_t { running, stopping, stopped };  // of the safety latch
+
+inline constexpr std::size_t kMaxEffects = 12;
 
 struct TelemetrySample {
   std::uint64_t tick = 0;  // of the absolute grid: gaps are missed releases
@@ -79,12 +31,8 @@ struct TelemetrySample {
   double cmd_m[3] = {};    // stage set-point
   double force_N[3] = {};  // to the hand, after guard and limits
 
-  // Magnitudes of the parts, at the hand.
-  double membrane_N = 0;
-  double cone_N = 0;
-  double axis_N = 0;
-  double damping_N = 0;
-  double guard_N = 0;
+  double effect_N[kMaxEffects] = {};  // magnitude of each force effect at the hand; rt/forces/list.hpp
+  double guard_N = 0;                 // what the passivity guard changed
 
   // The local membrane model, at the needle.
   double wd_m = 0;
@@ -107,9 +55,6 @@ struct TelemetrySample {
   std::uint64_t stale_ticks = 0;  // ticks on which the newest observation was too old
   std::uint8_t injector_open = 0;
   std::uint8_t pad[7] = {};
-  double repulsive_N = 0;  // more parts, as above
-  double friction_N = 0;
-  double vibration_N = 0;
 };
 
 }  // namespace punctum::rt

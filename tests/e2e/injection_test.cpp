@@ -3,8 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <regex>
+#include <set>
+#include <sstream>
 
-#include "tests/e2e/programs.hpp"
+#include "tests/support/programs.hpp"
 
 namespace punctum::e2e {
 namespace {
@@ -12,7 +15,7 @@ namespace {
 using Strings = std::vector<std::string>;
 const Strings kOrder = {"free", "contact", "indentation", "puncture", "injection", "withdrawal", "clear"};
 
-TEST_F(Programs, AnInjectionGoesThroughItsPhasesInOrder) {
+TEST_F(Programs, an_injection_goes_through_its_phases_in_order) {
   for (const char* method : {"truth", "paper"}) {
     ASSERT_EQ(punctum({"run", "icsi", "--clock", "virtual", "--set", std::string("vision.method=") + method}),
               0)
@@ -33,9 +36,9 @@ TEST_F(Programs, AnInjectionGoesThroughItsPhasesInOrder) {
   }
 }
 
-TEST_F(Programs, AnInjectionOfNothingIsNotDone) {
+TEST_F(Programs, an_injection_of_nothing_is_not_done) {
   EXPECT_EQ(punctum({"run", "icsi", "--clock", "virtual", "--set", "vision.method=truth", "--set",
-                     "failure=[{device=\"injector\", kind=\"disconnect\", at_s=2}]"}),
+                     "sim.failure=[{device=\"injector\", kind=\"disconnect\", at_s=2}]"}),
             1)
       << said_;
   const auto r = json();
@@ -44,7 +47,7 @@ TEST_F(Programs, AnInjectionOfNothingIsNotDone) {
   EXPECT_EQ(r["cells"]["without_injection"], 1);
 }
 
-TEST_F(Programs, TheSameSeedGivesTheSameBytesWithVisionInTheLoop) {
+TEST_F(Programs, the_same_seed_gives_the_same_bytes_with_vision_in_the_loop) {
   for (const char* method : {"truth", "paper"}) {
     const Strings args{"run",     "icsi",
                        "--clock", "virtual",
@@ -59,7 +62,7 @@ TEST_F(Programs, TheSameSeedGivesTheSameBytesWithVisionInTheLoop) {
   }
 }
 
-TEST_F(Programs, EveryBuiltInCellSceneIsDoneWithTheTruthAsObserver) {
+TEST_F(Programs, every_built_in_cell_scene_is_done_with_the_truth_as_observer) {
   for (const char* scene : {"icsi", "zebrafish", "outer-only", "no-holder"}) {
     EXPECT_EQ(punctum({"run", scene, "--clock", "virtual", "--set", "vision.method=truth"}), 0)
         << scene << "\n"
@@ -68,7 +71,7 @@ TEST_F(Programs, EveryBuiltInCellSceneIsDoneWithTheTruthAsObserver) {
   }
 }
 
-TEST_F(Programs, SeveralCellsAreInjectedOneAfterTheOther) {
+TEST_F(Programs, several_cells_are_injected_one_after_the_other) {
   ASSERT_EQ(punctum({"run", "icsi", "--clock", "virtual", "--set", "vision.method=truth", "--set",
                      "scene.cells=3"}),
             0)
@@ -78,7 +81,7 @@ TEST_F(Programs, SeveralCellsAreInjectedOneAfterTheOther) {
   EXPECT_EQ(r["cell_list"].size(), 3U);
 }
 
-TEST_F(Programs, ATimeLimitBeforeTheTaskIsDoneIsNotAnEndThatIsWell) {
+TEST_F(Programs, a_time_limit_before_the_task_is_done_is_not_an_end_that_is_well) {
   EXPECT_EQ(punctum({"run", "icsi", "--clock", "virtual", "--seconds", "3", "--set", "vision.method=truth"}),
             1)
       << said_;
@@ -86,10 +89,10 @@ TEST_F(Programs, ATimeLimitBeforeTheTaskIsDoneIsNotAnEndThatIsWell) {
 }
 
 // A vision process that hangs and is then killed, while the needle dents the cell.
-TEST_F(Programs, WhenVisionDiesTheForceFadesOnlyWithdrawalIsAcceptedAndTheTaskIsFinished) {
-  Running run(
-      {"run", "icsi", "--set", "vision.method=truth", "--report", report(), "--no-figure", "--no-frames"},
-      words());
+TEST_F(Programs, when_vision_dies_the_force_fades_only_withdrawal_is_accepted_and_the_task_is_finished) {
+  Running run({"run", "icsi", "--set", "vision.method=truth", "--set", kPatientRelay, "--report", report(),
+               "--no-figure", "--no-frames"},
+              words());
   Look look("icsi", run);
   ASSERT_TRUE(look.until(rt::Phase::indentation)) << run.output();
   std::this_thread::sleep_for(700ms);
@@ -114,7 +117,9 @@ TEST_F(Programs, WhenVisionDiesTheForceFadesOnlyWithdrawalIsAcceptedAndTheTaskIs
     const bool stale = (static_cast<unsigned>(t.number(i, "alarms")) & rt::alarm_vision_stale) != 0 &&
                        t.number(i, "t_s") > 1;
     if (!stale) {
-      if (seen == 0) before = t.number(i, "membrane_N");
+      if (seen == 0) {
+        before = t.number(i, "membrane_N");
+      }
       stretch = 0;
       continue;
     }
@@ -133,7 +138,7 @@ TEST_F(Programs, WhenVisionDiesTheForceFadesOnlyWithdrawalIsAcceptedAndTheTaskIs
   EXPECT_GT(before, 0);
 }
 
-TEST_F(Programs, WhenTheCoreDiesInsideTheCellTheNeedleStopsAndTheSuctionHolds) {
+TEST_F(Programs, when_the_core_dies_inside_the_cell_the_needle_stops_and_the_suction_holds) {
   Running run(
       {"run", "icsi", "--set", "vision.method=truth", "--report", report(), "--no-figure", "--no-frames"},
       words());
@@ -148,7 +153,7 @@ TEST_F(Programs, WhenTheCoreDiesInsideTheCellTheNeedleStopsAndTheSuctionHolds) {
   EXPECT_LT(u["stage_moved_um"], 5);
 }
 
-TEST_F(Programs, VisionThatCannotReadItsFramesEndsTheRunAsBadInput) {
+TEST_F(Programs, vision_that_cannot_read_its_frames_ends_the_run_as_bad_input) {
   fs::create_directory(folder_ / "frames");
   std::ofstream(folder_ / "frames" / "1.png") << "no picture";
   EXPECT_EQ(punctum({"run", "recorded", "--seconds", "5", "--set",
@@ -156,6 +161,36 @@ TEST_F(Programs, VisionThatCannotReadItsFramesEndsTheRunAsBadInput) {
             2)
       << said_;
   EXPECT_NE(said_.find("1.png"), std::string::npos) << said_;
+}
+
+// The segments that a process maps for writing, by their last names.
+std::set<std::string> written_segments(pid_t pid) {
+  std::set<std::string> names;
+  std::istringstream maps(read_all("/proc/" + std::to_string(pid) + "/maps"));
+  for (std::string line; std::getline(maps, line);) {
+    std::smatch m;
+    if (std::regex_search(line, m, std::regex("^[^ ]+ rw.s .*memfd:punctum\\.[^.]*\\.([^ ]*)"))) {
+      names.insert(m[1]);
+    }
+  }
+  return names;
+}
+
+TEST_F(Programs, each_program_can_write_what_it_has_to_say_and_nothing_else) {
+  Running run({"run", "icsi", "--seconds", "60", "--report", report(), "--no-figure", "--no-frames"},
+              words());
+  Look look("icsi", run);
+  ASSERT_TRUE(look.until_started()) << run.output();
+  for (int i = 0; i < 3000 && look.vision() == 0; ++i) {
+    std::this_thread::sleep_for(10ms);
+  }
+  EXPECT_EQ(written_segments(look.vision()), (std::set<std::string>{"observation", "camera"}));
+  EXPECT_EQ(written_segments(look.core()),
+            (std::set<std::string>{"core", "commands.parent", "commands.console", "bench", "camera"}));
+  const std::set<std::string> parents = written_segments(run.pid());
+  EXPECT_FALSE(parents.contains("core") || parents.contains("observation"));
+  run.send(SIGINT);
+  run.wait();
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// punctum-report as a person runs it: every topic there is, in its quick form.
+// punctum-report as a user runs it: all topics, with --quick.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,15 +8,14 @@
 #include <string>
 #include <vector>
 
-#include "tests/e2e/programs.hpp"
+#include "tests/e2e/quick_report.hpp"
+#include "tests/support/programs.hpp"
 #include "tools/report/topic.hpp"
 
 namespace punctum::e2e {
 namespace {
 
-const char* const kProgram = "punctum-report";
-
-// The fields of a CSV file, quoted ones too.
+// The fields of a CSV file; some of them are quoted.
 std::vector<std::vector<std::string>> fields(const std::string& csv) {
   std::vector<std::vector<std::string>> rows;
   std::vector<std::string> row(1);
@@ -42,16 +41,17 @@ std::vector<std::vector<std::string>> fields(const std::string& csv) {
 class Report : public Programs {
  protected:
   int run(const std::vector<std::string>& args) {
-    Running running(args, words(), kProgram);
+    Running running(args, words(), "punctum-report");
     const int code = running.wait();
     said_ = running.output();
     return code;
   }
 };
 
-TEST_F(Report, AllWritesTablesFiguresAndOnePageForEveryTopic) {
-  ASSERT_EQ(run({"all", "--quick", "--out", report()}), 0) << said_;
-  const fs::path out = report();
+TEST_F(Report, writes_tables_figures_and_one_page_for_every_topic) {
+  const QuickReport& made = quick_report();
+  ASSERT_EQ(made.code, 0) << made.said;
+  const fs::path out = made.folder();
   const std::string html = read_all(out / "index.html");
   for (const report::Topic& topic : report::topics()) {
     const std::string name(topic.name);
@@ -66,7 +66,9 @@ TEST_F(Report, AllWritesTablesFiguresAndOnePageForEveryTopic) {
     EXPECT_EQ(std::set(head.begin(), head.end()).size(), head.size());
     EXPECT_EQ(std::vector(head.end() - 4, head.end()),
               (std::vector<std::string>{"machine", "compiler", "flags", "commit"}));
-    for (const auto& row : rows) ASSERT_EQ(row.size(), head.size());
+    for (const auto& row : rows) {
+      ASSERT_EQ(row.size(), head.size());
+    }
     const auto column = [&head](const char* wanted) {
       return static_cast<std::size_t>(std::find(head.begin(), head.end(), wanted) - head.begin());
     };
@@ -76,15 +78,17 @@ TEST_F(Report, AllWritesTablesFiguresAndOnePageForEveryTopic) {
         return row[shipped] == "1" && std::atof(row[median].c_str()) > 0;
       }));
     }
-    EXPECT_TRUE(std::regex_search(said_, std::regex("(^|\n)" + name + " +[^ ].*\\([0-9.]+ s\\)\n"))) << said_;
+    EXPECT_TRUE(std::regex_search(made.said, std::regex("(^|\n)" + name + " +[^ ].*\\([0-9.]+ s\\)\n")))
+        << made.said;
   }
   EXPECT_FALSE(std::regex_search(html, std::regex("<script|<link|<img|<iframe|@import")));
-  for (std::size_t at = html.find("href="); at != std::string::npos; at = html.find("href=", at + 1))
+  for (std::size_t at = html.find("href="); at != std::string::npos; at = html.find("href=", at + 1)) {
     ASSERT_EQ(html[at + 6], '#') << html.substr(at, 60);
+  }
   EXPECT_EQ(html.find("class=\"failed\""), std::string::npos);
 }
 
-TEST_F(Report, BadInputIsOneLineAndCodeTwo) {
+TEST_F(Report, reports_bad_input_in_one_line_with_exit_code_two) {
   const std::vector<std::vector<std::string>> inputs = {{"colour", "--out", report()},
                                                         {"all", "--out", "/proc/nowhere"},
                                                         {"all", "--out", ""},

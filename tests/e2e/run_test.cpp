@@ -1,10 +1,13 @@
 // Whole runs: the programs as built, started as a person starts them.
 #include <gtest/gtest.h>
+#include <sys/mman.h>
 
 #include <algorithm>
 #include <cmath>
+#include <regex>
 
-#include "tests/e2e/programs.hpp"
+#include "rt/forces/list.hpp"
+#include "tests/support/programs.hpp"
 
 namespace punctum::e2e {
 namespace {
@@ -13,7 +16,7 @@ using Strings = std::vector<std::string>;
 
 // ---- scene `free`: core and parent only ----
 
-TEST_F(Programs, FreeEndsWellAtItsTimeLimit) {
+TEST_F(Programs, free_ends_well_at_its_time_limit) {
   ASSERT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "5"}), 0) << said_;
   const auto r = json();
   EXPECT_EQ(r["outcome"], "done");
@@ -27,14 +30,15 @@ TEST_F(Programs, FreeEndsWellAtItsTimeLimit) {
   // through.
   EXPECT_LT(r["tremor_ratio"], 0.3);
   EXPECT_GT(r["peak_hand_force_N"], 0);
-  for (const char* file : {"scene.toml", "samples.csv", "report.json", "core.log"})
+  for (const char* file : {"scene.toml", "samples.csv", "report.json", "core.log"}) {
     EXPECT_TRUE(fs::exists(fs::path(report()) / file)) << file;
+  }
   const Table t(fs::path(report()) / "samples.csv");
   EXPECT_EQ(t.rows.size(), r["ticks"]);
   EXPECT_EQ(t.text(0, "phase"), "free");
 }
 
-TEST_F(Programs, TheFirstColumnsOfSamplesAreThoseOtherProgramsRelyOn) {
+TEST_F(Programs, the_first_columns_of_samples_are_those_other_programs_rely_on) {
   ASSERT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "0.1"}), 0) << said_;
   const std::string csv = read_all(fs::path(report()) / "samples.csv");
   EXPECT_TRUE(
@@ -44,7 +48,7 @@ TEST_F(Programs, TheFirstColumnsOfSamplesAreThoseOtherProgramsRelyOn) {
       << csv.substr(0, 300);
 }
 
-TEST_F(Programs, TheSameSeedGivesTheSameBytesAndAnotherSeedOthers) {
+TEST_F(Programs, the_same_seed_gives_the_same_bytes_and_another_seed_others) {
   ASSERT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "3", "--seed", "4"}, "a"), 0) << said_;
   ASSERT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "3", "--seed", "4"}, "b"), 0) << said_;
   ASSERT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "3", "--seed", "5"}, "c"), 0) << said_;
@@ -54,7 +58,7 @@ TEST_F(Programs, TheSameSeedGivesTheSameBytesAndAnotherSeedOthers) {
   EXPECT_FALSE(a == read_all(fs::path(report("c")) / "samples.csv"));
 }
 
-TEST_F(Programs, TheResolvedSceneInTheReportRunsAgainToTheSameBytes) {
+TEST_F(Programs, the_resolved_scene_in_the_report_runs_again_to_the_same_bytes) {
   ASSERT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "2", "--set", "damping.B1_Ns_m=0.3",
                      "--set", "damping.B2_Ns_m=0.7"},
                     "a"),
@@ -65,7 +69,7 @@ TEST_F(Programs, TheResolvedSceneInTheReportRunsAgainToTheSameBytes) {
               read_all(fs::path(report("b")) / "samples.csv"));
 }
 
-TEST_F(Programs, EveryRateRunsOnItsGrid) {
+TEST_F(Programs, every_rate_runs_on_its_grid) {
   for (const char* rate : {"1000", "2000", "4000", "8000"}) {
     ASSERT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "0.5", "--rate", rate}), 0) << said_;
     const Table t(fs::path(report()) / "samples.csv");
@@ -73,7 +77,7 @@ TEST_F(Programs, EveryRateRunsOnItsGrid) {
   }
 }
 
-TEST_F(Programs, ALongRunIsRecordedThinnerAndSaysSo) {
+TEST_F(Programs, a_long_run_is_recorded_thinner_and_says_so) {
   ASSERT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "1500"}), 0) << said_;
   const auto r = json();
   EXPECT_EQ(r["samples"]["every"], 3);
@@ -82,7 +86,7 @@ TEST_F(Programs, ALongRunIsRecordedThinnerAndSaysSo) {
   EXPECT_EQ(r["samples"]["lost"], 0);
 }
 
-TEST_F(Programs, TwoRunsAtOnceDoNotMeet) {
+TEST_F(Programs, two_runs_at_once_do_not_meet) {
   const auto args = [this](const char* name, const char* seed) {
     return Strings{"run",    "free", "--clock",  "virtual",    "--seconds",   "20",
                    "--seed", seed,   "--report", report(name), "--no-figure", "--no-frames"};
@@ -95,7 +99,7 @@ TEST_F(Programs, TwoRunsAtOnceDoNotMeet) {
               read_all(fs::path(report("b")) / "samples.csv"));
 }
 
-TEST_F(Programs, ASecondRunIntoTheSameFolderReplacesTheFirst) {
+TEST_F(Programs, a_second_run_into_the_same_folder_replaces_the_first) {
   ASSERT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "1"}), 0) << said_;
   std::ofstream(fs::path(report()) / "notes.txt") << "mine";
   ASSERT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "0.5"}), 0) << said_;
@@ -103,7 +107,7 @@ TEST_F(Programs, ASecondRunIntoTheSameFolderReplacesTheFirst) {
   EXPECT_EQ(read_all(fs::path(report()) / "notes.txt"), "mine");
 }
 
-TEST_F(Programs, AFolderWithSomebodysOwnFilesIsNoReportFolder) {
+TEST_F(Programs, a_folder_with_somebodys_own_files_is_no_report_folder) {
   fs::create_directories(fs::path(report()) / "frames");
   std::ofstream(fs::path(report()) / "frames" / "000012.png") << "a picture of theirs";
   EXPECT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "0.1"}), 2);
@@ -111,7 +115,7 @@ TEST_F(Programs, AFolderWithSomebodysOwnFilesIsNoReportFolder) {
   EXPECT_TRUE(fs::exists(fs::path(report()) / "frames" / "000012.png"));
 }
 
-TEST_F(Programs, FramesThatAreToBePlayedAreNotClearedAway) {
+TEST_F(Programs, frames_that_are_to_be_played_are_not_cleared_away) {
   ASSERT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "0.1"}), 0) << said_;
   const fs::path frames = fs::path(report()) / "frames";
   fs::create_directories(frames);
@@ -121,7 +125,7 @@ TEST_F(Programs, FramesThatAreToBePlayedAreNotClearedAway) {
   EXPECT_TRUE(fs::exists(frames / "000000.png"));
 }
 
-TEST_F(Programs, OutputThatNobodyTakesEndsNoRun) {
+TEST_F(Programs, output_that_nobody_takes_ends_no_run) {
   // Unbuffered, so that the very first word meets the full device. stdbuf preloads a library, which a
   // sanitized program takes amiss unless told not to.
   const std::string run = std::string("ASAN_OPTIONS=verify_asan_link_order=0 stdbuf -o0 ") + PUNCTUM_BIN_DIR +
@@ -131,7 +135,7 @@ TEST_F(Programs, OutputThatNobodyTakesEndsNoRun) {
   EXPECT_EQ(json()["outcome"], "done");
 }
 
-TEST_F(Programs, ASceneMayHaveAnyFileName) {
+TEST_F(Programs, a_scene_may_have_any_file_name) {
   for (const char* name : {"it's_mine.toml", "a b.toml", "caf\xe9.toml"}) {
     const fs::path file = folder_ / name;
     ASSERT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "0.1"}, "plain"), 0);
@@ -145,8 +149,8 @@ TEST_F(Programs, ASceneMayHaveAnyFileName) {
   }
 }
 
-TEST_F(Programs, InRealTimeTheCoreKeepsItsGridWithoutFaultsOrAllocations) {
-  ASSERT_EQ(punctum({"run", "free", "--seconds", "2"}), 0) << said_;
+TEST_F(Programs, in_real_time_the_core_keeps_its_grid_without_faults_or_allocations) {
+  ASSERT_EQ(punctum({"run", "free", "--seconds", "2", "--set", kPatientRelay}), 0) << said_;
   const auto r = json();
   EXPECT_EQ(r["clock"], "real");
   EXPECT_NEAR(r["ticks"].get<double>() + r["missed"].get<double>(), 2100, 150);
@@ -157,10 +161,30 @@ TEST_F(Programs, InRealTimeTheCoreKeepsItsGridWithoutFaultsOrAllocations) {
   }
 }
 
-TEST_F(Programs, CtrlCStopsCleanlyAndTheReportIsWritten) {
-  Running run(
-      {"run", "free", "--seconds", "60", "--set", "scene.cells=0", "--report", report(), "--no-figure"},
-      words());
+TEST_F(Programs, a_running_core_has_no_rights_left_that_it_does_not_need) {
+  Running run({"run", "free", "--seconds", "60", "--report", report(), "--no-figure"}, words());
+  Look look("free", run);
+  ASSERT_TRUE(look.until_started()) << run.output();
+  std::istringstream status(read_all("/proc/" + std::to_string(look.core()) + "/status"));
+  std::map<std::string, std::string> says;
+  for (std::string line; std::getline(status, line);) {
+    std::istringstream words_of(line);
+    std::string key, value;
+    words_of >> key >> value;
+    says[key] = value;
+  }
+  for (const char* set : {"CapInh:", "CapPrm:", "CapEff:", "CapAmb:"}) {
+    EXPECT_EQ(says[set], "0000000000000000") << set;
+  }
+  EXPECT_EQ(says["NoNewPrivs:"], "1");
+  run.send(SIGINT);
+  EXPECT_EQ(run.wait(), 0) << run.output();
+}
+
+TEST_F(Programs, ctrl_c_stops_cleanly_and_the_report_is_written) {
+  Running run({"run", "free", "--seconds", "60", "--set", "scene.cells=0", "--set", kPatientRelay, "--report",
+               report(), "--no-figure"},
+              words());
   Look look("free", run);
   ASSERT_TRUE(look.until_started()) << run.output();
   std::this_thread::sleep_for(300ms);
@@ -172,7 +196,52 @@ TEST_F(Programs, CtrlCStopsCleanlyAndTheReportIsWritten) {
   EXPECT_NE(run.output().find("stopping"), std::string::npos);
 }
 
-TEST_F(Programs, WhenTheCoreIsKilledTheDevicesGoToTheirSafeStateAndTheParentSaysSo) {
+// What the core left of the simulated devices, by the bench's newest snapshot.
+void expect_devices_off(const sim::Bench& bench) {
+  sim::Snapshot last;
+  std::uint64_t index = 0;
+  ASSERT_EQ(bench.snapshots.newest(last, index), hal::Read::ok);
+  EXPECT_EQ(hal::Vec3(last.hand.commanded_N).norm(), 0);
+  EXPECT_EQ(last.injector.gate, 0U);
+  EXPECT_EQ(last.stage.enable_line, 0);
+}
+
+TEST_F(Programs, a_core_that_is_told_three_times_to_end_leaves_its_devices_without_force_and_power) {
+  Running run({"run", "free", "--seconds", "60", "--report", report(), "--no-figure"}, words());
+  Look look("free", run);
+  ASSERT_TRUE(look.until_started()) << run.output();
+  std::this_thread::sleep_for(500ms);
+  for (const int signal : {SIGTERM, SIGINT, SIGHUP}) {  // different ones: none is lost in another
+    kill(look.core(), signal);
+  }
+  (void)run.wait();
+  EXPECT_NE(json()["outcome"], "core died") << run.output();
+  expect_devices_off(look.bench());
+}
+
+TEST_F(Programs, every_signal_that_ends_a_program_stops_the_core_in_order) {
+  for (const int signal : {SIGTERM, SIGINT, SIGHUP, SIGQUIT}) {
+    Running run({"run", "free", "--seconds", "60", "--report", report(), "--no-figure"}, words());
+    Look look("free", run);
+    ASSERT_TRUE(look.until_started()) << run.output();
+    std::this_thread::sleep_for(300ms);
+    kill(look.core(), signal);
+    EXPECT_EQ(run.wait(), 0) << signal << run.output();
+    EXPECT_EQ(json()["outcome"], "done") << signal;
+    expect_devices_off(look.bench());
+  }
+}
+
+TEST_F(Programs, a_run_that_ends_well_leaves_the_drive_without_power) {
+  Running run({"run", "free", "--clock", "virtual", "--seconds", "30", "--report", report(), "--no-figure"},
+              words());
+  Look look("free", run);
+  ASSERT_TRUE(look.until_started()) << run.output();
+  EXPECT_EQ(run.wait(), 0) << run.output();
+  expect_devices_off(look.bench());
+}
+
+TEST_F(Programs, when_the_core_is_killed_the_devices_go_to_their_safe_state_and_the_parent_says_so) {
   Running run({"run", "free", "--seconds", "60", "--report", report(), "--no-figure"}, words());
   Look look("free", run);
   ASSERT_TRUE(look.until_started()) << run.output();
@@ -185,10 +254,12 @@ TEST_F(Programs, WhenTheCoreIsKilledTheDevicesGoToTheirSafeStateAndTheParentSays
   EXPECT_TRUE(r["unattended"]["safe"]);
   EXPECT_LT(r["unattended"]["relay_opened_s"], 0.1);
   EXPECT_TRUE(r["page_faults"]["minor"].is_null());  // nobody counted them: not zero
+  EXPECT_EQ(Table(fs::path(report()) / "fault.csv").rows.size(), r["ticks"]);  // fewer than two seconds
+  EXPECT_TRUE(r["events"].is_array());
   EXPECT_NE(run.output().find("the control core was killed by signal 9"), std::string::npos) << run.output();
 }
 
-TEST_F(Programs, WhenTheCoreHangsItIsNoticedAndTheDevicesGoToTheirSafeState) {
+TEST_F(Programs, when_the_core_hangs_it_is_noticed_and_the_devices_go_to_their_safe_state) {
   Running run({"run", "free", "--seconds", "60", "--report", report(), "--no-figure"}, words());
   Look look("free", run);
   ASSERT_TRUE(look.until_started()) << run.output();
@@ -200,7 +271,7 @@ TEST_F(Programs, WhenTheCoreHangsItIsNoticedAndTheDevicesGoToTheirSafeState) {
   EXPECT_NE(run.output().find("has not ticked"), std::string::npos) << run.output();
 }
 
-TEST_F(Programs, WhenTheParentIsKilledTheCoreStopsByItselfAndTheNextRunCleansUp) {
+TEST_F(Programs, when_the_parent_is_killed_the_core_stops_by_itself_and_nothing_is_left_of_the_station) {
   pid_t core = 0;
   std::string station;
   {
@@ -208,22 +279,52 @@ TEST_F(Programs, WhenTheParentIsKilledTheCoreStopsByItselfAndTheNextRunCleansUp)
     Look look("free", run);
     ASSERT_TRUE(look.until_started()) << run.output();
     core = look.core();
-    station = "/dev/shm/punctum.free-" + std::to_string(run.pid()) + ".station";
-    EXPECT_TRUE(fs::exists(station));
+    station = "free-" + std::to_string(run.pid());
+    EXPECT_TRUE(hal::Joined::join(station));
     run.send(SIGKILL);
     EXPECT_EQ(run.wait(), -SIGKILL);
   }
-  for (int i = 0; i < 500 && alive(core); ++i) std::this_thread::sleep_for(10ms);
+  for (int i = 0; i < 500 && alive(core); ++i) {
+    std::this_thread::sleep_for(10ms);
+  }
   EXPECT_FALSE(alive(core));
-  ASSERT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "0.1"}, "next"), 0) << said_;
-  EXPECT_FALSE(fs::exists(station));
+  EXPECT_FALSE(hal::Joined::join(station));
+  EXPECT_TRUE(hal::Rendezvous::open(station)) << "its name is free again";
+  for (const auto& file : fs::directory_iterator("/dev/shm")) {
+    EXPECT_EQ(file.path().string().find(station), std::string::npos) << file.path();
+  }
 }
 
-TEST_F(Programs, WhenTheParentIsKilledACoreThatHasStoppedAlreadyEndsToo) {
+TEST_F(Programs, nobody_can_cut_off_the_memory_that_core_and_parent_share) {
+  Running run({"run", "free", "--seconds", "60", "--report", report(), "--no-figure"}, words());
+  Look look("free", run);
+  ASSERT_TRUE(look.until_started()) << run.output();
+  int tried = 0;
+  for (const auto& file : fs::directory_iterator("/proc/" + std::to_string(run.pid()) + "/fd")) {
+    std::error_code error;
+    if (fs::read_symlink(file.path(), error).string().find("punctum.") == std::string::npos) {
+      continue;
+    }
+    ++tried;
+    const int fd = open(file.path().c_str(), O_RDWR | O_CLOEXEC);
+    EXPECT_NE(ftruncate(fd, 0), 0) << file.path();
+    EXPECT_NE(ftruncate(fd, 1 << 30), 0) << file.path();
+    close(fd);
+  }
+  EXPECT_GE(tried, 3);  // core, commands, bench
+  std::this_thread::sleep_for(300ms);
+  EXPECT_TRUE(alive(run.pid()));
+  EXPECT_TRUE(alive(look.core()));
+  run.send(SIGINT);
+  EXPECT_EQ(run.wait(), 0) << run.output();
+  EXPECT_EQ(json()["outcome"], "done");
+}
+
+TEST_F(Programs, when_the_parent_is_killed_a_core_that_has_stopped_already_ends_too) {
   pid_t core = 0;
   {
     Running run({"run", "free", "--seconds", "60", "--report", report(), "--no-figure", "--set",
-                 "failure=[{device=\"haptic\", kind=\"disconnect\", at_s=0.2}]"},
+                 "sim.failure=[{device=\"haptic\", kind=\"disconnect\", at_s=0.2}]"},
                 words());
     Look look("free", run);
     ASSERT_TRUE(look.until_started()) << run.output();
@@ -233,16 +334,20 @@ TEST_F(Programs, WhenTheParentIsKilledACoreThatHasStoppedAlreadyEndsToo) {
     run.send(SIGKILL);
     EXPECT_EQ(run.wait(), -SIGKILL);
   }
-  for (int i = 0; i < 500 && alive(core); ++i) std::this_thread::sleep_for(10ms);
+  for (int i = 0; i < 500 && alive(core); ++i) {
+    std::this_thread::sleep_for(10ms);
+  }
   EXPECT_FALSE(alive(core));
-  if (alive(core)) kill(core, SIGKILL);
+  if (alive(core)) {
+    kill(core, SIGKILL);
+  }
 }
 
 // ---- the safety chain, under the virtual clock ----
 
-TEST_F(Programs, APressedEmergencyStopLatchesAndTheRunEndsAsAFault) {
+TEST_F(Programs, a_pressed_emergency_stop_latches_and_the_run_ends_as_a_fault) {
   EXPECT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "4", "--set",
-                     "estop_press=[{at_s=1, for_s=0.5}]"}),
+                     "sim.estop_press=[{at_s=1, for_s=0.5}]"}),
             3)
       << said_;
   const auto r = json();
@@ -253,15 +358,85 @@ TEST_F(Programs, APressedEmergencyStopLatchesAndTheRunEndsAsAFault) {
   // Within the ramp the force is gone, and nothing moves it back when the button is released.
   const Table t(fs::path(report()) / "samples.csv");
   for (std::size_t i = 0; i < t.rows.size(); ++i) {
-    if (t.number(i, "t_s") < 1.03) continue;
+    if (t.number(i, "t_s") < 1.03) {
+      continue;
+    }
     ASSERT_EQ(t.number(i, "fx_N"), 0) << t.text(i, "t_s");
     ASSERT_EQ(t.text(i, "fault"), "estop");
   }
 }
 
-TEST_F(Programs, ReleaseAndResetClearTheStopAndTheRunGoesOn) {
+TEST_F(Programs, a_fault_leaves_its_last_seconds_at_full_rate_and_tells_its_events) {
+  EXPECT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "8", "--samples-every", "10", "--set",
+                     "sim.estop_press=[{at_s=5, for_s=0.5}]"}),
+            3)
+      << said_;
+  const Table thin(fs::path(report()) / "samples.csv");
+  const Table full(fs::path(report()) / "fault.csv");
+  EXPECT_EQ(thin.column, full.column);
+  ASSERT_GT(full.rows.size(), 2000U);
+  std::size_t at = 0;
+  while (at < full.rows.size() && full.text(at, "fault") == "none") {
+    ++at;
+  }
+  ASSERT_LT(at, full.rows.size());
+  EXPECT_NEAR(full.number(at, "t_s") - full.number(0, "t_s"), 2, 0.002);
+  for (std::size_t i = 1; i < full.rows.size(); ++i) {
+    ASSERT_NEAR(full.number(i, "t_s") - full.number(i - 1, "t_s"), 1e-3, 1e-9);
+  }
+  const auto events = json()["events"];
+  const auto first = [&events](const char* what) {
+    return std::find_if(events.begin(), events.end(), [what](const auto& e) { return e["event"] == what; });
+  };
+  ASSERT_NE(first("fault"), events.end());
+  EXPECT_EQ((*first("fault"))["what"], "estop");
+  EXPECT_NEAR((*first("fault"))["t_s"].get<double>(), full.number(at, "t_s"), 1e-9);
+  EXPECT_EQ(events.back()["event"], "ended");
+  EXPECT_EQ(events.back()["what"], "fault");
+  EXPECT_EQ(json()["events_not_listed"], 0);
+  // The next run into this folder has no fault, and no such file.
+  ASSERT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "0.1"}), 0) << said_;
+  EXPECT_FALSE(fs::exists(fs::path(report()) / "fault.csv"));
+}
+
+TEST_F(Programs, an_operator_beside_the_run_changes_gains_by_commands_that_the_report_tells) {
+  Running run({"run", "free", "--seconds", "60", "--report", report(), "--no-figure"}, words());
+  Look look("free", run);
+  ASSERT_TRUE(look.until_started()) << run.output();
+  const auto joined = hal::Joined::join("free-" + std::to_string(run.pid()));
+  ASSERT_TRUE(joined) << joined.error();
+  const std::string name = tools::command_segment(rt::kConsole);
+  {
+    auto console = hal::Shared<rt::CommandSegment>::claim(name, joined->descriptor(name));
+    ASSERT_TRUE(console) << console.error();
+    EXPECT_FALSE(hal::Shared<rt::CommandSegment>::claim(name, joined->descriptor(name))) << "one at a time";
+    EXPECT_TRUE((*console)->queue.try_push({rt::Command::force_scale, 0.5}));
+    EXPECT_TRUE((*console)->queue.try_push({rt::Command::effect_gain, 0, rt::effect_damping}));
+    EXPECT_TRUE((*console)->queue.try_push({rt::Command::effect_gain, 0, rt::effect_membrane}));
+    std::this_thread::sleep_for(1s);
+    EXPECT_TRUE((*console)->queue.try_push({rt::Command::stop, 0}));
+  }
+  EXPECT_EQ(run.wait(), 0) << run.output();
+  const auto r = json();
+  std::vector<std::string> told;
+  for (const auto& e : r["events"]) {
+    if (e["event"] == "command" || e["event"] == "command_refused") {
+      EXPECT_EQ(e["writer"], "console");
+      told.push_back(e["event"].get<std::string>() + " " + e["what"].get<std::string>() +
+                     (e.contains("target") ? " " + e["target"].get<std::string>() : ""));
+    }
+  }
+  EXPECT_EQ(told, (Strings{"command force_scale", "command effect_gain damping",
+                           "command_refused effect_gain membrane", "command stop"}));
+  // Without damping, the only effect of this scene, there is no force.
+  const Table t(fs::path(report()) / "samples.csv");
+  const std::size_t before_stop = t.rows.size() - 200;
+  EXPECT_EQ(t.number(before_stop, "damping_N"), 0) << t.text(before_stop, "t_s");
+}
+
+TEST_F(Programs, release_and_reset_clear_the_stop_and_the_run_goes_on) {
   EXPECT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "4", "--set",
-                     "estop_press=[{at_s=1, for_s=0.5, reset_after=true}]"}),
+                     "sim.estop_press=[{at_s=1, for_s=0.5, reset_after=true}]"}),
             0)
       << said_;
   const auto r = json();
@@ -270,9 +445,9 @@ TEST_F(Programs, ReleaseAndResetClearTheStopAndTheRunGoesOn) {
   EXPECT_EQ(r["faults"][0]["name"], "estop");
 }
 
-TEST_F(Programs, ALostHandStopsTheStation) {
+TEST_F(Programs, a_lost_hand_stops_the_station) {
   EXPECT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "4", "--set",
-                     "failure=[{device=\"haptic\", kind=\"disconnect\", at_s=1}]"}),
+                     "sim.failure=[{device=\"haptic\", kind=\"disconnect\", at_s=1}]"}),
             3)
       << said_;
   EXPECT_EQ(json()["outcome_detail"], "hand_lost");
@@ -280,7 +455,7 @@ TEST_F(Programs, ALostHandStopsTheStation) {
 
 // ---- what is refused ----
 
-TEST_F(Programs, BadInputIsRefusedInOneLineAndNothingStarts) {
+TEST_F(Programs, bad_input_is_refused_in_one_line_and_nothing_starts) {
   const std::vector<std::pair<Strings, std::string>> wrong = {
       {{"run", "icsy"}, "icsy: unknown scene (did you mean icsi?)"},
       {{"run", "free", "--rate", "3000"}, "--set: servo.rate_hz: 3000 is not one of the choices"},
@@ -311,7 +486,7 @@ TEST_F(Programs, BadInputIsRefusedInOneLineAndNothingStarts) {
   }
 }
 
-TEST_F(Programs, AReportFolderThatCannotBeIsRefused) {
+TEST_F(Programs, a_report_folder_that_cannot_be_is_refused) {
   std::ofstream(folder_ / "file") << "x";
   Running run(
       {"run", "free", "--clock", "virtual", "--seconds", "1", "--report", (folder_ / "file").string()},
@@ -320,7 +495,7 @@ TEST_F(Programs, AReportFolderThatCannotBeIsRefused) {
   EXPECT_NE(run.output().find("cannot be used as report folder"), std::string::npos) << run.output();
 }
 
-TEST_F(Programs, TheCoreAloneRefusesWhatItCannotRunWith) {
+TEST_F(Programs, the_core_alone_refuses_what_it_cannot_run_with) {
   const auto core = [this](const std::string& args) {
     const int status = std::system(
         (std::string(PUNCTUM_BIN_DIR) + "/punctum-core " + args + " >" + words().string() + " 2>&1").c_str());
@@ -328,19 +503,60 @@ TEST_F(Programs, TheCoreAloneRefusesWhatItCannotRunWith) {
     return WEXITSTATUS(status);
   };
   EXPECT_EQ(core(""), 2);
-  EXPECT_EQ(core("--scene free --station nobody.station --bench nobody.bench"), 2);
+  EXPECT_EQ(core("--scene free --segments core=77"), 2);
   EXPECT_EQ(std::count(said_.begin(), said_.end(), '\n'), 1) << said_;
   EXPECT_EQ(core("--scene"), 2);
   EXPECT_EQ(core("--wings 2"), 2);
 }
 
+TEST_F(Programs, every_program_tells_its_version_and_commit) {
+  int programs = 0;
+  for (const auto& entry : fs::directory_iterator(PUNCTUM_BIN_DIR)) {
+    const std::string name = entry.path().filename().string();
+    Running run({"--version"}, words(), name.c_str());
+    EXPECT_EQ(run.wait(), 0) << name;
+    EXPECT_TRUE(std::regex_match(
+        run.output(), std::regex(name + " [0-9]+\\.[0-9]+ \\((unknown|[0-9a-f]{12}(\\+changes)?)\\)\n")))
+        << run.output();
+    ++programs;
+  }
+  EXPECT_GE(programs, 2);
+}
+
+TEST_F(Programs, whoever_joins_a_running_station_may_read_it_and_is_no_second_core) {
+  Running run({"run", "free", "--seconds", "60", "--set", kPatientRelay, "--report", report(), "--no-figure"},
+              words());
+  Look look("free", run);
+  ASSERT_TRUE(look.until_started()) << run.output();
+  const std::string station = "free-" + std::to_string(run.pid());
+  const auto joined = hal::Joined::join(station);
+  ASSERT_TRUE(joined) << joined.error();
+  const auto second =
+      hal::Shared<rt::CoreSegment>::claim(tools::kCoreSegment, joined->descriptor(tools::kCoreSegment));
+  ASSERT_FALSE(second);
+  EXPECT_NE(second.error().find("already written by process " + std::to_string(look.core())),
+            std::string::npos)
+      << second.error();
+  for (const char* name : {tools::kCoreSegment, tools::kBenchSegment}) {
+    EXPECT_EQ(mmap(nullptr, 4096, PROT_READ | PROT_WRITE, MAP_SHARED, joined->descriptor(name), 0),
+              MAP_FAILED)
+        << name;
+  }
+  EXPECT_EQ(joined->descriptor(tools::command_segment(rt::kParent)), -1) << "the parent's own";
+  EXPECT_FALSE(hal::Rendezvous::open(station)) << "the name of a running station is taken";
+  run.send(SIGINT);
+  EXPECT_EQ(run.wait(), 0) << run.output();
+  EXPECT_EQ(json()["outcome"], "done");
+}
+
 // ---- explain and check ----
 
-TEST_F(Programs, ExplainSaysWhatRunsAndWhatIsLeftOut) {
+TEST_F(Programs, explain_says_what_runs_and_what_is_left_out) {
   ASSERT_EQ(punctum({"explain", "icsi"}), 0);
   for (const char* word : {"punctum-core", "punctum-vision", "SCHED_FIFO 80", "1000 Hz", "membrane",
-                           "cone guide", "withdrawal axis", "damping", "snake", "25 per s"})
+                           "cone guide", "withdrawal axis", "damping", "snake", "25 per s"}) {
     EXPECT_NE(said_.find(word), std::string::npos) << word;
+  }
   ASSERT_EQ(punctum({"explain", "free"}), 0);
   EXPECT_EQ(said_.find("punctum-vision"), std::string::npos);
   EXPECT_NE(said_.find("left out"), std::string::npos);
@@ -349,7 +565,7 @@ TEST_F(Programs, ExplainSaysWhatRunsAndWhatIsLeftOut) {
   EXPECT_NE(said_.find("a number from"), std::string::npos);
 }
 
-TEST_F(Programs, CheckFindsFramesThatAreNotThere) {
+TEST_F(Programs, check_finds_frames_that_are_not_there) {
   EXPECT_EQ(punctum({"check", "free"}), 0) << said_;
   EXPECT_EQ(punctum({"check", "recorded", "--set", "camera.frames=/nowhere"}), 2);
   EXPECT_NE(said_.find("FAIL files"), std::string::npos) << said_;

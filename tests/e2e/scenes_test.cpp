@@ -11,9 +11,10 @@
 #include <string>
 #include <vector>
 
-#include "tests/e2e/programs.hpp"
+#include "tests/e2e/quick_report.hpp"
+#include "tests/support/programs.hpp"
 #include "tools/report/simulated_frames.hpp"
-#include "tools/scene_keys.hpp"
+#include "tools/scene/scene_keys.hpp"
 
 namespace punctum::e2e {
 namespace {
@@ -22,44 +23,39 @@ using Strings = std::vector<std::string>;
 
 bool valgrind_is_there() { return std::system("valgrind --version >/dev/null 2>&1") == 0; }
 
-// The topic is measured once for all tests.
 class Scenes : public Programs {
  protected:
-  static void SetUpTestSuite() {
-    std::string name = (fs::temp_directory_path() / "punctum-scenes-test-XXXXXX").string();
-    ASSERT_NE(mkdtemp(name.data()), nullptr);
-    measured_ = name;
-    Running run({"scenes", "--quick", "--out", measured_.string()}, measured_ / "said.txt", "punctum-report");
-    code_ = run.wait();
-  }
-  static void TearDownTestSuite() { fs::remove_all(measured_); }
   void SetUp() override {
     Programs::SetUp();
-    ASSERT_EQ(code_, 0) << read_all(measured_ / "said.txt");
+    ASSERT_EQ(quick_report().code, 0) << quick_report().said;
   }
 
-  [[nodiscard]] static Table table(const std::string& name) { return Table(measured_ / (name + ".csv")); }
+  [[nodiscard]] static Table table(const std::string& name) {
+    return Table(quick_report().folder() / (name + ".csv"));
+  }
   // Its rows that belong to one scene.
   [[nodiscard]] static std::vector<std::size_t> rows_of(const Table& t, const std::string& scene) {
     std::vector<std::size_t> rows;
-    for (std::size_t i = 0; i < t.rows.size(); ++i)
-      if (t.text(i, "scene") == scene) rows.push_back(i);
+    for (std::size_t i = 0; i < t.rows.size(); ++i) {
+      if (t.text(i, "scene") == scene) {
+        rows.push_back(i);
+      }
+    }
     return rows;
   }
-
-  inline static fs::path measured_;
-  inline static int code_ = -1;
 };
 
-TEST_F(Scenes, EveryBuiltInSceneIsMeasured) {
+TEST_F(Scenes, every_built_in_scene_is_measured) {
   const Table t = table("scenes");
   std::set<std::string> names;
-  for (std::size_t i = 0; i < t.rows.size(); ++i) names.insert(t.text(i, "scene"));
+  for (std::size_t i = 0; i < t.rows.size(); ++i) {
+    names.insert(t.text(i, "scene"));
+  }
   EXPECT_EQ(names,
             (std::set<std::string>{"free", "icsi", "no-holder", "outer-only", "recorded", "zebrafish"}));
 }
 
-TEST_F(Scenes, OpenCVIsInTheVisionProcessOnlyAndFreeStartsNone) {
+TEST_F(Scenes, open_cv_is_in_the_vision_process_only_and_free_starts_none) {
   const Table t = table("scenes_processes");
   for (const char* scene : {"free", "icsi", "no-holder", "outer-only", "recorded", "zebrafish"}) {
     std::multiset<std::string> processes;
@@ -70,12 +66,14 @@ TEST_F(Scenes, OpenCVIsInTheVisionProcessOnlyAndFreeStartsNone) {
       EXPECT_GT(t.number(i, "libraries"), 1) << scene << " " << process;  // libc, libstdc++
     }
     std::multiset<std::string> wanted{"punctum", "punctum-core"};
-    if (scene != std::string("free")) wanted.insert("punctum-vision");
+    if (scene != std::string("free")) {
+      wanted.insert("punctum-vision");
+    }
     EXPECT_EQ(processes, wanted) << scene;
   }
 }
 
-TEST_F(Scenes, ExplainSaysInWordsWhatWasMeasured) {
+TEST_F(Scenes, explain_says_in_words_what_was_measured) {
   const Table costs = table("scenes"), processes = table("scenes_processes");
   for (std::size_t i = 0; i < costs.rows.size(); ++i) {
     const std::string& scene = costs.text(i, "scene");
@@ -84,7 +82,9 @@ TEST_F(Scenes, ExplainSaysInWordsWhatWasMeasured) {
     std::smatch said;
     ASSERT_TRUE(std::regex_search(said_, said, std::regex("(\\d+) processes of one thread each"))) << said_;
     EXPECT_EQ(std::stod(said[1]), costs.number(i, "processes"));
-    for (const std::size_t p : rows_of(processes, scene)) EXPECT_EQ(processes.number(p, "threads"), 1);
+    for (const std::size_t p : rows_of(processes, scene)) {
+      EXPECT_EQ(processes.number(p, "threads"), 1);
+    }
     ASSERT_TRUE(std::regex_search(said_, said, std::regex("force effects +(\\d+): "))) << said_;
     EXPECT_EQ(std::stod(said[1]), costs.number(i, "effects"));
     if (std::regex_search(said_, said, std::regex("(\\d+) stages far from the cell.* (\\d+) at it"))) {
@@ -98,21 +98,23 @@ TEST_F(Scenes, ExplainSaysInWordsWhatWasMeasured) {
   }
 }
 
-TEST_F(Scenes, WhatIsLeftOutIsSaidForEveryThingThereIs) {
+TEST_F(Scenes, explain_names_every_table_that_is_left_out) {
   for (const auto name : tools::builtin_names()) {
     const auto scene = tools::load_scene(name);
     ASSERT_TRUE(scene) << scene.error();
     ASSERT_EQ(punctum({"explain", std::string(name)}), 0);
     const auto left_out = said_.find("\nleft out");
     for (const auto& t : tools::scene_tables()) {
-      if (t.kind != tools::Kind::thing || t.there(*scene)) continue;
+      if (t.kind != tools::Kind::thing || t.there(*scene)) {
+        continue;
+      }
       ASSERT_NE(left_out, std::string::npos) << said_;
       EXPECT_NE(said_.find("\n  " + t.name + " ", left_out), std::string::npos) << name << ": " << t.name;
     }
   }
 }
 
-TEST_F(Scenes, VisionRunsOnlyTheStagesThatTheSceneNeeds) {
+TEST_F(Scenes, vision_runs_only_the_stages_that_the_scene_needs) {
   const Table t = table("scenes_stages");
   for (std::size_t i = 0; i < t.rows.size(); ++i) {
     const std::string &scene = t.text(i, "scene"), &stage = t.text(i, "stage");
@@ -134,15 +136,21 @@ TEST_F(Scenes, VisionRunsOnlyTheStagesThatTheSceneNeeds) {
   }
 }
 
-TEST_F(Scenes, InstructionsFallWithEveryTableRemoved) {
-  if (!valgrind_is_there()) GTEST_SKIP() << "valgrind is not installed";
-  // These are no business of the tick: the plant's, the camera's and vision's.
-  const std::set<std::string> outside{"cell", "cell.inner", "holder", "camera", "vision", "vision.holder"};
+TEST_F(Scenes, instructions_fall_with_every_table_removed) {
+  if (!valgrind_is_there()) {
+    GTEST_SKIP() << "valgrind is not installed";
+  }
+  // The tick does not depend on these tables: they belong to plant, camera and vision.
+  const std::set<std::string> outside{"sim.cell", "sim.cell.inner", "sim.holder",
+                                      "camera",   "vision",         "vision.holder"};
   const auto scene = tools::load_scene("icsi");
   ASSERT_TRUE(scene);
   std::multiset<std::string> left;
-  for (const auto& t : tools::scene_tables())
-    if (t.kind == tools::Kind::thing && t.there(*scene)) left.insert(t.name);
+  for (const auto& t : tools::scene_tables()) {
+    if (t.kind == tools::Kind::thing && t.there(*scene)) {
+      left.insert(t.name);
+    }
+  }
   const Table t = table("scenes_tables");
   for (const std::size_t i : rows_of(t, "icsi")) {
     const std::string& removed = t.text(i, "removed");
@@ -163,12 +171,14 @@ TEST_F(Scenes, InstructionsFallWithEveryTableRemoved) {
   EXPECT_TRUE(left.empty()) << *left.begin() << " was not taken out";
 }
 
-TEST_F(Scenes, WithoutItsTablesEverySceneTicksAlike) {
-  if (!valgrind_is_there()) GTEST_SKIP() << "valgrind is not installed";
+TEST_F(Scenes, every_scene_costs_the_same_without_its_tables) {
+  if (!valgrind_is_there()) {
+    GTEST_SKIP() << "valgrind is not installed";
+  }
   const Table t = table("scenes");
   for (std::size_t i = 0; i < t.rows.size(); ++i) {
     EXPECT_EQ(t.text(i, "fault"), "none");
-    // What is left depends a little on how the hand moves.
+    // The rest depends a little on the motion of the hand.
     EXPECT_NEAR(t.number(i, "instructions_bare"), t.number(0, "instructions_bare"),
                 0.02 * t.number(0, "instructions_bare"))
         << t.text(i, "scene");
@@ -176,9 +186,11 @@ TEST_F(Scenes, WithoutItsTablesEverySceneTicksAlike) {
   }
 }
 
-// Not what vision says of itself: which of its functions were called, by the processor.
-TEST_F(Scenes, VisionCallsNothingForWhatIsLeftOut) {
-  if (!valgrind_is_there()) GTEST_SKIP() << "valgrind is not installed";
+// The functions that the processor called, whatever vision reports about itself.
+TEST_F(Scenes, vision_calls_nothing_for_what_is_left_out) {
+  if (!valgrind_is_there()) {
+    GTEST_SKIP() << "valgrind is not installed";
+  }
   report::InjectionPlan plan;
   plan.gap_m = 18e-6;
   plan.approach_m_s = 200e-6;
@@ -193,7 +205,7 @@ TEST_F(Scenes, VisionCallsNothingForWhatIsLeftOut) {
     out.write(reinterpret_cast<const char*>(injection.pixels[i].data()),
               static_cast<std::streamsize>(injection.pixels[i].size()));
   }
-  // The scene with less of everything: no inner membrane, and nobody looks for the holding pipette.
+  // A reduced scene: without an inner membrane, and without the search for the holding pipette.
   std::string less(*tools::builtin_text("outer-only"));
   const std::string holder = "[vision.holder]";
   ASSERT_NE(less.find(holder), std::string::npos);
@@ -212,8 +224,12 @@ TEST_F(Scenes, VisionCallsNothingForWhatIsLeftOut) {
     std::ifstream in(counts);
     std::string called;
     for (std::string line; std::getline(in, line);) {
-      if (line.starts_with("cfn=")) called = line.substr(4, line.find('(') - 4);
-      if (line.starts_with("calls=")) n[called] += std::atoi(line.c_str() + 6);
+      if (line.starts_with("cfn=")) {
+        called = line.substr(4, line.find('(') - 4);
+      }
+      if (line.starts_with("calls=")) {
+        n[called] += std::atoi(line.c_str() + 6);
+      }
     }
     return n;
   };
@@ -231,8 +247,8 @@ TEST_F(Scenes, VisionCallsNothingForWhatIsLeftOut) {
   }
 }
 
-// The observer that reads the truth looks at no picture, so none is drawn.
-TEST_F(Scenes, TruthDrawsNoPicture) {
+// The observer that reads the truth needs no picture, so none is drawn.
+TEST_F(Scenes, truth_draws_no_picture) {
   ASSERT_EQ(punctum({"run", "icsi", "--clock", "virtual", "--seconds", "1", "--set", "vision.method=truth"}),
             1)
       << said_;

@@ -11,8 +11,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (picture) {
     const auto expected =
         static_cast<std::size_t>(picture->width) * static_cast<std::size_t>(picture->height);
-    if (expected == 0 || picture->pixels.size() != expected || picture->bits < 8 || picture->bits > 16)
+    if (expected == 0 || picture->pixels.size() != expected || picture->bits < 8 || picture->bits > 16) {
       std::abort();
+    }
   } else if (picture.error().empty() || picture.error().find('\n') != std::string::npos) {
     std::abort();
   }

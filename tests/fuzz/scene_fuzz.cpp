@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "tools/scene.hpp"
+#include "tools/scene/scene.hpp"
 
 namespace {
 

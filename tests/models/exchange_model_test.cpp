@@ -6,8 +6,8 @@
 #include <iostream>
 #include <memory>
 
-#include "hal/exchange.hpp"
-#include "tests/models/weak_memory.hpp"
+#include "hal/ipc/exchange.hpp"
+#include "tests/support/weak_memory.hpp"
 
 namespace punctum::model {
 namespace {
@@ -48,7 +48,9 @@ struct RingCase {
       }
     };
     world.thread(kWriter, [this, write] { write(pushes, 1); });
-    if (writer_dies) world.mortal(kWriter, [this, write] { write(pushes, 2); });
+    if (writer_dies) {
+      world.mortal(kWriter, [this, write] { write(pushes, 2); });
+    }
     world.thread(kReader, [this, ring, &world] {
       std::uint64_t seen = 0;
       bool any = false;
@@ -59,19 +61,30 @@ struct RingCase {
         if (wanted >= 0) {
           index = static_cast<std::uint64_t>(wanted);
           result = ring->read(index, sample);
-          if (any && index <= seen && result == hal::Read::not_yet)
+          if (any && index <= seen && result == hal::Read::not_yet) {
             world.fail("a seen sample became not_yet");
+          }
         } else {
           result = ring->newest(sample, index);
-          if (any && result == hal::Read::not_yet) world.fail("the ring became empty");
-          if (any && result == hal::Read::ok && index < seen) world.fail("the newest became older");
+          if (any && result == hal::Read::not_yet) {
+            world.fail("the ring became empty");
+          }
+          if (any && result == hal::Read::ok && index < seen) {
+            world.fail("the newest became older");
+          }
           if (pushes <= 2 && !writer_dies && result == hal::Read::overrun) {
             world.fail("overrun although nothing was overwritten");
           }
         }
-        if (result != hal::Read::ok) continue;
-        if (!sample.whole()) world.fail("a torn sample was accepted");
-        if (sample.index() != index) world.fail("a sample of another number was accepted");
+        if (result != hal::Read::ok) {
+          continue;
+        }
+        if (!sample.whole()) {
+          world.fail("a torn sample was accepted");
+        }
+        if (sample.index() != index) {
+          world.fail("a sample of another number was accepted");
+        }
         if (wanted < 0) {
           seen = index;
           any = true;
@@ -98,7 +111,7 @@ const std::vector<std::pair<const char*, const RingCase*>> kRingCases{
     {"append", &kAppend}, {"overwrite", &kOverwrite},       {"follow", &kFollow},
     {"crash", &kCrash},   {"crash, newest", &kCrashNewest}, {"two looks", &kTwoLooks}};
 
-TEST(SeqRingModel, NoExecutionAcceptsATornSampleOrLosesOne) {
+TEST(SeqRingModel, no_execution_accepts_a_torn_sample_or_loses_one) {
   for (const auto& [name, scenario] : kRingCases) {
     const Verdict verdict = explore(*scenario);
     EXPECT_EQ(verdict.failure, "") << name << "\n" << verdict.trace;
@@ -120,11 +133,13 @@ std::string first_failure(const Mutation& mutation) {
 
 Mutation weaken(const std::function<bool(const Access&)>& which) {
   return {.before = [which](Access& a) {
-    if (which(a)) a.order = std::memory_order_relaxed;
+    if (which(a)) {
+      a.order = std::memory_order_relaxed;
+    }
   }};
 }
 
-TEST(SeqRingModel, FindsEveryOrderingThatIsTakenAway) {
+TEST(SeqRingModel, finds_every_ordering_that_is_taken_away) {
   const auto store_of = [](bool (*where)(int)) {
     return [where](const Access& a) { return a.store && where(a.location); };
   };
@@ -139,14 +154,14 @@ TEST(SeqRingModel, FindsEveryOrderingThatIsTakenAway) {
   EXPECT_NE(first_failure(weaken(load_of(is_head))), "") << "head loaded relaxed";
 }
 
-TEST(SeqRingModel, FindsAMissingOddMark) {
+TEST(SeqRingModel, finds_a_missing_odd_mark) {
   EXPECT_NE(
       first_failure(
           {.before = [](Access& a) { a.dropped = a.store && is_sequence(a.location) && a.value % 2 == 1; }}),
       "");
 }
 
-TEST(SeqRingModel, FindsAMissingSecondCheck) {
+TEST(SeqRingModel, finds_a_missing_second_check) {
   std::uint64_t first_check = 0;
   EXPECT_NE(first_failure({.before =
                                [&](Access& a) {
@@ -157,16 +172,20 @@ TEST(SeqRingModel, FindsAMissingSecondCheck) {
                                },
                            .after =
                                [&](Access& a) {
-                                 if (a.role == kReader && is_sequence(a.location)) first_check = a.value;
+                                 if (a.role == kReader && is_sequence(a.location)) {
+                                   first_check = a.value;
+                                 }
                                }}),
             "");
 }
 
-TEST(SeqRingModel, FindsAWriterThatDoesNotLookForASampleItsPredecessorFinished) {
+TEST(SeqRingModel, finds_a_writer_that_does_not_look_for_a_sample_its_predecessor_finished) {
   // Without it the successor rewrites a sample that readers accept: torn, with an unchanged sequence.
   EXPECT_NE(first_failure({.before =
                                [](Access& a) {
-                                 if (a.role == kWriter && !a.store && is_sequence(a.location)) a.forced = 0;
+                                 if (a.role == kWriter && !a.store && is_sequence(a.location)) {
+                                   a.forced = 0;
+                                 }
                                }}),
             "");
 }
@@ -193,13 +212,19 @@ struct QueueCase {
     const auto produce = [this, state] {
       for (int n = 0; n < attempts; ++n) {
         const std::uint64_t number = state->number++;
-        if (state->queue.try_push(Sample::of(number, 1))) state->accepted.push_back(number);
+        if (state->queue.try_push(Sample::of(number, 1))) {
+          state->accepted.push_back(number);
+        }
       }
     };
     const auto consume = [state, &world] {
       Sample sample;
-      if (!state->queue.try_pop(sample)) return false;
-      if (!sample.whole()) world.fail("a torn command was taken");
+      if (!state->queue.try_pop(sample)) {
+        return false;
+      }
+      if (!sample.whole()) {
+        world.fail("a torn command was taken");
+      }
       if (!state->received.empty() && sample.index() <= state->received.back()) {
         world.fail("a command came twice or out of order");
       }
@@ -207,9 +232,13 @@ struct QueueCase {
       return true;
     };
     world.thread(kWriter, produce);
-    if (producer_dies) world.mortal(kWriter, produce);
+    if (producer_dies) {
+      world.mortal(kWriter, produce);
+    }
     world.thread(kReader, [this, consume] {
-      for (int n = 0; n < attempts; ++n) (void)consume();
+      for (int n = 0; n < attempts; ++n) {
+        (void)consume();
+      }
     });
     world.at_end([this, state, consume, &world] {
       while (consume()) {
@@ -236,14 +265,18 @@ std::string queue_failure(const Mutation& mutation, bool said = true) {
       std::cout << (scenario->producer_dies ? "producer dies: " : "exchange: ") << verdict.executions
                 << " executions " << verdict.failure << "\n";
     }
-    if (!verdict.failure.empty()) return verdict.failure + "\n" + verdict.trace;
+    if (!verdict.failure.empty()) {
+      return verdict.failure + "\n" + verdict.trace;
+    }
   }
   return "";
 }
 
-TEST(CommandQueueModel, NoExecutionLosesRepeatsReordersOrTearsACommand) { EXPECT_EQ(queue_failure({}), ""); }
+TEST(CommandQueueModel, no_execution_loses_repeats_reorders_or_tears_a_command) {
+  EXPECT_EQ(queue_failure({}), "");
+}
 
-TEST(CommandQueueModel, FindsEveryOrderingThatIsTakenAway) {
+TEST(CommandQueueModel, finds_every_ordering_that_is_taken_away) {
   EXPECT_NE(queue_failure(weaken([](const Access& a) { return a.store && a.location == kPut; })), "");
   EXPECT_NE(queue_failure(weaken([](const Access& a) { return !a.store && a.location == kPut; })), "");
   // Entries travel with release and acquire themselves; the two sides of `taken` matter when they do not.
@@ -257,22 +290,26 @@ TEST(CommandQueueModel, FindsEveryOrderingThatIsTakenAway) {
             "");
 }
 
-TEST(CommandQueueModel, IsNotAlarmedByOrderingsThatAreStrongerThanNeeded) {
+TEST(CommandQueueModel, is_not_alarmed_by_orderings_that_are_stronger_than_needed) {
   EXPECT_EQ(queue_failure(weaken([](const Access& a) { return is_entry(a.location); })), "");
 }
 
-TEST(CommandQueueModel, FindsABoundThatIsOneTooLarge) {
+TEST(CommandQueueModel, finds_a_bound_that_is_one_too_large) {
   // When two entries lie in the queue the producer is told that one more was taken.
   std::uint64_t put = 0;
   EXPECT_NE(queue_failure({.before =
                                [&](Access& a) {
-                                 if (a.store && a.location == kPut) put = a.value;
+                                 if (a.store && a.location == kPut) {
+                                   put = a.value;
+                                 }
                                },
                            .after =
                                [&](Access& a) {
                                  const bool full =
                                      a.role == kWriter && a.location == kTaken && a.value + 2 == put;
-                                 if (full) ++a.value;
+                                 if (full) {
+                                   ++a.value;
+                                 }
                                }}),
             "");
 }

@@ -66,7 +66,7 @@ constexpr Row kRows[] = {
     {0.20000000000000001, 1.5, 0.001, 3, 0, 0, 500, 10.000000000000002, 75.5013192394, 3136.26112859},
 };
 
-TEST(DeviceLimits, AreWhereAnEigenvalueLeavesTheUnitCircle) {
+TEST(DeviceLimits, are_where_an_eigenvalue_leaves_the_unit_circle) {
   double worst_B = 0;
   double worst_K = 0;
   for (const Row& r : kRows) {
@@ -86,7 +86,7 @@ TEST(DeviceLimits, AreWhereAnEigenvalueLeavesTheUnitCircle) {
   std::printf("worst relative difference: damping %.1e, stiffness %.1e\n", worst_B, worst_K);
 }
 
-TEST(DeviceLimits, DampingOfABareMassIsTheLiteratures) {
+TEST(DeviceLimits, damping_of_a_bare_mass_is_the_literatures) {
   // In units of m/T: no delay, one tick, two ticks.
   const double unit = 0.075 / kT;
   EXPECT_NEAR(stable_damping_Ns_m(device(0.075, 0.1, 0), kT, slope_of(1)) / unit, 2, 1e-12);
@@ -107,7 +107,7 @@ TEST(DeviceLimits, DampingOfABareMassIsTheLiteratures) {
   }
 }
 
-TEST(DeviceLimits, StiffnessOfABareMassIsTheClosedForm) {
+TEST(DeviceLimits, stiffness_of_a_bare_mass_is_the_closed_form) {
   // K T^2/m < 2 beta (2 - beta) / (2 + beta) for a finite difference without delay.
   const HandDevice bare = device(0.075, 0, 0);
   const double unit = 0.075 / (kT * kT);
@@ -122,7 +122,7 @@ TEST(DeviceLimits, StiffnessOfABareMassIsTheClosedForm) {
   EXPECT_EQ(stable_stiffness_N_m(bare, kT, slope_of(1), 0), 0);
 }
 
-TEST(DeviceLimits, PassiveStiffnessIsThatOfAHoldAndADelay) {
+TEST(DeviceLimits, passive_stiffness_is_that_of_a_hold_and_a_delay) {
   // b = 0.1: 200/800/1600 N/m at 1/4/8 kHz without delay, 67/267/533 with one tick.
   const double no_delay[] = {200, 800, 1600};
   const double one_tick[] = {67, 267, 533};
@@ -154,13 +154,17 @@ double growth(const HandDevice& d, double K, double B, double smooth_s, int tick
     const double terminal = f / d.damping_Ns_m;
     x += terminal * kT + (v - terminal) * d.mass_kg / d.damping_Ns_m * (1 - e);
     v = terminal + (v - terminal) * e;
-    if (k < ticks / 10) first = std::max(first, std::abs(x));
-    if (k >= ticks - ticks / 10) last = std::max(last, std::abs(x));
+    if (k < ticks / 10) {
+      first = std::max(first, std::abs(x));
+    }
+    if (k >= ticks - ticks / 10) {
+      last = std::max(last, std::abs(x));
+    }
   }
   return last / first;
 }
 
-TEST(DeviceLimits, ALoopStepsStableBelowAndUnstableAbove) {
+TEST(DeviceLimits, a_loop_steps_stable_below_and_unstable_above) {
   for (const int delay : {0, 1, 3}) {
     for (const double B : {0.0, 1.0, 4.0}) {
       for (const double smooth_s : {0.0, 0.003}) {

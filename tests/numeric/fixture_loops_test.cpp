@@ -52,7 +52,9 @@ template <class G>
 void zeros(const G& g, std::vector<double>& out) {
   constexpr int kSamples = 16;
   std::array<double, kSamples + 1> at;
-  for (int i = 0; i <= kSamples; ++i) at[static_cast<std::size_t>(i)] = g(static_cast<double>(i) / kSamples);
+  for (int i = 0; i <= kSamples; ++i) {
+    at[static_cast<std::size_t>(i)] = g(static_cast<double>(i) / kSamples);
+  }
   const auto bisect = [&](double a, double b) {
     const bool below = g(a) < 0;
     for (int k = 0; k < 52 && b - a > 1e-15; ++k) {
@@ -67,11 +69,19 @@ void zeros(const G& g, std::vector<double>& out) {
     const double here = static_cast<double>(i) * step;
     const bool first = i == 0;
     const bool last = i == kSamples;
-    if (!last && positive(i) != positive(i + 1)) bisect(here, here + step);
-    if ((!first && positive(i - 1) != positive(i)) || (!last && positive(i + 1) != positive(i))) continue;
+    if (!last && positive(i) != positive(i + 1)) {
+      bisect(here, here + step);
+    }
+    if ((!first && positive(i - 1) != positive(i)) || (!last && positive(i + 1) != positive(i))) {
+      continue;
+    }
     const double sign = positive(i) ? 1 : -1;
-    if (!first && sign * at[i] > sign * at[i - 1]) continue;
-    if (!last && sign * at[i] > sign * at[i + 1]) continue;
+    if (!first && sign * at[i] > sign * at[i - 1]) {
+      continue;
+    }
+    if (!last && sign * at[i] > sign * at[i + 1]) {
+      continue;
+    }
     double low = first ? 0 : here - step, high = last ? 1 : here + step;
     for (int k = 0; k < 44; ++k) {  // golden section
       const double m1 = high - 0.618033988749895 * (high - low), m2 = low + 0.618033988749895 * (high - low);
@@ -82,9 +92,15 @@ void zeros(const G& g, std::vector<double>& out) {
       }
     }
     const double dip = (low + high) / 2;
-    if ((g(dip) < 0) == (at[i] < 0)) continue;
-    if (dip > 0) bisect(first ? 0 : here - step, dip);
-    if (dip < 1) bisect(dip, last ? 1 : here + step);
+    if ((g(dip) < 0) == (at[i] < 0)) {
+      continue;
+    }
+    if (dip > 0) {
+      bisect(first ? 0 : here - step, dip);
+    }
+    if (dip < 1) {
+      bisect(dip, last ? 1 : here + step);
+    }
   }
 }
 
@@ -118,7 +134,7 @@ Loops run(const Field& field, const Knots& knots, const Corner& corner, std::mt1
     double sum = 0;
     rounding = 0;
     for (std::size_t i = 0; i < Gauss::n; ++i) {
-      const Pull p = field(a + (from + (to - from) * gauss.x[i]) * way);
+      const PotentialForce p = field(a + (from + (to - from) * gauss.x[i]) * way);
       energy = std::max(energy, p.energy_J);
       sum += gauss.w[i] * p.force_N.dot(way);
       rounding += gauss.w[i] * p.force_N.norm();
@@ -133,13 +149,17 @@ Loops run(const Field& field, const Knots& knots, const Corner& corner, std::mt1
     const double left = panel(a, way, from, middle);
     const double right = panel(a, way, middle, to);
     const double off = std::abs(left + right - whole);
-    if (depth == 0 || off <= 1e-15 * energy || off <= rounding) return left + right;
+    if (depth == 0 || off <= 1e-15 * energy || off <= rounding) {
+      return left + right;
+    }
     return integral(a, way, from, middle, left, depth - 1) + integral(a, way, middle, to, right, depth - 1);
   };
   for (int n = 0; n < loops; ++n) {
     loop.clear();
     const int corners = 3 + n % 2;
-    for (int i = 0; i < corners; ++i) loop.push_back(corner(random));
+    for (int i = 0; i < corners; ++i) {
+      loop.push_back(corner(random));
+    }
     energy = 0;
     double work = 0;
     for (int i = 0; i < corners; ++i) {
@@ -149,7 +169,9 @@ Loops run(const Field& field, const Knots& knots, const Corner& corner, std::mt1
       knots(a, b, cuts);
       std::sort(cuts.begin(), cuts.end());
       for (std::size_t k = 0; k + 1 < cuts.size(); ++k) {
-        if (!(cuts[k + 1] > cuts[k])) continue;
+        if (!(cuts[k + 1] > cuts[k])) {
+          continue;
+        }
         work += integral(a, b - a, cuts[k], cuts[k + 1], panel(a, b - a, cuts[k], cuts[k + 1]), 14);
       }
     }
@@ -168,8 +190,9 @@ Loops run(const Field& field, const Knots& knots, const Corner& corner, std::mt1
 void tell(const char* name, const Loops& l) {
   std::printf("%s: worst work %.1e of the loop's largest stored energy, %.1e of the largest (%.2g mJ)\n",
               name, l.worst, l.worst_of_all, l.largest_J * 1e3);
-  for (const Vec3& v : l.worst_loop)
+  for (const Vec3& v : l.worst_loop) {
     std::printf("  (%.3f, %.3f, %.3f) um\n", v.x() * 1e6, v.y() * 1e6, v.z() * 1e6);
+  }
 }
 
 const FixtureFrame kFrame{Vec3(21e-6, -4e-6, 2e-6), Vec3(-0.97, 0.15, -0.2).normalized()};
@@ -190,12 +213,14 @@ Vec3 near_the_cell(std::mt19937_64& random) {
   return kFrame.entry_m - d(random) * kFrame.axis + r * (std::cos(at) * e1 + std::sin(at) * e2);
 }
 
-TEST(FixtureLoops, ConeDoesNoWorkRoundAHundredThousandLoops) {
+TEST(FixtureLoops, cone_does_no_work_round_a_hundred_thousand_loops) {
   const ConeParams params;
   const double tan_alpha = std::tan(params.alpha_rad);
   const double e = params.d0_m / 4;  // the free core widens smoothly over this
   const auto core = [&](double d) {
-    if (d <= 0) return params.r0_m;
+    if (d <= 0) {
+      return params.r0_m;
+    }
     const double t = d / e;
     const double widened =
         t >= 1 ? d - e / 2 : e * (2.5 * std::pow(t, 4) - 3 * std::pow(t, 5) + std::pow(t, 6));
@@ -205,22 +230,26 @@ TEST(FixtureLoops, ConeDoesNoWorkRoundAHundredThousandLoops) {
   const Loops l = run([&](const Vec3& tip) { return cone_pull(params, kScale, kFrame, tip); },
                       [&](const Vec3& a, const Vec3& b, std::vector<double>& cuts) {
                         const double da = distance(a), db = distance(b);
-                        for (const double plane : {-2 * params.d0_m, -params.d0_m, 0.0, e})
-                          if ((da < plane) != (db < plane)) cuts.push_back((plane - da) / (db - da));
-                        for (const double edge : {0.0, params.eps_m / std::cos(params.alpha_rad)})
+                        for (const double plane : {-2 * params.d0_m, -params.d0_m, 0.0, e}) {
+                          if ((da < plane) != (db < plane)) {
+                            cuts.push_back((plane - da) / (db - da));
+                          }
+                        }
+                        for (const double edge : {0.0, params.eps_m / std::cos(params.alpha_rad)}) {
                           zeros(
                               [&](double t) {
                                 const Vec3 p = a + t * (b - a);
                                 return off_axis(p) - core(distance(p)) - edge;
                               },
                               cuts);
+                        }
                       },
                       near_the_cell, random);
   tell("cone", l);
   EXPECT_LE(l.worst_of_all, kTolerance);
 }
 
-TEST(FixtureLoops, WithdrawalAxisDoesNoWorkRoundAHundredThousandLoops) {
+TEST(FixtureLoops, withdrawal_axis_does_no_work_round_a_hundred_thousand_loops) {
   const AxisParams params;
   std::mt19937_64 random(102);
   const Loops l = run([&](const Vec3& tip) { return axis_pull(params, kScale, kFrame, tip); },
@@ -233,7 +262,7 @@ TEST(FixtureLoops, WithdrawalAxisDoesNoWorkRoundAHundredThousandLoops) {
   EXPECT_LE(l.worst_of_all, kTolerance);
 }
 
-TEST(FixtureLoops, RepulsiveRegionDoesNoWorkRoundAHundredThousandLoops) {
+TEST(FixtureLoops, repulsive_region_does_no_work_round_a_hundred_thousand_loops) {
   const RepulsiveParams params;
   const Vec3 centre(3e-6, -37e-6, 1e-6);
   std::mt19937_64 random(103);
@@ -253,14 +282,16 @@ TEST(FixtureLoops, RepulsiveRegionDoesNoWorkRoundAHundredThousandLoops) {
 }
 
 // The yardstick itself: the printed law's loops do give work, as the closed form says.
-TEST(FixtureLoops, ThePrintedConeDoesWorkRoundTheSameKindOfLoop) {
+TEST(FixtureLoops, the_printed_cone_does_work_round_the_same_kind_of_loop) {
   ConeParams params;
   params.method = ConeParams::Method::paper;
   std::mt19937_64 random(104);
   const Loops l = run([&](const Vec3& tip) { return cone_pull(params, kScale, kFrame, tip); },
                       [&](const Vec3& a, const Vec3& b, std::vector<double>& cuts) {
                         const double da = distance(a), db = distance(b);
-                        if ((da < 0) != (db < 0)) cuts.push_back(da / (da - db));
+                        if ((da < 0) != (db < 0)) {
+                          cuts.push_back(da / (da - db));
+                        }
                       },
                       near_the_cell, random, 2000);
   tell("printed cone", l);

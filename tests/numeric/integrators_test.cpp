@@ -7,7 +7,7 @@
 #include <limits>
 #include <numbers>
 
-#include "hal/sim/stage.hpp"
+#include "hal/sim/plant/stage.hpp"
 #include "tools/report/integration_problems.hpp"
 
 namespace punctum::report {
@@ -30,7 +30,9 @@ template <class Method>
 double smooth_error(int steps) {
   const double end = 0.5, h = end / steps;
   Motion<double> s{1, 1};
-  for (int i = 0; i < steps; ++i) s = Method::step(Smooth{}, i * h, s, h);
+  for (int i = 0; i < steps; ++i) {
+    s = Method::step(Smooth{}, i * h, s, h);
+  }
   return std::abs(s.x - 2.125) + std::abs(s.v - 4.75);
 }
 
@@ -40,7 +42,7 @@ void expect_order(double order, double within) {
   EXPECT_NEAR(seen, order, within) << Method::name;
 }
 
-TEST(Integrators, ConvergeWithTheirOrder) {
+TEST(Integrators, converge_with_their_order) {
   expect_order<ExplicitEuler>(1, 0.1);
   expect_order<SemiImplicitEuler>(1, 0.1);
   expect_order<ImplicitMidpoint>(2, 0.05);
@@ -60,7 +62,9 @@ template <class Method>
 double after_many(double zeta, double wh) {
   const Oscillator law{zeta};
   Motion<double> s{1, 0.3};
-  for (int i = 0; i < 200'000; ++i) s = Method::step(law, 0.0, s, wh);
+  for (int i = 0; i < 200'000; ++i) {
+    s = Method::step(law, 0.0, s, wh);
+  }
   return std::abs(s.x) + std::abs(s.v);
 }
 
@@ -71,7 +75,7 @@ void expect_limit(double zeta, double wh) {
   EXPECT_FALSE(after_many<Method>(zeta, wh * 1.02) < 1e3) << Method::name << " " << zeta;
 }
 
-TEST(Integrators, AreStableUpToTheirPublishedLimits) {
+TEST(Integrators, are_stable_up_to_their_published_limits) {
   for (const double zeta : {0.05, 0.2, 0.7}) {
     expect_limit<ExplicitEuler>(zeta, 2 * zeta);
     expect_limit<SemiImplicitEuler>(zeta, 2 * (std::sqrt(1 + zeta * zeta) - zeta));
@@ -88,12 +92,14 @@ TEST(Integrators, AreStableUpToTheirPublishedLimits) {
 // One period of an undamped oscillator: explicit Euler multiplies its energy by 1 + (wh)^2 a step, implicit
 // midpoint turns by 2 atan(wh/2), RK4 is Taylor's polynomial; semi-implicit Euler turns by acos(1 -
 // (wh)^2/2).
-TEST(Integrators, ErrAsTheoryOfTheLinearOscillatorSays) {
+TEST(Integrators, err_as_theory_of_the_linear_oscillator_says) {
   const double wh = 0.2;
   const int n = 31;
   const auto run = [&](auto method) {
     Motion<double> s{1, 0};
-    for (int i = 0; i < n; ++i) s = decltype(method)::step(Oscillator{0}, 0.0, s, wh);
+    for (int i = 0; i < n; ++i) {
+      s = decltype(method)::step(Oscillator{0}, 0.0, s, wh);
+    }
     return s;
   };
   const auto euler = run(ExplicitEuler{});
@@ -121,7 +127,7 @@ void expect_reference(const Law& law, Motion<double> end, const Reference& r, do
   }
 }
 
-TEST(Integrators, ExponentialMethodIsExactOnThePiecewiseLinear) {
+TEST(Integrators, exponential_method_is_exact_on_the_piecewise_linear) {
   for (const int steps : {60, 960}) {
     for (const Reference& r : kWallReference) {
       Wall<double> law{r.stiffness_N_m};
@@ -136,7 +142,7 @@ TEST(Integrators, ExponentialMethodIsExactOnThePiecewiseLinear) {
   }
 }
 
-TEST(Integrators, ShippedClosedFormIsExactForStiffnessesOfFiveDecadesWhateverTheStep) {
+TEST(Integrators, shipped_closed_form_is_exact_for_stiffnesses_of_five_decades_whatever_the_step) {
   for (const int steps : {60, 960}) {
     for (const Reference& r : kWallReference) {
       Wall<double> law{r.stiffness_N_m};
@@ -169,7 +175,7 @@ double contact_order() {
   return (n * sxy - sx * sy) / (n * sxx - sx * sx);
 }
 
-TEST(Integrators, KeepTheirOrderThroughContactOnlyWhenItIsLocated) {
+TEST(Integrators, keep_their_order_through_contact_only_when_it_is_located) {
   EXPECT_GT((contact_order<RungeKutta4, true>()), 3.5);
   EXPECT_NEAR((contact_order<ImplicitMidpoint, true>()), 2, 0.15);
   EXPECT_NEAR((contact_order<RungeKutta4, false>()), 1, 0.4);
@@ -196,7 +202,7 @@ Puncture<Real> punctured(std::int64_t steps, bool located = true) {
   return law;
 }
 
-TEST(Puncture, TakesItsForceFromTheCellsTable) {
+TEST(Puncture, takes_its_force_from_the_cells_table) {
   const sim::Cell& cell = plain_cell();
   const MembraneForce<double> force(cell);
   const double N = cell.outer_Eh_N_m() * cell.R_m();
@@ -208,7 +214,7 @@ TEST(Puncture, TakesItsForceFromTheCellsTable) {
   EXPECT_NEAR(force(x).slope_N_m, (force(x + h).force_N - force(x - h).force_N) / (2 * h), 1e-7);
 }
 
-TEST(Puncture, IsWhereThreeMethodsMeet) {
+TEST(Puncture, is_where_three_methods_meet) {
   const auto best = punctured<Extrapolated, long double>(16'000);
   ASSERT_EQ(best.events.count, 2);
   const auto halves = punctured<Extrapolated, long double>(8'000);
@@ -223,7 +229,7 @@ TEST(Puncture, IsWhereThreeMethodsMeet) {
   }
 }
 
-TEST(Puncture, NotLocatedIsLateByUpToAStep) {
+TEST(Puncture, not_located_is_late_by_up_to_a_step) {
   const double at = punctured<Extrapolated, long double>(16'000).events.at_s[1];
   for (const std::int64_t steps : {80, 800, 8000}) {
     const double h = Puncture<double>::end_s / static_cast<double>(steps);
@@ -234,7 +240,7 @@ TEST(Puncture, NotLocatedIsLateByUpToAStep) {
 }
 
 // The quasi-static needle leaves out bending and drag: it is early by (F + c v) / (k v), to first order.
-TEST(Puncture, QuasiStaticErrsByTheForceThatItLeavesOut) {
+TEST(Puncture, quasi_static_errs_by_the_force_that_it_leaves_out) {
   using Law = Puncture<double>;
   const auto exact = punctured<Extrapolated, long double>(16'000);
   for (const std::int64_t steps : {8, 64, 4096}) {
@@ -255,7 +261,7 @@ TEST(Puncture, QuasiStaticErrsByTheForceThatItLeavesOut) {
 }
 
 // Stage and cell as shipped: through the stage's speed limit, then as a lag; whatever the step.
-TEST(Puncture, OfTheWholeStationComesWhenItsDriveReachesItWhateverTheStep) {
+TEST(Puncture, of_the_whole_station_comes_when_its_drive_reaches_it_whatever_the_step) {
   const sim::Cell& cell = plain_cell();
   sim::StageParams p;
   p.start_m = cell.centre_m({}) + sim::Vec3(cell.R_m() + 3e-6, 0, 0);

@@ -9,7 +9,7 @@
 #include <random>
 #include <utility>
 
-#include "hal/sim/membrane_truth.hpp"
+#include "hal/sim/plant/membrane_truth.hpp"
 #include "rt/forces/membrane.hpp"
 
 namespace punctum::rt {
@@ -40,7 +40,9 @@ TEST(LargeDeflection, follows_the_full_equations_where_it_was_not_fitted) {
     sim::MembraneSolution x;
     for (int k = 1; k <= 17; ++k) {
       at.w = kHigh.w * std::pow((k - 0.5) / 16.5, 2);
-      if (!sim::solve_membrane({at.c, at.seat, at.nu, at.prestrain}, at.w, 64, x)) break;
+      if (!sim::solve_membrane({at.c, at.seat, at.nu, at.prestrain}, at.w, 64, x)) {
+        break;
+      }
       const Deflection law = large_deflection(at);
       ASSERT_TRUE(law.calibrated);
       const double error = law.force / x.force - 1;
@@ -49,8 +51,9 @@ TEST(LargeDeflection, follows_the_full_equations_where_it_was_not_fitted) {
       worst_force = std::max(worst_force, std::abs(error));
       worst_pressure = std::max(worst_pressure, std::abs(law.pressure / x.pressure - 1));
       const double tension = x.tip_tension / (1 + at.prestrain);
-      if (at.w < 0.1)
+      if (at.w < 0.1) {
         continue;  // there the tension dips, and the solver's energy is a difference of large ones
+      }
       worst_tension = std::max(worst_tension, std::abs(law.tension / tension - 1));
       worst_energy = std::max(worst_energy, std::abs(law.energy / x.energy - 1));
     }

@@ -11,7 +11,7 @@
 #include <random>
 #include <vector>
 
-#include "hal/sim/membrane_truth.hpp"
+#include "hal/sim/plant/membrane_truth.hpp"
 #include "rt/forces/large_deflection.hpp"
 
 namespace {
@@ -46,7 +46,9 @@ std::vector<Sample> solve(unsigned seed, int places, double edges) {
     punctum::sim::MembraneSolution x;
     for (int k = 1; k <= kDepths; ++k) {
       at.w = high.w * std::pow(static_cast<double>(k) / kDepths, 2);
-      if (!punctum::sim::solve_membrane({at.c, at.seat, at.nu, at.prestrain}, at.w, kIntervals, x)) break;
+      if (!punctum::sim::solve_membrane({at.c, at.seat, at.nu, at.prestrain}, at.w, kIntervals, x)) {
+        break;
+      }
       const double by = 1 - at.nu;
       samples.push_back(
           {at, {by * x.force / at.w, by * x.pressure, by * x.tip_tension / (1 + at.prestrain)}});
@@ -72,7 +74,9 @@ int main() {
   Eigen::MatrixXd fit(kDeflectionTerms, 3);
   for (int q = 0; q < 3; ++q) {
     double mean = 0;
-    for (const Sample& s : seen) mean += s.y[q] / static_cast<double>(seen.size());
+    for (const Sample& s : seen) {
+      mean += s.y[q] / static_cast<double>(seen.size());
+    }
     const auto weight = [&](const Sample& s) { return 1 / (q == 2 ? std::max(s.y[q], mean) : s.y[q]); };
     Eigen::MatrixXd A(seen.size(), kDeflectionTerms);
     Eigen::VectorXd b(seen.size());
@@ -87,7 +91,9 @@ int main() {
     for (const Sample& s : unseen) {
       const double error = weight(s) * (terms(s.at).dot(fit.col(q)) - s.y[q]);
       square += error * error;
-      if (std::abs(error) > worst) worst = std::abs(error), where = s.at;
+      if (std::abs(error) > worst) {
+        worst = std::abs(error), where = s.at;
+      }
     }
     std::fprintf(stderr,
                  "%s: unseen rms %.2f %%, worst %.2f %% at w %.3f c %.3f seat %.2f nu %.2f prestrain %.3f\n",

@@ -8,8 +8,9 @@
 #include <random>
 #include <utility>
 
+#include "rt/control/local_membrane_model.hpp"
 #include "rt/forces/membrane.hpp"
-#include "tests/numeric/printed_law.hpp"
+#include "tests/support/printed_law.hpp"
 
 namespace punctum::rt {
 namespace {
@@ -55,12 +56,18 @@ TEST(MembraneLaw, agrees_with_the_printed_formula_at_1e5_random_places) {
   for (int i = 0; i < 100'000;) {
     const double c = between(1e-7, 1e-4);
     const double a = i % 2 == 0 ? c / between(1e-6, 1) : c / (1 - between(1e-9, 1));
-    if (!(c / a >= 1e-6 && (a - c) / a >= 1e-9)) continue;
+    if (!(c / a >= 1e-6 && (a - c) / a >= 1e-9)) {
+      continue;
+    }
     const double w = i % 4 < 2 ? 10 * a * u(random) : between(1e-12, 10) * a;
     const double E = between(1e2, 1e9), h = between(1e-8, 1e-4), nu = 0.5 * u(random);
-    if (!(w > 0)) continue;
+    if (!(w > 0)) {
+      continue;
+    }
     const double error = printed.relative_error(membrane_force(E, nu, h, c, w, a), E, nu, h, c, w, a);
-    if (!(error <= worst)) worst = error, worst_zeta = c / a, worst_w = w / a;
+    if (!(error <= worst)) {
+      worst = error, worst_zeta = c / a, worst_w = w / a;
+    }
     ++i;
   }
   EXPECT_LE(worst, 4e-15);
@@ -78,7 +85,9 @@ TEST(MembraneLaw, keeps_float_within_float_rounding) {
     const double exact = r.force_N * r.a_m * r.a_m * (1 - r.nu) /
                          (2 * std::acos(-1.0) * r.E_Pa * r.h_m * r.wd_m * r.wd_m * r.wd_m);
     // f ~ (1-zeta)^-4: rounding c and the reach to float costs up to 4 half-ulps each.
-    if (r.a_m - r.c_m > 1e-8 * r.c_m) worst = std::max(worst, relative(f, exact));
+    if (r.a_m - r.c_m > 1e-8 * r.c_m) {
+      worst = std::max(worst, relative(f, exact));
+    }
   }
   EXPECT_LT(worst, 2e-6);
   std::printf("worst relative error, float: %.2e\n", worst);
@@ -151,7 +160,9 @@ TEST(MembraneLaw, is_exactly_zero_without_a_dimple) {
 bool finite(const MembraneState& s) {
   for (const double x :
        {s.force_N, s.a_m, s.sigma_d_Pa, s.pressure_Pa, s.slope, s.pull_N, s.stiffness_N_m, s.energy_J}) {
-    if (!std::isfinite(x)) return false;
+    if (!std::isfinite(x)) {
+      return false;
+    }
   }
   return s.force_N >= 0 && s.stiffness_N_m >= 0 && s.energy_J >= 0;
 }
@@ -188,7 +199,9 @@ TEST(MembraneLaw, is_finite_for_any_finite_arguments) {
     MembraneParams params = i % 2 == 0 ? paper() : MembraneParams{};
     for (double* x :
          {&params.E_Pa, &params.nu, &params.h_m, &params.c_m, &params.prestrain, &params.seat_m}) {
-      if (random() % 2 == 0) *x = pick();
+      if (random() % 2 == 0) {
+        *x = pick();
+      }
     }
     const double w = pick(), R = pick(), scale = pick();
     ASSERT_TRUE(finite(membrane_law(params, w, R, scale)))
@@ -211,7 +224,7 @@ TEST(MembraneLaw, answers_what_is_not_a_number_with_a_force_that_is_none) {
   for (const double bad :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     for (const auto& good : {paper(), MembraneParams{}}) {
-      for (double MembraneParams::*field :
+      for (double MembraneParams::* field :
            {&MembraneParams::E_Pa, &MembraneParams::nu, &MembraneParams::h_m, &MembraneParams::c_m,
             &MembraneParams::prestrain, &MembraneParams::seat_m}) {
         MembraneParams params = good;
@@ -275,7 +288,9 @@ TEST(MembraneLaw, rises_without_a_jump_from_first_contact_with_the_shipped_closu
       }
       before = s.force_N;
     }
-    for (double w = 5e-324; w < 1e-300; w *= 1.5) EXPECT_GE(membrane_law(params, w, 60e-6, scale).force_N, 0);
+    for (double w = 5e-324; w < 1e-300; w *= 1.5) {
+      EXPECT_GE(membrane_law(params, w, 60e-6, scale).force_N, 0);
+    }
   }
 }
 

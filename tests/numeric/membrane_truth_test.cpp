@@ -1,4 +1,4 @@
-#include "hal/sim/membrane_truth.hpp"
+#include "hal/sim/plant/membrane_truth.hpp"
 
 #include <gtest/gtest.h>
 
@@ -35,10 +35,14 @@ double derivative(const std::vector<double>& x, const std::vector<double>& y, st
   for (std::size_t j = first; j < first + 5; ++j) {
     double weight = 0;
     for (std::size_t m = first; m < first + 5; ++m) {
-      if (m == j) continue;
+      if (m == j) {
+        continue;
+      }
       double product = 1 / (x[j] - x[m]);
       for (std::size_t l = first; l < first + 5; ++l) {
-        if (l != j && l != m) product *= (x[i] - x[l]) / (x[j] - x[l]);
+        if (l != j && l != m) {
+          product *= (x[i] - x[l]) / (x[j] - x[l]);
+        }
       }
       weight += product;
     }
@@ -70,7 +74,7 @@ constexpr Reference kReference[] = {
     {0.1, 0.4, 0.3, 0.05, 0.75, 0.21346768279, 0.23379010588, 0.3573460236},
 };
 
-TEST(MembraneTruth, AgreesWithAnIndependentSolutionByScipy) {
+TEST(MembraneTruth, agrees_with_an_independent_solution_by_scipy) {
   for (const Reference& ref : kReference) {
     const MembraneSolution x = solved({ref.c_over_R, ref.seat_over_R, ref.nu, ref.prestrain}, ref.w, 512);
     EXPECT_NEAR(x.force / ref.force, 1, 1e-7) << ref.prestrain << " " << ref.w;
@@ -79,7 +83,7 @@ TEST(MembraneTruth, AgreesWithAnIndependentSolutionByScipy) {
   }
 }
 
-TEST(MembraneTruth, ConvergesWithTheFourthPowerOfTheMesh) {
+TEST(MembraneTruth, converges_with_the_fourth_power_of_the_mesh) {
   for (const double w : {0.05, 0.333, 0.7}) {
     const double exact = solved(kDefault, w, 1024).force;
     double before = 0;
@@ -96,7 +100,7 @@ TEST(MembraneTruth, ConvergesWithTheFourthPowerOfTheMesh) {
   }
 }
 
-TEST(MembraneTruth, KeepsItsVolume) {
+TEST(MembraneTruth, keeps_its_volume) {
   for (const double prestrain : {0.01, 0.2}) {
     for (const double w : {0.01, 0.2, 0.5, 0.8}) {
       MembraneShape shape = kDefault;
@@ -126,7 +130,7 @@ TEST(MembraneTruth, KeepsItsVolume) {
 }
 
 // From the places of the nodes alone: stretches by numerical differentiation, tensions by Hooke's law.
-TEST(MembraneTruth, BalancesForcesAtEveryCut) {
+TEST(MembraneTruth, balances_forces_at_every_cut) {
   for (const double prestrain : {0.01, 0.2}) {
     for (const double w : {0.05, 0.333, 0.8}) {
       MembraneShape shape = kDefault;
@@ -159,7 +163,7 @@ TEST(MembraneTruth, BalancesForcesAtEveryCut) {
   }
 }
 
-TEST(MembraneTruth, StoresExactlyTheWorkOfTheNeedle) {
+TEST(MembraneTruth, stores_exactly_the_work_of_the_needle) {
   for (const double w : {0.05, 0.333, 0.7}) {
     // dU/dw by central differences of the solver's energies, error w^4 small: F of the same mesh.
     constexpr double h = 1e-3;
@@ -170,7 +174,7 @@ TEST(MembraneTruth, StoresExactlyTheWorkOfTheNeedle) {
   }
 }
 
-TEST(MembraneTruth, StartsLinearlyFromNothing) {
+TEST(MembraneTruth, starts_linearly_from_nothing) {
   const MembraneTruth table(kDefault);
   EXPECT_EQ(table.force(0), 0);
   EXPECT_EQ(table.force(-1), 0);
@@ -180,7 +184,7 @@ TEST(MembraneTruth, StartsLinearlyFromNothing) {
   EXPECT_NEAR(table.force(1e-4) / 1e-4 / stiffness, 1, 1e-2);
 }
 
-TEST(MembraneTruth, TableReproducesTheSolverBetweenItsPoints) {
+TEST(MembraneTruth, table_reproduces_the_solver_between_its_points) {
   const auto before = std::chrono::steady_clock::now();
   const MembraneTruth table(kDefault);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - before).count();
@@ -214,7 +218,7 @@ TEST(MembraneTruth, TableReproducesTheSolverBetweenItsPoints) {
   }
 }
 
-TEST(MembraneTruth, ForceStrainAndPressureOnlyGrowWithDepth) {
+TEST(MembraneTruth, force_strain_and_pressure_only_grow_with_depth) {
   const MembraneTruth table(kDefault);
   double F = 0, strain = 0, p = 0, U = 0;
   for (int i = 1; i <= 4000; ++i) {
@@ -231,7 +235,7 @@ TEST(MembraneTruth, ForceStrainAndPressureOnlyGrowWithDepth) {
   EXPECT_EQ(table.depth_at_strain(0.1), 0);
 }
 
-TEST(MembraneTruth, HalfWidthIsWhereTheDepthHasFallenToOnePerCent) {
+TEST(MembraneTruth, half_width_is_where_the_depth_has_fallen_to_one_per_cent) {
   const MembraneTruth table(kDefault);
   std::vector<std::array<double, 2>> rz(MembraneTruth::kProfile);
   for (const double w : {0.05, 0.3, 0.8}) {
@@ -241,13 +245,15 @@ TEST(MembraneTruth, HalfWidthIsWhereTheDepthHasFallenToOnePerCent) {
       const auto rest = [&](std::size_t k) {
         return std::sqrt(1 - rz[k][0] * rz[k][0]) - rz[k][1] - 0.01 * w;
       };
-      if (rest(j + 1) <= 0) a = rz[j][0] + (rz[j + 1][0] - rz[j][0]) * rest(j) / (rest(j) - rest(j + 1));
+      if (rest(j + 1) <= 0) {
+        a = rz[j][0] + (rz[j + 1][0] - rz[j][0]) * rest(j) / (rest(j) - rest(j + 1));
+      }
     }
     EXPECT_NEAR(table.half_width(w), a, 1e-3) << w;
   }
 }
 
-TEST(MembraneTruth, RimIsTheHighestCircleOfTheProfile) {
+TEST(MembraneTruth, rim_is_the_highest_circle_of_the_profile) {
   const MembraneTruth table(kDefault);
   std::vector<std::array<double, 2>> rz(MembraneTruth::kProfile);
   for (const double w : {0.1, 0.333, 0.8}) {
@@ -258,7 +264,7 @@ TEST(MembraneTruth, RimIsTheHighestCircleOfTheProfile) {
   }
 }
 
-TEST(MembraneTruth, ReachesItsLastDepthForAnySensibleCell) {
+TEST(MembraneTruth, reaches_its_last_depth_for_any_sensible_cell) {
   for (const double prestrain : {0.002, 0.05, 0.3}) {
     for (const double c : {0.0125, 0.3}) {
       for (const double seat : {0.1, 0.85}) {

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <limits>
@@ -33,7 +34,9 @@ std::vector<LoopResult> sweep(bool guarded, std::uint64_t n) {
   std::vector<std::jthread> threads;
   for (int i = 0; i < 2; ++i) {
     threads.emplace_back([&] {
-      for (std::uint64_t k = next++; k < n; k = next++) results[k] = run_loop(sweep_cell(k + 1, guarded));
+      for (std::uint64_t k = next++; k < n; k = next++) {
+        results[k] = run_loop(sweep_cell(k + 1, guarded));
+      }
     });
   }
   threads.clear();
@@ -57,8 +60,95 @@ TEST(Passivity, no_cell_of_the_sweep_is_unstable_with_the_guard_and_none_is_fade
 
 TEST(Passivity, most_of_the_same_cells_are_unstable_without_it) {
   int unstable = 0;
-  for (const LoopResult& r : sweep(false, 300)) unstable += r.unstable() ? 1 : 0;
+  for (const LoopResult& r : sweep(false, 300)) {
+    unstable += r.unstable() ? 1 : 0;
+  }
   EXPECT_GT(unstable, 150);
+}
+
+TEST(Passivity, no_wall_that_moves_gives_the_hand_more_than_the_bound_and_it_comes_to_rest_afterwards) {
+  constexpr std::uint64_t kMoving = 500;  // `punctum-report stability` runs as many as of the others
+  for (std::uint64_t n = 1; n <= kMoving; ++n) {
+    const LoopCell cell = report::moving_cell(n, true);
+    const LoopResult r = run_loop(cell);
+    EXPECT_FALSE(r.unstable()) << "cell " << n << ": " << r.peak_to_peak_m << " m, " << r.net_J << " J";
+    EXPECT_TRUE(faithful(cell, r)) << "cell " << n << ": " << r.rendered_N_m << " of " << r.commanded_N_m;
+  }
+}
+
+// A Falcon: 1 kHz under ticks of 4 kHz.
+TEST(Passivity, a_hand_that_is_sampled_more_slowly_than_the_ticks_comes_to_rest_at_a_stiff_wall) {
+  for (const int ticks : {2, 4, 8}) {
+    for (const double K : {150.0, 300.0, 700.0, 3000.0}) {
+      LoopCell cell;
+      cell.rate_Hz = 4000;
+      cell.ticks_per_sample = ticks;
+      cell.device.encoder_step_m = 0.01e-3;
+      cell.holder = report::Holder::nobody;
+      cell.stiffness_N_m = K;
+      cell.speed_m_s = 0.05;
+      const LoopResult r = run_loop(cell);
+      EXPECT_FALSE(r.unstable()) << ticks << " ticks, " << K << " N/m: swings by " << r.peak_to_peak_m
+                                 << " m";
+      EXPECT_TRUE(faithful(cell, r)) << ticks << " ticks, " << K << " N/m: " << r.rendered_N_m;
+    }
+  }
+}
+
+// The hand is moved by A sin(wt) against a spring that is never stiffer than the device keeps passive. Each
+// cycle of the hand would give pi/2 K_1 A^2 = 7.9 mJ without delay, K_1 the amplitude of the stiffness.
+TEST(Passivity, a_spring_that_is_modulated_gives_the_hand_no_more_than_the_bound) {
+  for (const int delay : {0, 3}) {
+    HandDevice device;
+    device.delay_ticks = delay;
+    device.encoder_step_m = 1e-6;
+    PassivityGuard guard({}, device, {}, 1000);
+    constexpr double A = 10e-3, w = 2 * std::numbers::pi, T = 1e-3;
+    constexpr double kAllowed_J = 2e-3, kAllowed_W = 2e-3;  // as README promises
+    const double K = 0.5 * passive_stiffness_N_m(device, T);
+    std::array<double, 8> written{};
+    double work_J = 0, most_J = 0, before = 0, least_J = 0;
+    for (std::size_t k = 0; k < 60000; ++k) {
+      const double t = T * static_cast<double>(k);
+      const double x = A * std::sin(w * t);
+      work_J += written[(k + 7 - static_cast<std::size_t>(delay)) % 8] * (x - before) - kAllowed_W * T;
+      before = x;
+      const double stiffness = K * (1 - 0.5 * std::sin(2 * w * t));
+      GuardInput in;
+      in.position_m = {x, 0, 0};
+      in.storing[0] = {{-stiffness * x, 0, 0}, in.position_m};
+      in.stored_J = 0.5 * stiffness * x * x;
+      in.stiffness_N_m = stiffness;
+      in.elapsed_s = T;
+      const hal::Vec3 force_N = guard.step(in);
+      guard.wrote(force_N);
+      written[k % 8] = force_N.x();
+      // The stored energy, by the whole of the effect's stiffness, is more than what is rendered.
+      least_J = std::min(least_J, work_J + in.stored_J);
+      most_J = std::max(most_J, work_J - least_J);
+    }
+    EXPECT_LT(most_J, 1.1 * kAllowed_J) << delay;
+  }
+}
+
+// Below what the device keeps passive the loop is stable without the guard, and there it is not to be felt.
+TEST(Passivity, a_wall_that_is_stable_by_itself_gives_back_all_but_a_hundredth_of_what_the_hand_put_in) {
+  for (const double rate : {1000.0, 4000.0}) {
+    for (const int delay : {0, 1, 5}) {
+      for (const int ticks : {1, 4}) {
+        LoopCell cell;
+        cell.rate_Hz = rate;
+        cell.ticks_per_sample = ticks;
+        cell.device.delay_ticks = delay;
+        for (const double part : {0.1, 0.5, 0.85}) {
+          cell.stiffness_N_m = part * cell.device.damping_Ns_m * rate / (0.5 * ticks + delay);
+          const double lost = report::lost_part(cell);
+          EXPECT_LT(lost, 0.01) << rate << " Hz, " << delay << ", " << ticks << ", " << cell.stiffness_N_m;
+          EXPECT_GT(lost, -0.01) << rate << " Hz, " << delay << ", " << ticks << ", " << cell.stiffness_N_m;
+        }
+      }
+    }
+  }
 }
 
 // Hannaford & Ryu's bookkeeping on paper: a spring K, two ticks, one step of 1 mm into it.
@@ -152,7 +242,9 @@ TEST(Passivity, eight_hours_at_rest_and_in_gentle_motion_wind_nothing_up) {
     in.dissipative_N = {-6.3e-4 * std::cos(0.2 * std::numbers::pi * t), 0, 0};  // 1 Ns/m
     const hal::Vec3 f = guard.step(in);
     guard.wrote(f);
-    if (k + 1 == 60000) fresh = reaction_N(1e-3);
+    if (k + 1 == 60000) {
+      fresh = reaction_N(1e-3);
+    }
   }
   EXPECT_EQ(guard.gain(), 1);
   EXPECT_LT(std::abs(guard.surplus_J()), 1e-4);
@@ -191,7 +283,9 @@ TEST(Passivity, a_stiffness_falls_at_once_and_returns_slowly_to_the_passive_one)
   in.stiffness_N_m = 0;
   (void)guard.step(in);
   EXPECT_LT(guard.gain(), 0.19);
-  for (int k = 0; k < 10000; ++k) (void)guard.step(in);
+  for (int k = 0; k < 10000; ++k) {
+    (void)guard.step(in);
+  }
   EXPECT_GT(guard.gain(), 0.98);
 }
 

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "hal/sim/cell.hpp"
-#include "hal/sim/hand.hpp"
 #include "hal/sim/noise.hpp"
+#include "hal/sim/plant/cell.hpp"
+#include "hal/sim/plant/hand.hpp"
 
 namespace punctum::sim {
 namespace {
@@ -57,12 +57,14 @@ Flow flow(const HandParams& hand, const ArmImpedance& arm, const Drive& d, const
     still = still && a.v_m_s == 0;
   }
   sum.way = std::abs(end.x_m - begin.x_m);
-  if (hand.coulomb_N == 0 || smooth || still || depth == 12) return sum;
+  if (hand.coulomb_N == 0 || smooth || still || depth == 12) {
+    return sum;
+  }
   Flow parts = flow(hand, arm, d, start, from, from + half, depth + 1);
   return parts += flow(hand, arm, d, start, from + half, to, depth + 1);
 }
 
-TEST(PlantEnergy, OfTheHandleClosesOverAMillionSteps) {
+TEST(PlantEnergy, of_the_handle_closes_over_a_million_steps) {
   constexpr double dt = 1e-3;
   constexpr int kSteps = 1'000'000;
   const HandParams hand;
@@ -103,9 +105,13 @@ TEST(PlantEnergy, OfTheHandleClosesOverAMillionSteps) {
     worst = std::max(worst, std::abs(in - (stored - stored_at_start) - dissipated) / (dissipated + 1e-6));
 
     const double depth = axis.x_m - 0.004;
-    if ((depth > 0) != touched) contacts += 1;
+    if ((depth > 0) != touched) {
+      contacts += 1;
+    }
     touched = depth > 0;
-    if (axis.v_m_s == 0) stuck += 1;
+    if (axis.v_m_s == 0) {
+      stuck += 1;
+    }
     ASSERT_EQ(device.write_force({-wall_N_m * std::max(0.0, depth) + 0.02 * noise.gaussian(k), 0, 0}),
               hal::Status::ok);
   }
@@ -162,14 +168,16 @@ double stored_J(const Cell& cell, const CellState& s) {
   };
   const double inner_Eh = 10e3 * 0.5e-6;
   double sum = 0;
-  if (!s.outer.punctured)
+  if (!s.outer.punctured) {
     sum += of(cell.table(Membrane::outer), s.outer.dimple_m, cell.outer_Eh_N_m(), cell.R_m());
-  if (!s.inner.punctured)
+  }
+  if (!s.inner.punctured) {
     sum += of(cell.table(Membrane::inner), s.inner.dimple_m, inner_Eh, cell.R_inner_m());
+  }
   return sum;
 }
 
-TEST(PlantEnergy, OfTheTableIsTheWorkOfItsForce) {
+TEST(PlantEnergy, of_the_table_is_the_work_of_its_force) {
   const MembraneTruth& table = plain_cell().table(Membrane::outer);
   double work = 0, at = 0;
   constexpr double h = 1e-5;
@@ -181,7 +189,7 @@ TEST(PlantEnergy, OfTheTableIsTheWorkOfItsForce) {
   }
 }
 
-TEST(PlantEnergy, OfIntactMembranesComesBackOverAMillionSteps) {
+TEST(PlantEnergy, of_intact_membranes_comes_back_over_a_million_steps) {
   // Needle on the axis and beside it, in, sideways while inside, and out again, short of any puncture.
   constexpr double um = 1e-6;
   Needle needle{plain_cell(), {61.3 * um, 0, 0}};
@@ -217,7 +225,7 @@ TEST(PlantEnergy, OfIntactMembranesComesBackOverAMillionSteps) {
 // Through both membranes and out again at constant speeds, a million steps: the needle's work is what the
 // membranes had stored when they gave way, what the inner one lost when the zona let it go, and drag and
 // grip, written down here in closed form.
-TEST(PlantEnergy, OfAPunctureIsDroppedAndNeverGivenBack) {
+TEST(PlantEnergy, of_a_puncture_is_dropped_and_never_given_back) {
   constexpr double um = 1e-6, speed = 20 * um;
   constexpr double viscosity = 2e-3, grip = 0.05e-6, grip_speed = 5 * um, drag_length = 20 * um;
   const Cell& cell = plain_cell();
@@ -279,7 +287,7 @@ TEST(PlantEnergy, OfAPunctureIsDroppedAndNeverGivenBack) {
   EXPECT_GT(outer_J(outer_at), 0.5 * expected);  // the puncture is what it is about
 }
 
-TEST(PlantExtremes, TheHandleStaysBoundedForAnyStiffnessAndStep) {
+TEST(PlantExtremes, the_handle_stays_bounded_for_any_stiffness_and_step) {
   for (const double K : {10.0, 1e2, 1e3, 1e4, 1e5, 1e6}) {
     for (const double m : {0.01, 0.075, 2.0}) {
       for (const double B : {0.0, 0.1, 50.0}) {
@@ -292,7 +300,9 @@ TEST(PlantExtremes, TheHandleStaysBoundedForAnyStiffnessAndStep) {
             const double force = 8.5, x0 = 0.08, v0 = -1;
             HandAxis axis{x0, v0};
             const double start = 0.5 * m * v0 * v0 + 0.5 * K * x0 * x0;
-            for (int i = 0; i < 40; ++i) advance(axis, hand, arm, force, 0, 0, dt);
+            for (int i = 0; i < 40; ++i) {
+              advance(axis, hand, arm, force, 0, 0, dt);
+            }
             // A held force is a potential: H = kinetic + spring - f x only falls, from below start + f |x0|.
             ASSERT_TRUE(std::isfinite(axis.x_m) && std::isfinite(axis.v_m_s));
             const double H =
@@ -311,7 +321,7 @@ TEST(PlantExtremes, TheHandleStaysBoundedForAnyStiffnessAndStep) {
   }
 }
 
-TEST(PlantExtremes, TheHandleIsWhereShorterStepsBringItAfterFiftyMilliseconds) {
+TEST(PlantExtremes, the_handle_is_where_shorter_steps_bring_it_after_fifty_milliseconds) {
   for (const double K : {10.0, 1e4, 1e6}) {
     for (const double friction : {0.0, 0.3}) {
       HandParams hand;
@@ -319,14 +329,16 @@ TEST(PlantExtremes, TheHandleIsWhereShorterStepsBringItAfterFiftyMilliseconds) {
       const ArmImpedance arm{K, 1};
       HandAxis once{0.01, 0.3}, often = once;
       advance(once, hand, arm, -2, 0.001, 0.02, 0.05);
-      for (int i = 0; i < 500; ++i) advance(often, hand, arm, -2, 0.001 + 0.02 * 1e-4 * i, 0.02, 1e-4);
+      for (int i = 0; i < 500; ++i) {
+        advance(often, hand, arm, -2, 0.001 + 0.02 * 1e-4 * i, 0.02, 1e-4);
+      }
       EXPECT_NEAR(once.x_m, often.x_m, 1e-12) << K << " " << friction;
       EXPECT_NEAR(once.v_m_s, often.v_m_s, 1e-9) << K << " " << friction;
     }
   }
 }
 
-TEST(PlantExtremes, AMembraneOfAGigapascalPushesAsItsTableSaysWhateverTheStep) {
+TEST(PlantExtremes, a_membrane_of_a_gigapascal_pushes_as_its_table_says_whatever_the_step) {
   constexpr double um = 1e-6;
   for (const double E : {1.0, 35.3e3, 1e9}) {
     CellParams p = uniform_cell();

@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "hal/sim/hand.hpp"
 #include "hal/sim/noise.hpp"
+#include "hal/sim/plant/hand.hpp"
 
 namespace punctum::sim {
 namespace {
@@ -51,7 +51,7 @@ constexpr Reference kReferences[] = {
      0.086320129826562803549},  // slips 0.019875
 };
 
-TEST(SimHand, MatchesTheMatrixExponentialIn40Digits) {
+TEST(SimHand, matches_the_matrix_exponential_in_40_digits) {
   for (const Reference& r : kReferences) {
     HandAxis axis{r.x, r.v};
     advance(axis, handle(r.m, r.b, r.friction), {r.K, r.B}, r.force, r.p, r.u, r.T);
@@ -60,7 +60,7 @@ TEST(SimHand, MatchesTheMatrixExponentialIn40Digits) {
   }
 }
 
-TEST(SimHand, GivesTheSameHoweverTheIntervalIsCut) {
+TEST(SimHand, gives_the_same_however_the_interval_is_cut) {
   for (const Reference& r : kReferences) {
     for (const int pieces : {7, 400}) {
       HandAxis axis{r.x, r.v};
@@ -74,14 +74,14 @@ TEST(SimHand, GivesTheSameHoweverTheIntervalIsCut) {
   }
 }
 
-TEST(SimHand, FallsLikeABodyWithoutFriction) {
+TEST(SimHand, falls_like_a_body_without_friction) {
   HandAxis axis{0.01, -0.2};
   advance(axis, handle(0.1, 0, 0), kNoArm, 0.3, 0, 0, 0.7);
   EXPECT_NEAR(axis.x_m, 0.01 - 0.2 * 0.7 + 0.5 * 3.0 * 0.7 * 0.7, 1e-15);
   EXPECT_NEAR(axis.v_m_s, -0.2 + 3.0 * 0.7, 1e-15);
 }
 
-TEST(SimHand, StopsByDryFrictionWhereMechanicsSaysItStops) {
+TEST(SimHand, stops_by_dry_friction_where_mechanics_says_it_stops) {
   // v0^2 m / (2 f_c), after v0 m / f_c.
   const double m = 0.075;
   const double friction = 0.04;
@@ -94,7 +94,7 @@ TEST(SimHand, StopsByDryFrictionWhereMechanicsSaysItStops) {
   EXPECT_NEAR(axis.x_m, v0 * v0 * m / (2 * friction), 1e-15);
 }
 
-TEST(SimHand, StopsByDryAndViscousFrictionWhereMechanicsSaysItStops) {
+TEST(SimHand, stops_by_dry_and_viscous_friction_where_mechanics_says_it_stops) {
   // t = m/b ln(1 + b v0 / f_c), x = m/b (v0 - f_c t / m).
   const double m = 0.075;
   const double b = 0.3;
@@ -107,7 +107,7 @@ TEST(SimHand, StopsByDryAndViscousFrictionWhereMechanicsSaysItStops) {
   EXPECT_NEAR(axis.x_m, -m / b * (std::abs(v0) - friction * t / m), 1e-15);
 }
 
-TEST(SimHand, SticksUntilTheArmPullsHarderThanFriction) {
+TEST(SimHand, sticks_until_the_arm_pulls_harder_than_friction) {
   // K u t = f_c.
   const ArmImpedance arm{250, 0};
   const double u = 0.002;
@@ -120,13 +120,15 @@ TEST(SimHand, SticksUntilTheArmPullsHarderThanFriction) {
   EXPECT_GT(axis.v_m_s, 0);
 }
 
-TEST(SimHand, HoldsAgainstAForceBelowFrictionForEver) {
+TEST(SimHand, holds_against_a_force_below_friction_for_ever) {
   HandAxis axis{0.001, 0};
-  for (int i = 0; i < 1000; ++i) advance(axis, handle(0.075, 0.1, 0.04), kNoArm, 0.0399, 0, 0, 0.001);
+  for (int i = 0; i < 1000; ++i) {
+    advance(axis, handle(0.075, 0.1, 0.04), kNoArm, 0.0399, 0, 0, 0.001);
+  }
   EXPECT_EQ(axis.x_m, 0.001);
 }
 
-TEST(SimHand, CreatesNoEnergy) {
+TEST(SimHand, creates_no_energy) {
   // The arm's intention at rest: kinetic energy and the arm's spring gain no more than the amplifier's work.
   const Noise noise(7, Noise::Stream::free_use);
   for (std::uint64_t trial = 0; trial < 60; ++trial) {
@@ -153,7 +155,7 @@ TEST(SimHand, CreatesNoEnergy) {
   }
 }
 
-TEST(SimHand, ReadsInStepsOfItsEncoder) {
+TEST(SimHand, reads_in_steps_of_its_encoder) {
   HandParams p;
   SimHand hand(p, kNoArm);
   HandPlantState s;
@@ -166,7 +168,7 @@ TEST(SimHand, ReadsInStepsOfItsEncoder) {
   EXPECT_NEAR((seen.position_m - Vec3(s.position_m)).cwiseAbs().maxCoeff(), 0, 0.015e-3 + 1e-12);
 }
 
-TEST(SimHand, GivesNoMoreForceThanItsMotorsCan) {
+TEST(SimHand, gives_no_more_force_than_its_motors_can) {
   HandParams p;
   p.coulomb_N = 0;
   p.damping_Ns_m = 0;
@@ -178,7 +180,7 @@ TEST(SimHand, GivesNoMoreForceThanItsMotorsCan) {
   EXPECT_NEAR(hand.state().work_J, 0.5 * 0.075 * std::pow(8.5 / 0.075 * 0.001, 2), 1e-12);
 }
 
-TEST(SimHand, GivesAForceSoManyTicksLateAsItsDelay) {
+TEST(SimHand, gives_a_force_so_many_ticks_late_as_its_delay) {
   for (int delay = 0; delay <= kMaxDelayTicks; ++delay) {
     HandParams p;
     p.delay_ticks = delay;
@@ -192,7 +194,7 @@ TEST(SimHand, GivesAForceSoManyTicksLateAsItsDelay) {
   }
 }
 
-TEST(SimHand, GivesNoForceWithoutPower) {
+TEST(SimHand, gives_no_force_without_power) {
   HandParams p;
   SimHand hand(p, kNoArm);
   ASSERT_EQ(hand.write_force(Vec3(1, 0, 0)), hal::Status::ok);
@@ -201,16 +203,16 @@ TEST(SimHand, GivesNoForceWithoutPower) {
   EXPECT_EQ(hand.state().amplifier_on, 0U);
 }
 
-TEST(SimHand, RefusesAForceThatIsNotANumber) {
+TEST(SimHand, refuses_a_force_that_is_not_a_number) {
   SimHand hand(HandParams{}, kNoArm);
   EXPECT_EQ(hand.write_force(Vec3(1, std::nan(""), 0)), hal::Status::fault);
   hand.step(1'000'000, 0.001, Vec3::Zero(), Vec3::Zero(), true, Failure::none);
   EXPECT_EQ(hand.state().position_m.x, 0);
 }
 
-TEST(SimHand, TellsHowTheHandleIsTilted) {
+TEST(SimHand, tells_how_the_handle_is_tilted) {
   SimHand hand(HandParams{}, kNoArm);
-  hand.hold_by(0.03, -0.04, hal::kButtonInject);
+  hand.set_grip(0.03, -0.04, hal::kButtonInject);
   hand.step(1'000'000, 0.001, Vec3::Zero(), Vec3::Zero(), true, Failure::none);
   hal::HandState seen;
   ASSERT_EQ(hand.read(seen), hal::Status::ok);

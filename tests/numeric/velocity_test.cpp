@@ -1,6 +1,6 @@
 // Velocity of the hand: gains, noise and errors against velocity_reference.py, and the shipped default
 // against the other methods on motions known in closed form.
-#include "rt/forces/velocity.hpp"
+#include "rt/control/velocity.hpp"
 
 #include <gtest/gtest.h>
 
@@ -70,7 +70,7 @@ TEST(KalmanGains, settle_where_the_spectrum_of_the_measured_position_puts_them) 
   }
 }
 
-TEST(KalmanGains, become_a_third_order_Butterworth_filter_as_the_period_falls) {
+TEST(KalmanGains, become_a_third_order_butterworth_filter_as_the_period_falls) {
   const double T = 1e-6, jerk = 5, d = 0.03e-3;
   const double omega = std::pow(12 * jerk * jerk / (d * d * T), 1.0 / 6);
   const rt::KalmanGains g = rt::settled_gains(params(jerk, d), T);
@@ -99,15 +99,21 @@ TEST(Velocity, has_the_errors_of_an_independent_computation_and_of_the_notes) {
       int count = 0;
       for (std::size_t k = 0; k < r.dt_s.size(); ++k) {
         const double error = method.step(r.position_m[k], T).x() - r.velocity_m_s[k].x();
-        if (static_cast<double>(k) < e.rate_Hz / 10) continue;
+        if (static_cast<double>(k) < e.rate_Hz / 10) {
+          continue;
+        }
         sum += error * error;
         ++count;
       }
       return 1e3 * std::sqrt(sum / count);
     };
     const double errors[] = {rms_mm_s(difference), rms_mm_s(ema), rms_mm_s(foaw), rms_mm_s(kalman)};
-    for (int i = 0; i < 4; ++i) EXPECT_NEAR(errors[i], e.error_mm_s[i], 1e-5 * e.error_mm_s[i]) << i;
-    for (int i = 0; i < 3; ++i) EXPECT_NEAR(errors[i], e.notes_mm_s[i], 0.07 * e.notes_mm_s[i]) << i;
+    for (int i = 0; i < 4; ++i) {
+      EXPECT_NEAR(errors[i], e.error_mm_s[i], 1e-5 * e.error_mm_s[i]) << i;
+    }
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_NEAR(errors[i], e.notes_mm_s[i], 0.07 * e.notes_mm_s[i]) << i;
+    }
   }
 }
 
@@ -151,10 +157,12 @@ TEST(DefaultVelocity, is_on_the_front_of_error_against_time) {
       p.d_m = d;
       ASSERT_EQ(p.method, VelocityParams::Method::kalman);
       const double shipped = error_m_s(rt::Kalman(p, 1 / rate), r);
-      for (const std::size_t stride : {1U, 2U, 3U, 4U, 6U, 8U, 12U, 16U, 24U, 32U, 48U})
+      for (const std::size_t stride : {1U, 2U, 3U, 4U, 6U, 8U, 12U, 16U, 24U, 32U, 48U}) {
         EXPECT_GT(error_m_s(Difference<double>(stride), r), 1.3 * shipped) << rate << " stride " << stride;
-      for (double cutoff = 5; cutoff < 1000; cutoff *= 1.25)
+      }
+      for (double cutoff = 5; cutoff < 1000; cutoff *= 1.25) {
         EXPECT_GT(error_m_s(Ema<double>(cutoff), r), 1.3 * shipped) << rate << " cut-off " << cutoff;
+      }
       for (int window = 1; window <= 64; window = window * 4 / 3 + 1) {
         p.window = window;
         EXPECT_GT(error_m_s(rt::Foaw(p), r), 1.3 * shipped) << rate << " window " << window;
@@ -175,7 +183,9 @@ TEST(DefaultVelocity, costs_a_fraction_of_foaw) {
   const auto pass_ns = [&r](auto method) {
     const auto begin = std::chrono::steady_clock::now();
     Vec3 sum = Vec3::Zero();
-    for (std::size_t k = 0; k < r.dt_s.size(); ++k) sum += method.step(r.position_m[k], r.dt_s[k]);
+    for (std::size_t k = 0; k < r.dt_s.size(); ++k) {
+      sum += method.step(r.position_m[k], r.dt_s[k]);
+    }
     asm volatile("" : : "m"(sum) : "memory");
     return std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - begin).count();
   };
@@ -196,7 +206,9 @@ TEST(DefaultVelocity, lags_a_trembling_hand_by_less_than_a_millisecond) {
       const double t = k * T;
       const double x = 0.35e-3 * std::sin(omega * t);
       const double v = kalman.step(Vec3(0.03e-3 * std::round(x / 0.03e-3), 0, 0), T).x();
-      if (t < 1) continue;
+      if (t < 1) {
+        continue;
+      }
       in_phase += v * std::cos(omega * t);
       behind += v * std::sin(omega * t);
     }

@@ -1,4 +1,4 @@
-// Real microscope pictures, where they are at hand: ../shared/data or $PUNCTUM_DATA.
+// Real microscope pictures from the folder $PUNCTUM_DATA, or ../shared/data; they are not part of this tree.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -10,7 +10,7 @@
 #include <string>
 
 #include "hal/recorded/recorded_camera.hpp"
-#include "vision/picture_change.hpp"
+#include "vision/events/scene_change.hpp"
 #include "vision/tracker.hpp"
 
 namespace {
@@ -52,7 +52,7 @@ struct Icsi {
 
 class IcsiFrames : public testing::TestWithParam<Icsi> {};
 
-TEST_P(IcsiFrames, InnerContourCoversTheLabelledOoplasm) {
+TEST_P(IcsiFrames, inner_contour_covers_the_labelled_ooplasm) {
   SKIP_WITHOUT("icsi")
   const std::string stem = data("icsi/icsi_") + GetParam().number;
   const cv::Mat picture = cv::imread(stem + "_img.png", cv::IMREAD_GRAYSCALE);
@@ -94,7 +94,7 @@ TEST_P(IcsiFrames, InnerContourCoversTheLabelledOoplasm) {
   EXPECT_GT(iou, GetParam().iou);
   ASSERT_TRUE(r.needle.ok) << r.verdict;
   EXPECT_LT(tip_error, GetParam().tip_px);
-  // The zona's outer face is out of the picture or too faint here: not to be claimed.
+  // The outer face of the zona is outside of the picture or too faint here, so it must not be reported.
   if (std::string(GetParam().number) != "06") {
     EXPECT_FALSE(r.outer.ok);
   }
@@ -113,7 +113,7 @@ struct Embryo {
 
 class Zebrafish : public testing::TestWithParam<Embryo> {};
 
-TEST_P(Zebrafish, ChorionAndEmbryoAreFollowedThroughAllFrames) {
+TEST_P(Zebrafish, chorion_and_embryo_are_followed_through_all_frames) {
   SKIP_WITHOUT("zebrafish-timelapse")
   auto camera = recorded::Camera::open(data("zebrafish-timelapse"), 25);
   ASSERT_TRUE(camera) << camera.error();
@@ -155,7 +155,7 @@ struct Vesicle {
 
 class Vesicles : public testing::TestWithParam<Vesicle> {};
 
-TEST_P(Vesicles, HeldByAPipetteAreFound) {
+TEST_P(Vesicles, held_by_a_pipette_are_found) {
   SKIP_WITHOUT("vesicle-aspiration")
   const cv::Mat picture = cv::imread(data("vesicle-aspiration/") + GetParam().file, cv::IMREAD_GRAYSCALE);
   ASSERT_FALSE(picture.empty());
@@ -179,15 +179,15 @@ INSTANTIATE_TEST_SUITE_P(Cases, Vesicles,
                                          Vesicle{"small", "snapshot-image_8bit.png", {{187, 115}, 77, 0}}),
                          [](const auto& one) { return std::string(one.param.name); });
 
-TEST(PictureChange, TellsStillsOfDifferentCellsFromFramesOfOneSequence) {
+TEST(SceneChange, tells_stills_of_different_cells_from_frames_of_one_sequence) {
   SKIP_WITHOUT("icsi")
   SKIP_WITHOUT("zebrafish-timelapse")
   const auto read = [](const std::string& file) { return cv::imread(data(file), cv::IMREAD_GRAYSCALE); };
   const char* stills[] = {"00", "01", "03", "06"};
   for (const char* a : stills) {
     for (const char* b : stills) {
-      const double same = likeness(read(std::string("icsi/icsi_") + a + "_img.png"),
-                                   read(std::string("icsi/icsi_") + b + "_img.png"));
+      const double same = similarity(read(std::string("icsi/icsi_") + a + "_img.png"),
+                                     read(std::string("icsi/icsi_") + b + "_img.png"));
       if (a == b) {
         EXPECT_NEAR(same, 1, 1e-6);
       } else {
@@ -196,9 +196,9 @@ TEST(PictureChange, TellsStillsOfDifferentCellsFromFramesOfOneSequence) {
     }
   }
   EXPECT_GT(
-      likeness(read("zebrafish-timelapse/frame_LO001.jpg"), read("zebrafish-timelapse/frame_LO016.jpg")),
+      similarity(read("zebrafish-timelapse/frame_LO001.jpg"), read("zebrafish-timelapse/frame_LO016.jpg")),
       kSameScene);
-  EXPECT_EQ(likeness(cv::Mat(64, 64, CV_8U, cv::Scalar(9)), cv::Mat(64, 64, CV_8U, cv::Scalar(9))), 0);
+  EXPECT_EQ(similarity(cv::Mat(64, 64, CV_8U, cv::Scalar(9)), cv::Mat(64, 64, CV_8U, cv::Scalar(9))), 0);
 }
 
 }  // namespace

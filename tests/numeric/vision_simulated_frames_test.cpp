@@ -1,15 +1,17 @@
-// The tracker on the simulated microscope's pictures, whose truth comes from the large-deflection membrane:
-// approach, contact, indentation, puncture, withdrawal.
+// The tracker on pictures of the simulated microscope through approach, contact, indentation, puncture and
+// withdrawal. Their truth comes from the large-deflection membrane.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <cstdio>
-#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "hal/sim/cell.hpp"
-#include "hal/sim/microscope.hpp"
+#include "hal/sim/camera/microscope.hpp"
+#include "hal/sim/plant/cell.hpp"
+#include "vision/image/polyline.hpp"
 #include "vision/tracker.hpp"
 
 namespace {
@@ -31,9 +33,17 @@ struct Case {
 
 std::string label(const testing::TestParamInfo<Case>& info) { return info.param.name; }
 
+double rms_distance(const Contour& seen, const Polyline& truth) {
+  double ss = 0;
+  for (const Point& p : seen) {
+    ss += std::pow(truth.distance(p), 2) / static_cast<double>(seen.size());
+  }
+  return std::sqrt(ss);
+}
+
 class SimulatedFrames : public testing::TestWithParam<Case> {};
 
-TEST_P(SimulatedFrames, AreFollowedThroughAnInjection) {
+TEST_P(SimulatedFrames, are_followed_through_an_injection) {
   const Case& c = GetParam();
   sim::MicroscopeParams lens;
   lens.noise = c.noise;
@@ -59,6 +69,13 @@ TEST_P(SimulatedFrames, AreFollowedThroughAnInjection) {
   const double um = lens.pixel_m * 1e6;
   const auto pixel = [&](double x, double y) {
     return Point(x / lens.pixel_m + (lens.width - 1) / 2.0, y / lens.pixel_m + (lens.height - 1) / 2.0);
+  };
+  const auto line_of = [&](const std::vector<std::array<double, 2>>& points_m, std::size_t count) {
+    Contour contour;
+    for (std::size_t i = 0; i < count; ++i) {
+      contour.push_back(pixel(points_m[i][0], points_m[i][1]));
+    }
+    return Polyline(std::move(contour), true);
   };
   struct Sum {
     double ss = 0;
@@ -127,30 +144,13 @@ TEST_P(SimulatedFrames, AreFollowedThroughAnInjection) {
       ++lost;
       continue;
     }
-    Contour line;
-    for (std::size_t i = 0; i < no; ++i) {
-      line.push_back(pixel(outer[i][0], outer[i][1]));
-    }
-    double ss = 0;
-    for (const Point& p : r.outer.contour) {
-      const double d = distance_to(line, p) * um;
-      ss += d * d / static_cast<double>(r.outer.contour.size());
-    }
+    const double outer_rms = rms_distance(r.outer.contour, line_of(outer, no)) * um;
     const bool recoiling = puncture_s > 0 && t < puncture_s + 0.25;
     if (!recoiling) {
-      outer_error.add(std::sqrt(ss));
+      outer_error.add(outer_rms);
     }
     if (r.inner.ok && ni > 0 && !recoiling) {
-      line.clear();
-      for (std::size_t i = 0; i < ni; ++i) {
-        line.push_back(pixel(inner[i][0], inner[i][1]));
-      }
-      ss = 0;
-      for (const Point& p : r.inner.contour) {
-        const double d = distance_to(line, p) * um;
-        ss += d * d / static_cast<double>(r.inner.contour.size());
-      }
-      inner_error.add(std::sqrt(ss));
+      inner_error.add(rms_distance(r.inner.contour, line_of(inner, ni)) * um);
     }
     tip_error.add(cv::norm(r.needle.tip - pixel(tip.x(), tip.y())) * um);
     gap_error.add(*r.gap_px * um + truth.depth_m * 1e6);

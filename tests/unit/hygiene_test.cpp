@@ -64,7 +64,7 @@ std::string breaches(const std::string& file, std::istream& in) {
   return found;
 }
 
-TEST(Hygiene, TrackedFilesSpeakOfTheThingOnly) {
+TEST(Hygiene, tracked_files_speak_of_the_thing_only) {
   const std::vector<std::string> files = tracked_files();
   if (files.empty()) {
     GTEST_SKIP() << "not a git clone";
@@ -79,13 +79,13 @@ TEST(Hygiene, TrackedFilesSpeakOfTheThingOnly) {
   EXPECT_EQ(found, "");
 }
 
-TEST(Hygiene, NoTrackedFileIsLargerThanAMebibyte) {
+TEST(Hygiene, no_tracked_file_is_larger_than_a_mebibyte) {
   for (const std::string& file : tracked_files()) {
     EXPECT_LE(fs::file_size(fs::path(PUNCTUM_SOURCE_DIR) / file), 1U << 20U) << file;
   }
 }
 
-TEST(Hygiene, TopLevelIsTheOneOfTheDesign) {
+TEST(Hygiene, top_level_is_the_one_of_the_design) {
   const std::regex expected(
       "CMakeLists\\.txt|CMakePresets\\.json|README\\.md|LICENSE|rt|vision|hal|tools|tests|toolchain|\\..*");
   for (const std::string& file : tracked_files()) {
@@ -94,7 +94,7 @@ TEST(Hygiene, TopLevelIsTheOneOfTheDesign) {
   }
 }
 
-TEST(Hygiene, EachRuleFindsWhatItIsFor) {
+TEST(Hygiene, each_rule_finds_what_it_is_for) {
   const std::string planted[] = {"see /wo" + std::string("rk/x"), "// TO" + std::string("DO: later"),
                                  "as in the last ses" + std::string("sion"), std::string(7, '<') + " HEAD"};
   for (const std::string& line : planted) {

@@ -10,11 +10,11 @@
 #include <random>
 #include <vector>
 
-#include "hal/sim/hand.hpp"
+#include "hal/sim/plant/hand.hpp"
 #include "rt/control/device_limits.hpp"
 #include "rt/control/passivity.hpp"
+#include "rt/control/velocity.hpp"
 #include "rt/forces/membrane.hpp"
-#include "rt/forces/velocity.hpp"
 
 namespace punctum::report {
 namespace {
@@ -24,12 +24,18 @@ constexpr double kLongest_s = 40;
 constexpr double kSmallest_m = 0.1e-3;
 constexpr double kEnergyPart = 0.05;
 constexpr int kRing = 8;
+constexpr double kRecovers_s = 6;                                   // three times GuardParams::recover_s
+constexpr double kMoves_s = 5;                                      // a wall that moves does so for so long
+constexpr double kReach_s = 0.2, kReach_m = 7e-3, kSwing_m = 8e-3;  // of what holds the handle then
+constexpr double kStops_s = 0.5;                                    // and comes to a stand within this
 
-// The effect against which the handle is pushed, x > 0 inside.
+// The effect against which the handle is pushed; x > 0 is inside.
 class Wall {
  public:
   explicit Wall(const LoopCell& cell) : K_(cell.stiffness_N_m) {
-    if (cell.membrane_E_Pa <= 0) return;
+    if (cell.membrane_E_Pa <= 0) {
+      return;
+    }
     membrane_.emplace();
     membrane_->E_Pa = cell.membrane_E_Pa;
   }
@@ -39,8 +45,12 @@ class Wall {
     double energy_J = 0;
   };
   [[nodiscard]] At at(double x_m) const {
-    if (x_m <= 0) return {};
-    if (!membrane_) return {-K_ * x_m, K_, 0.5 * K_ * x_m * x_m};
+    if (x_m <= 0) {
+      return {};
+    }
+    if (!membrane_) {
+      return {-K_ * x_m, K_, 0.5 * K_ * x_m * x_m};
+    }
     const auto s = rt::membrane_law(*membrane_, x_m / scale_.position_scale, membrane_->R_m, 1);
     const double k_f = scale_.force_scale;
     return {-k_f * s.force_N, k_f / scale_.position_scale * s.stiffness_N_m,
@@ -51,6 +61,53 @@ class Wall {
   double K_;
   std::optional<rt::MembraneParams> membrane_;
   rt::MappingParams scale_;
+};
+
+// What a wall that moves does at a time: where it is, and the part of its force that is there.
+class Motion {
+ public:
+  explicit Motion(const LoopCell& cell) : cell_(cell), random_(cell.seed) {}
+
+  struct At {
+    double part = 1;
+    double shift_m = 0;
+  };
+  At at(double t_s) {
+    const double whole = std::clamp((kMoves_s + kStops_s - t_s) / kStops_s, 0.0, 1.0);
+    const double swing = std::sin(2 * std::numbers::pi * cell_.frequency_Hz * t_s);
+    switch (cell_.motion) {
+      case WallMotion::still:
+        break;
+      case WallMotion::modulated:
+        return {1 + whole * cell_.depth * swing, 0};
+      case WallMotion::moving:
+        return {1, whole * cell_.travel_m * swing};
+      case WallMotion::corrected: {
+        constexpr double kBetween_s = 0.12, kWithin_s = 0.03;
+        if (t_s >= next_s_) {
+          next_s_ += kBetween_s;
+          from_m_ = to_m_;
+          to_m_ = cell_.travel_m * std::uniform_real_distribution<double>(-1, 1)(random_);
+        }
+        const double done = std::min(1.0, 1 - (next_s_ - kBetween_s + kWithin_s - t_s) / kWithin_s);
+        return {1, whole * (from_m_ + done * (to_m_ - from_m_))};
+      }
+      case WallMotion::switched: {
+        constexpr double kRamp_s = 0.05;
+        const double half_s = 0.5 / cell_.frequency_Hz;
+        const double in_half_s = std::fmod(t_s, half_s);
+        const double ramp = std::min(1.0, in_half_s / std::min(kRamp_s, half_s));
+        const bool comes = std::fmod(t_s, 2 * half_s) < half_s;
+        return {1 - whole * (comes ? 1 - ramp : ramp), 0};
+      }
+    }
+    return {};
+  }
+
+ private:
+  const LoopCell& cell_;
+  std::mt19937_64 random_;
+  double next_s_ = 0, from_m_ = 0, to_m_ = 0;
 };
 
 class Velocity {
@@ -82,7 +139,9 @@ class Ticks {
       case Timing::jitter:
         return T_s_ * (1 + 0.4 * (part() - 0.5));
       case Timing::lost_ticks:
-        if (part() < 0.01) return T_s_ * std::floor(2 + 4 * part());
+        if (part() < 0.01) {
+          return T_s_ * std::floor(2 + 4 * part());
+        }
         break;
       case Timing::late_tick:
         if (t_s > 1 && !late_) {
@@ -102,6 +161,21 @@ class Ticks {
   bool late_ = false;
 };
 
+// What an effect can give back through an amplifier that saturates: the work of its force over the way out.
+double returnable_J(const Wall& wall, const Motion::At& moved, double x_m, double gain, double force_max_N) {
+  const Wall::At effect = wall.at(x_m - moved.shift_m);
+  const double part = gain * moved.part;
+  if (part * std::abs(effect.force_N) <= force_max_N) {
+    return part * effect.energy_J;
+  }
+  double saturated_m = 0, free_m = x_m - moved.shift_m;  // between them the force saturates
+  for (int i = 0; i < 30; ++i) {
+    const double middle_m = 0.5 * (saturated_m + free_m);
+    (part * std::abs(wall.at(middle_m).force_N) > force_max_N ? free_m : saturated_m) = middle_m;
+  }
+  return part * wall.at(saturated_m).energy_J + force_max_N * (x_m - moved.shift_m - saturated_m);
+}
+
 }  // namespace
 
 LoopResult run_loop(const LoopCell& cell) {
@@ -116,10 +190,27 @@ LoopResult run_loop(const LoopCell& cell) {
   hand.damping_Ns_m = cell.device.damping_Ns_m;
   hand.coulomb_N = cell.coulomb_N;
   sim::ArmImpedance arm;
-  if (cell.holder == Holder::fingertip) arm.damping_Ns_m = 1;
-  if (cell.holder == Holder::arm) arm = {250, 6};
+  if (cell.holder == Holder::fingertip) {
+    arm.damping_Ns_m = 1;
+  }
+  if (cell.holder == Holder::arm) {
+    arm = {250, 6};
+  }
+  const bool moves = cell.motion != WallMotion::still;
+  if (moves && cell.holder != Holder::arm) {
+    arm.stiffness_N_m = cell.holder == Holder::nobody ? 10 : 50;
+  }
 
-  const Wall wall(cell);
+  const Wall still(cell);
+  Motion motion(cell);
+  Motion::At moved;
+  const auto wall = [&](double x_m) {
+    Wall::At a = still.at(x_m - moved.shift_m);
+    a.force_N *= moved.part;
+    a.stiffness_N_m *= moved.part;
+    a.energy_J *= moved.part;
+    return a;
+  };
   Velocity velocity(estimate, cell.rate_Hz);
   Ticks ticks(cell.timing, T, cell.seed);
   std::optional<rt::PassivityGuard> guard;
@@ -128,31 +219,43 @@ LoopResult run_loop(const LoopCell& cell) {
   }
 
   LoopResult r;
-  r.passive_N_m = rt::passive_stiffness_N_m(cell.device, T);
-  const double soft_N_m = std::min(wall.at(1e-3).stiffness_N_m, 0.9 * r.passive_N_m);
+  const double delay_s = T * (0.5 * cell.ticks_per_sample + cell.device.delay_ticks);
+  r.passive_N_m = cell.device.damping_Ns_m / delay_s;
+  const double soft_N_m = std::min(still.at(1e-3).stiffness_N_m, 0.9 * r.passive_N_m);
   const double push_N =
-      cell.holder == Holder::arm ? 0 : cell.coulomb_N + std::min(cell.push_N, 0.01 * soft_N_m);
+      moves || cell.holder == Holder::arm ? 0 : cell.coulomb_N + std::min(cell.push_N, 0.01 * soft_N_m);
   const double enough_m = std::max(4 * cell.device.encoder_step_m, kSmallest_m);
   const double settles_s =
       cell.holder == Holder::nobody ? 24 * cell.device.mass_kg / cell.device.damping_Ns_m : 14;
+  const double moves_s = moves ? kMoves_s + kStops_s : 0;
   const double longest_s =
-      cell.holder == Holder::arm ? 12 : std::min(kLongest_s, std::max(settles_s, 6 + 6 * B / soft_N_m));
+      moves_s +
+      (cell.holder == Holder::arm ? 12 : std::min(kLongest_s, std::max(settles_s, 8 + 6 * B / soft_N_m)));
 
   sim::HandAxis handle{-kFrom_m, cell.speed_m_s};
   double intention_m = -kFrom_m;
   std::array<double, kRing> commands{};
   double t = 0, dt = T;
   double port_J = 0, counted_J = 0, port_before_J = 0;
-  double low = handle.x_m, high = handle.x_m, second = 0;
+  double low = handle.x_m, high = handle.x_m, began_m = handle.x_m, second = 0;
+  double owed_from_s = 0;
   std::vector<double> swings;
   double stored_J = 0, raised_J = 0, gain_before = 1;
+  double lowest_J = 0, most_tick_J = 0;
+  double x = 0, v = 0, between_s = 0, written_N = 0;
   double noise_N2 = 0;
   std::int64_t noise_ticks = 0;
   while (t < longest_s) {
     const double step_m = cell.device.encoder_step_m;
-    const double x = step_m > 0 ? step_m * std::round(handle.x_m / step_m) : handle.x_m;
-    const double v = velocity.step(x, dt);
-    const Wall::At effect = wall.at(x);
+    const bool fresh = r.ticks % cell.ticks_per_sample == 0;
+    between_s += dt;
+    if (fresh) {
+      x = step_m > 0 ? step_m * std::round(handle.x_m / step_m) : handle.x_m;
+      v = velocity.step(x, between_s);
+      between_s = 0;
+    }
+    moved = motion.at(t);
+    const Wall::At effect = wall(x);
     double force_N = effect.force_N - B * v;
     double gain = 1;
     if (guard) {
@@ -162,15 +265,25 @@ LoopResult run_loop(const LoopCell& cell) {
       in.dissipative_N = {-B * v, 0, 0};
       in.stiffness_N_m = effect.stiffness_N_m;
       in.damping_Ns_m = B;
+      in.stored_J = effect.energy_J;
       in.elapsed_s = dt;
+      in.fresh = fresh;
       force_N = guard->step(in).x();
       gain = guard->gain();
+      r.least_gain = std::min(r.least_gain, gain);
+      owed_from_s = guard->net_J() < -0.25 * rt::PassivityGuard::kAllowed_J ? t + kRecovers_s : owed_from_s;
       r.damper_Ns_m = std::max(r.damper_Ns_m, guard->damper_Ns_m());
       noise_N2 += guard->damper_N().squaredNorm();
       ++noise_ticks;
     }
     force_N = std::clamp(force_N, -cell.device.force_max_N, cell.device.force_max_N);
-    if (guard) guard->wrote({force_N, 0, 0});
+    if (cell.slew_N_s > 0) {
+      force_N = std::clamp(force_N, written_N - cell.slew_N_s * dt, written_N + cell.slew_N_s * dt);
+    }
+    written_N = force_N;
+    if (guard) {
+      guard->wrote({force_N, 0, 0});
+    }
     commands[static_cast<std::size_t>(r.ticks % kRing)] = force_N;
     const std::int64_t acting = r.ticks - cell.device.delay_ticks;
     const double applied_N = acting >= 0 ? commands[static_cast<std::size_t>(acting % kRing)] : 0;
@@ -179,44 +292,68 @@ LoopResult run_loop(const LoopCell& cell) {
 
     dt = ticks.next(t);
     const double before_m = handle.x_m;
-    const double reached_m =
-        cell.holder == Holder::arm ? std::min(intention_m + 0.05 * dt, 0.02) : intention_m;
+    double reached_m = cell.holder == Holder::arm ? std::min(intention_m + 0.05 * dt, 0.02) : intention_m;
+    if (moves) {  // to and fro about a place in the wall
+      const double omega = std::numbers::pi * std::min(cell.frequency_Hz, 4.0);
+      const double pace_m_s = (t < kReach_s ? kReach_m / kReach_s : 0) +
+                              (t < moves_s ? kSwing_m * omega * std::cos(omega * t) : 0);
+      reached_m = intention_m + pace_m_s * dt;
+    }
     const double pace = (reached_m - intention_m) / dt;
     sim::advance(handle, hand, arm, applied_N + push_N, intention_m, pace, dt);
     intention_m = reached_m;
-    port_J += applied_N * (handle.x_m - before_m);
+    const double tick_J = applied_N * (handle.x_m - before_m);
+    port_J += tick_J;
+    most_tick_J = std::max(most_tick_J, tick_J);
     t += dt;
     ++r.ticks;
-    stored_J = gain * wall.at(handle.x_m).energy_J;
-    raised_J += std::max(0.0, gain - gain_before) * wall.at(handle.x_m).energy_J;
+    stored_J = returnable_J(still, moved, handle.x_m, gain, cell.device.force_max_N);
+    const double beyond_J = port_J - rt::PassivityGuard::kAllowed_W * t;
+    lowest_J = std::min(lowest_J, beyond_J + stored_J);
+    r.net_J = std::max(r.net_J, beyond_J - lowest_J);
+    raised_J += std::max(0.0, gain - gain_before) * wall(handle.x_m).energy_J;
     gain_before = gain;
     r.stored_max_J = std::max(r.stored_max_J, stored_J);
 
     low = std::min(low, handle.x_m);
     high = std::max(high, handle.x_m);
-    if (t - second < 1) continue;
-    swings.push_back(high - low);
-    if (high - low > enough_m) counted_J += port_J - port_before_J;
+    if (t - second < 1) {
+      continue;
+    }
+    // What a wall brought up under the handle may not push out at once creeps out: that is no swing.
+    swings.push_back(high - low - (moves ? std::abs(handle.x_m - began_m) : 0));
+    if (high - low > enough_m) {
+      counted_J += port_J - port_before_J;
+    }
     port_before_J = port_J;
     r.rest_N = noise_ticks > 0 ? std::sqrt(noise_N2 / static_cast<double>(noise_ticks)) : 0;
     noise_N2 = 0;
     noise_ticks = 0;
     second = t;
-    low = high = handle.x_m;
+    low = high = began_m = handle.x_m;
     const std::size_t n = swings.size();
-    if (n >= 4 && swings[n - 1] < 0.3 * enough_m && swings[n - 2] < enough_m) break;
-    const bool lasts =
-        !cell.guarded && n >= 6 && swings[n - 1] > 5 * enough_m && swings[n - 1] > 0.98 * swings[n - 3];
-    if (lasts || !std::isfinite(handle.x_m)) break;
+    if (t > moves_s + 4 && swings[n - 1] < 0.3 * enough_m && swings[n - 2] < enough_m) {
+      break;
+    }
+    const bool lasts = !cell.guarded && t > moves_s + 6 && swings[n - 1] > 5 * enough_m &&
+                       swings[n - 1] > 0.98 * swings[n - 3];
+    if (lasts || !std::isfinite(handle.x_m)) {
+      break;
+    }
   }
   r.end_s = t;
+  r.owes = t > owed_from_s;
   r.peak_to_peak_m = swings.empty() ? std::numeric_limits<double>::infinity() : swings.back();
   r.moving = !(r.peak_to_peak_m <= enough_m);
   r.surplus_J = counted_J + stored_J;
   const double count_J = 4 * cell.device.encoder_step_m * std::min(cell.device.force_max_N, push_N + 0.1);
   const double allowed_J = kEnergyPart * r.stored_max_J + count_J;
-  r.active = !(r.surplus_J <= allowed_J);
-  r.active_at_rest = !(port_J + stored_J - raised_J <= allowed_J);
+  if (cell.motion == WallMotion::still) {
+    r.active = !(r.surplus_J <= allowed_J);
+    r.active_at_rest = !(port_J + stored_J - raised_J <= allowed_J);
+  }
+  r.given = !(r.net_J <= rt::PassivityGuard::kAllowed_J + allowed_J +
+                             most_tick_J * (cell.ticks_per_sample + cell.device.delay_ticks));
   return r;
 }
 
@@ -238,27 +375,95 @@ LoopCell sweep_cell(std::uint64_t n, bool guarded) {
   c.device.encoder_step_m = one_of({0.01e-3, 0.03e-3, 0.055e-3});
   c.coulomb_N = one_of({0, 0, 0.04, 0.1});
   c.stiffness_N_m = log_uniform(1e1, 1e6);
-  if (random() % 3 == 0) c.membrane_E_Pa = log_uniform(1, 1e9);
+  if (random() % 3 == 0) {
+    c.membrane_E_Pa = log_uniform(1, 1e9);
+  }
   c.damping_share = one_of({0, 0, 0.1, 0.5, 1, 3, 10});
   c.timing = static_cast<Timing>(random() % 4);
   c.holder = static_cast<Holder>(random() % 3);
   c.speed_m_s = one_of({0, 0.05, 0.2});
   c.push_N = one_of({0.2, 0.5, 1});
-  // Nobody's hand on a heavy handle in light bearings would swing for a minute by itself.
+  // A heavy handle in light bearings that nobody holds would swing by itself for a minute.
   if (c.holder == Holder::nobody && c.device.mass_kg / c.device.damping_Ns_m > 1.6) {
     c.device.damping_Ns_m = 0.1;
   }
-  // Against next to nothing a push alone would creep for minutes.
-  if (Wall(c).at(1e-3).stiffness_N_m < 5) c.holder = Holder::arm;
+  // Against a very soft wall a constant push would creep for minutes.
+  if (Wall(c).at(1e-3).stiffness_N_m < 5) {
+    c.holder = Holder::arm;
+  }
+  return c;
+}
+
+LoopCell moving_cell(std::uint64_t n, bool guarded) {
+  LoopCell c = sweep_cell(n, guarded);
+  std::mt19937_64 random(n * 6271 + 29);
+  const auto one_of = [&random](std::initializer_list<double> list) {
+    return *(list.begin() + static_cast<std::ptrdiff_t>(random() % list.size()));
+  };
+  c.motion = static_cast<WallMotion>(random() % 5);
+  do {  // no device samples more slowly than 250 Hz
+    c.ticks_per_sample = static_cast<int>(one_of({1, 1, 2, 4, 8}));
+  } while (c.rate_Hz < 250 * c.ticks_per_sample);
+  c.depth = one_of({0.1, 0.5, 0.9});
+  c.travel_m = one_of({0.1e-3, 1e-3, 5e-3});
+  c.frequency_Hz = one_of({0.5, 1, 2, 5, 10, 30});
+  c.travel_m = std::min(c.travel_m, 0.3 / (2 * std::numbers::pi * c.frequency_Hz));  // no faster than a hand
+  c.device.force_max_N = one_of({1, 3.3, 8.5});
+  c.slew_N_s = one_of({0, 0, 1000, 3000});
   return c;
 }
 
 bool faithful(const LoopCell& cell, const LoopResult& r) noexcept {
-  if (r.commanded_N_m <= 0 || cell.timing == Timing::lost_ticks || cell.timing == Timing::late_tick) {
+  if (r.commanded_N_m <= 0 || !r.owes || cell.timing == Timing::lost_ticks ||
+      cell.timing == Timing::late_tick) {
     return true;
   }
-  if (r.commanded_N_m < 0.8 * r.passive_N_m) return r.rendered_N_m >= 0.9 * r.commanded_N_m;
+  if (r.commanded_N_m < 0.8 * r.passive_N_m) {
+    return r.rendered_N_m >= 0.9 * r.commanded_N_m;
+  }
   return r.rendered_N_m >= 0.5 * r.passive_N_m;
+}
+
+double lost_part(const LoopCell& cell) {
+  constexpr double kPress_m = 10e-3;
+  constexpr int kBefore = 2, kPresses = 8;
+  const double T = 1 / cell.rate_Hz;
+  const auto per_press = static_cast<std::int64_t>(std::round(cell.rate_Hz));
+  const Wall wall(cell);
+  rt::PassivityGuard guard({}, cell.device, {}, cell.rate_Hz);
+  std::array<double, kRing> commands{};
+  double x = 0, before_m = 0, work_J = 0, pressed_J = 0;
+  for (std::int64_t k = 0; k < (kBefore + kPresses) * per_press; ++k) {
+    const double turn = 2 * std::numbers::pi * static_cast<double>(k % per_press) * T;
+    const double true_m = 0.5 * kPress_m * (1 - std::cos(turn));
+    const auto acting = static_cast<std::size_t>((k + kRing - 1 - cell.device.delay_ticks) % kRing);
+    const double tick_J = k > cell.device.delay_ticks ? commands[acting] * (true_m - before_m) : 0;
+    before_m = true_m;
+    if (k >= kBefore * per_press) {
+      work_J += tick_J;
+      pressed_J -= std::min(0.0, tick_J);
+    }
+    const bool fresh = k % cell.ticks_per_sample == 0;
+    if (fresh) {
+      const double step_m = cell.device.encoder_step_m;
+      x = step_m > 0 ? step_m * std::round(true_m / step_m) : true_m;
+    }
+    const Wall::At effect = wall.at(x);
+    double force_N = effect.force_N;
+    if (cell.guarded) {
+      rt::GuardInput in;
+      in.position_m = {x, 0, 0};
+      in.storing[0] = {{effect.force_N, 0, 0}, {x, 0, 0}};
+      in.stiffness_N_m = effect.stiffness_N_m;
+      in.stored_J = effect.energy_J;
+      in.elapsed_s = T;
+      in.fresh = fresh;
+      force_N = guard.step(in).x();
+      guard.wrote({force_N, 0, 0});
+    }
+    commands[static_cast<std::size_t>(k % kRing)] = force_N;
+  }
+  return -work_J / pressed_J;
 }
 
 double measured_boundary_N_m(const rt::HandDevice& device, double T_s, double B_Ns_m) {
@@ -279,9 +484,15 @@ double measured_boundary_N_m(const rt::HandDevice& device, double T_s, double B_
       const double force_N = acting >= 0 ? commands[static_cast<std::size_t>(acting % kRing)] : 0;
       sim::advance(handle, hand, {}, force_N, 0, 0, T_s);
       const double x = std::abs(handle.x_m);
-      if (!(x < 1e3)) return false;
-      if (k >= kTicks / 4 && k < kTicks / 2) earlier_m = std::max(earlier_m, x);
-      if (k >= 3 * kTicks / 4) later_m = std::max(later_m, x);
+      if (!(x < 1e3)) {
+        return false;
+      }
+      if (k >= kTicks / 4 && k < kTicks / 2) {
+        earlier_m = std::max(earlier_m, x);
+      }
+      if (k >= 3 * kTicks / 4) {
+        later_m = std::max(later_m, x);
+      }
     }
     return later_m < earlier_m || later_m < 1e-12;
   };
@@ -305,7 +516,9 @@ CycleEnergy cycle_energy(double K_N_m, double B_Ns_m, double tau_s, double T_s, 
       before = x;
       commands[static_cast<std::size_t>(k % kRing)] = -K_N_m * x - B_Ns_m * v;
       const int acting = k - delay_ticks;
-      if (k < kSettle || acting < 0) continue;
+      if (k < kSettle || acting < 0) {
+        continue;
+      }
       work +=
           commands[static_cast<std::size_t>(acting % kRing)] * (std::sin(omega * (k + 1) * T_s + phase) - x);
     }

@@ -1,5 +1,5 @@
-// Topic force: eq. 5's evaluation, error against run time; and the laws of the membrane against the
-// large-deflection equations of the simulated cell, which none of them solves.
+// Topic force: evaluations of eq. 5, error against run time; and the laws of the membrane against the
+// large-deflection equations of the simulated cell, which none of the laws solves.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,13 +8,14 @@
 #include <limits>
 #include <numbers>
 #include <random>
+#include <stdexcept>
 
-#include "hal/sim/cell.hpp"
-#include "hal/sim/membrane_truth.hpp"
+#include "hal/sim/plant/cell.hpp"
+#include "hal/sim/plant/membrane_truth.hpp"
 #include "rt/forces/large_deflection.hpp"
 #include "rt/forces/membrane.hpp"
 #include "tools/report/topic.hpp"
-#include "tools/scene.hpp"
+#include "tools/scene/scene.hpp"
 
 namespace punctum::report {
 namespace {
@@ -22,7 +23,7 @@ namespace {
 using std::numbers::pi_v;
 
 constexpr double kJustNoticeable = 0.08;  // relative difference of force that a hand can tell
-constexpr double kNoDigit = 1;            // errors above count as it
+constexpr double kNoDigit = 1;            // larger errors count as this
 
 // ---- eq. 5, evaluated ----
 
@@ -37,7 +38,8 @@ constexpr double kE_Pa = 35.3e3, kH_m = 4.6e-6, kNu = 0.5;
 
 double narrowness(const Reference& r) { return (r.a_m - r.c_m) / r.a_m; }  // 1 - zeta
 
-// What a method is given. The difference is handed over: a - c of numbers rounded to float would be noise.
+// The input of a method. The difference a - c is an input of its own, since rounding to float would leave
+// only noise.
 template <class Real>
 struct Dimple {
   Real c, wd, a, reach;
@@ -74,8 +76,8 @@ struct Stable {
   }
 };
 
-// Cubics through a table of f s^4 over the eighth root of 1 - s, s = (1-zeta^2)/(1+zeta^2): no logarithm, and
-// smooth at both ends.
+// Cubics through a table of f s^4 over the eighth root of 1 - s, s = (1-zeta^2)/(1+zeta^2): without a
+// logarithm, and smooth at both ends.
 template <class Real>
 class Tabled {
  public:
@@ -88,7 +90,7 @@ class Tabled {
       const double reach = 2 * s / ((1 + s) * (1 + zeta));
       g_.push_back(static_cast<Real>(rt::membrane_shape(zeta, reach).f * s * s * s * s));
     }
-    // Beyond the ends: as the cubic through the four inside goes on.
+    // Beyond the ends the cubic through the last four knots continues.
     const std::size_t n = g_.size();
     g_[0] = 4 * g_[1] - 6 * g_[2] + 4 * g_[3] - g_[4];
     g_[n - 1] = 4 * g_[n - 2] - 6 * g_[n - 3] + 4 * g_[n - 4] - g_[n - 5];
@@ -111,14 +113,14 @@ class Tabled {
   }
 
  private:
-  static constexpr double kLeast = 0.03;  // of v: zeta of 6e-7
+  static constexpr double kLeast = 0.03;  // of v; there zeta is 6e-7
   Real last_;
   std::vector<Real> g_;
 };
 
 struct Method {
   std::string name, knob;
-  double narrowest = 1e-9;  // 1 - zeta of what it is asked for
+  double narrowest = 1e-9;  // smallest 1 - zeta that it is evaluated at
   double worst = 0;
   Reference where{};
   Timed timed;
@@ -132,18 +134,24 @@ Method method(const std::string& name, const std::string& knob, double narrowest
   double worst = 0;
   Reference where{};
   for (const Reference& r : kReference) {
-    if (narrowness(r) < narrowest) continue;
+    if (narrowness(r) < narrowest) {
+      continue;
+    }
     walk.emplace_back(r);
     const auto force = static_cast<long double>(law(walk.back()));
     double error = static_cast<double>(std::abs(force - r.force_N) / r.force_N);
-    if (!(error < kNoDigit)) error = kNoDigit;
+    if (!(error < kNoDigit)) {
+      error = kNoDigit;
+    }
     if (error > worst) {
       worst = error;
       where = r;
     }
   }
   const std::size_t n = walk.size();
-  while (walk.size() < kWalk) walk.push_back(walk[walk.size() % n]);
+  while (walk.size() < kWalk) {
+    walk.push_back(walk[walk.size() % n]);
+  }
   walk.resize(kWalk, walk.front());
   return {.name = name,
           .knob = knob,
@@ -160,16 +168,17 @@ void add_methods(std::vector<Method>& methods, const std::string& real, bool qui
     methods.push_back(method<Real>("as printed, " + real, knob, narrowest, Printed<Real>{}));
     methods.push_back(method<Real>("stable form, " + real, knob, narrowest, Stable<Real>{}));
   }
-  for (int knots = 16; knots <= 16384; knots *= quick ? 8 : 4)
+  for (int knots = 16; knots <= 16384; knots *= quick ? 8 : 4) {
     methods.push_back(
         method<Real>("table of cubics, " + real, fmt::format("{} knots", knots), 1e-9, Tabled<Real>(knots)));
+  }
 }
 
 // ---- the laws against the large-deflection equations ----
 
-constexpr int kFine = 256;  // intervals of half a meridian: 1e-8 of the force
+constexpr int kFine = 256;  // intervals of half a meridian; the force is right to 1e-8
 
-// One built-in scene's cell and the laws as they are shipped for it.
+// The cell of a built-in scene, and the parameters of its laws.
 struct SceneCell {
   std::string name;
   rt::MembraneParams params;
@@ -179,7 +188,12 @@ struct SceneCell {
 };
 SceneCell cell_of(const std::string& scene_name) {
   const auto scene = tools::load_scene(scene_name, {});
-  if (!scene) throw std::runtime_error(scene.error());
+  if (!scene) {
+    throw std::runtime_error(scene.error());
+  }
+  if (!scene->sim || !scene->sim->cell || !scene->servo.membrane || !scene->servo.local_model) {
+    throw std::runtime_error(scene_name + ": it has no simulated cell or no membrane law");
+  }
   sim::CellParams one = *scene->sim->cell;
   one.spread = 0;
   const sim::Cell cell(one, scene->sim->needle, scene->sim->holder, 1, 0);
@@ -195,7 +209,7 @@ SceneCell cell_of(const std::string& scene_name) {
 struct Law {
   std::string name;
   bool shipped = false;
-  // Depth and what a perfect eye sees of the dimple's half-width.
+  // seen_a_m: half-width of the dimple that vision without error would see.
   std::function<double(const SceneCell&, double wd_m, double seen_a_m)> force_N;
 };
 double by_law(const SceneCell& cell, rt::MembraneParams::Law law, double wd_m) {
@@ -224,7 +238,9 @@ struct Fit {
     true_square += truth_N * truth_N;
     ++points;
     const double error = std::abs(force_N / truth_N - 1);
-    if (!(error > worst)) return;
+    if (!(error > worst)) {
+      return;
+    }
     worst = error;
     worst_at_m = wd_m;
   }
@@ -248,15 +264,21 @@ struct Compared {
 Compared compare(const SceneCell& cell, const std::vector<Law>& all, int depths, Progress& progress) {
   Compared out{error_panel(cell.name + ": laws against the simulated cell", "depth of the dimple [um]"),
                std::vector<Fit>(all.size())};
-  for (const Law& law : all) out.panel.series.push_back({.name = law.name});
+  for (const Law& law : all) {
+    out.panel.series.push_back({.name = law.name});
+  }
   sim::MembraneSolution x;
   for (int k = 1; k <= depths; ++k) {
     const double wd_m = 1.15 * cell.puncture_m * k / depths;
-    if (!sim::solve_membrane(cell.shape, wd_m / cell.R_m, kFine, x)) break;
+    if (!sim::solve_membrane(cell.shape, wd_m / cell.R_m, kFine, x)) {
+      break;
+    }
     const double truth_N = x.force * cell.Eh_N_m * cell.R_m;
     for (std::size_t i = 0; i < all.size(); ++i) {
       const double force_N = all[i].force_N(cell, wd_m, x.half_width * cell.R_m);
-      if (wd_m <= cell.puncture_m) out.fits[i].add(force_N, truth_N, wd_m);
+      if (wd_m <= cell.puncture_m) {
+        out.fits[i].add(force_N, truth_N, wd_m);
+      }
       out.panel.series[i].x.push_back(wd_m * 1e6);
       out.panel.series[i].y.push_back(std::max(std::abs(force_N / truth_N - 1), 1e-5));
     }
@@ -267,7 +289,7 @@ Compared compare(const SceneCell& cell, const std::vector<Law>& all, int depths,
   return out;
 }
 
-// The corrected law over its whole box, at places its calibration has not seen.
+// The corrected law at random places in the whole box of its calibration.
 struct Box {
   Panel panel;
   double rms = 0, worst = 0;
@@ -291,7 +313,9 @@ Box over_the_box(int places, Progress& progress) {
     sim::MembraneSolution x;
     for (int k = 0; k < kDepths; ++k) {
       at.w = high.w * std::pow((k + 1.0) / kDepths, 1.5);
-      if (!sim::solve_membrane({at.c, at.seat, at.nu, at.prestrain}, at.w, 64, x)) break;
+      if (!sim::solve_membrane({at.c, at.seat, at.nu, at.prestrain}, at.w, 64, x)) {
+        break;
+      }
       const double error = std::abs(rt::large_deflection(at).force / x.force - 1);
       errors[static_cast<std::size_t>(k)].push_back(error);
       square += error * error;
@@ -305,7 +329,9 @@ Box over_the_box(int places, Progress& progress) {
     Series s{.name = name};
     for (int k = 0; k < kDepths; ++k) {
       auto& e = errors[static_cast<std::size_t>(k)];
-      if (e.empty()) continue;
+      if (e.empty()) {
+        continue;
+      }
       std::sort(e.begin(), e.end());
       s.x.push_back(high.w * std::pow((k + 1.0) / kDepths, 1.5));
       s.y.push_back(std::max(e[static_cast<std::size_t>(part * static_cast<double>(e.size() - 1))], 1e-5));
@@ -322,17 +348,21 @@ Result run_force(const Job& job) {
   std::vector<Method> methods;
   add_methods<double>(methods, "double", job.quick);
   add_methods<float>(methods, "float", job.quick);
-  for (Method& m : methods)
+  for (Method& m : methods) {
     m.shipped = m.name == "stable form, double" && m.narrowest == 1e-9 && m.knob[0] == '1';
+  }
 
-  // The whole laws of a tick: force, stiffness, energy, stress, pressure.
+  // In a tick a law also gives stiffness, energy, stress and pressure.
   const SceneCell oocyte = cell_of("icsi");
   const std::array<SceneCell, 2> cells = {oocyte, cell_of("zebrafish")};
   std::vector<double> depths(256);
-  for (std::size_t i = 0; i < depths.size(); ++i)
+  for (std::size_t i = 0; i < depths.size(); ++i) {
     depths[i] = oocyte.puncture_m * static_cast<double>(i + 1) / static_cast<double>(depths.size());
+  }
   std::vector<Timed> timed;
-  for (const Method& m : methods) timed.push_back(m.timed);
+  for (const Method& m : methods) {
+    timed.push_back(m.timed);
+  }
   for (const auto law : {rt::MembraneParams::Law::paper, rt::MembraneParams::Law::large_deflection}) {
     rt::MembraneParams params = oocyte.params;
     params.law = law;
@@ -351,9 +381,10 @@ Result run_force(const Job& job) {
   for (std::size_t i = 0; i < methods.size(); ++i) {
     const Method& m = methods[i];
     works.push_back({m.name, m.knob, m.worst, times[i], m.shipped});
-    if (m.narrowest == 1e-9)
+    if (m.narrowest == 1e-9) {
       worst.add({m.name, m.knob, m.worst, m.where.c_m / m.where.a_m, narrowness(m.where),
                  m.where.wd_m / m.where.a_m});
+    }
   }
   Table law_table{.name = "force_laws",
                   .columns = {"cell", "law", "relative_error_rms", "worst_relative_error", "worst_at_wd_m",
@@ -373,12 +404,14 @@ Result run_force(const Job& job) {
     Compared compared = compare(cell, all, points, job.progress);
     for (std::size_t i = 0; i < all.size(); ++i) {
       const Fit& f = compared.fits[i];
-      // By a measured width the law is evaluated by vision, not in the tick.
+      // The law with a measured half-width is evaluated by vision, not in the tick.
       const double tick_ns =
           i == 0 ? std::numeric_limits<double>::quiet_NaN() : times[methods.size() + i - 1].median_ns;
       law_table.add({cell.name, all[i].name, f.rms(), f.worst, f.worst_at_m,
                      std::sqrt(f.true_square / f.points), cell.puncture_m, tick_ns, all[i].shipped});
-      if (&cell == &cells[0]) of_oocyte[i] = f;
+      if (&cell == &cells[0]) {
+        of_oocyte[i] = f;
+      }
     }
     figure.panels.push_back(std::move(compared.panel));
   }

@@ -10,9 +10,9 @@
 #include <fstream>
 #include <iterator>
 #include <system_error>
-#include <vector>
 
 #include "rt/forces/membrane.hpp"
+#include "tools/shared/csv.hpp"
 
 namespace punctum::report {
 namespace {
@@ -37,26 +37,19 @@ constexpr std::array<Column, 6> kColumns = {{
 }};
 enum : std::size_t { kA, kW, kC, kH, kE, kNu };
 
-std::vector<std::string_view> split(std::string_view line) {
-  std::vector<std::string_view> cells;
-  for (std::size_t from = 0;;) {
-    const std::size_t comma = line.find(',', from);
-    cells.push_back(line.substr(from, comma - from));
-    if (comma == std::string_view::npos) return cells;
-    from = comma + 1;
-  }
-}
-
 std::string_view trimmed(std::string_view s) {
   const std::size_t first = s.find_first_not_of(" \t");
   return first == std::string_view::npos ? "" : s.substr(first, s.find_last_not_of(" \t") + 1 - first);
 }
 
-// As it stands in a message: short, and one line whatever it was.
+// For a message: short, and without control characters.
 std::string shown(std::string_view s) {
   std::string text(s.substr(0, 40));
-  for (char& c : text)
-    if (static_cast<unsigned char>(c) < ' ' || c == 127) c = '?';
+  for (char& c : text) {
+    if (static_cast<unsigned char>(c) < ' ' || c == 127) {
+      c = '?';
+    }
+  }
   return text;
 }
 
@@ -66,7 +59,9 @@ tl::unexpected<std::string> wrong(std::size_t line, const std::string& what) {
 
 bool number(std::string_view cell, double& value) {
   std::string_view text = trimmed(cell);
-  if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
+  if (text.starts_with('+') && !text.starts_with("+-")) {
+    text.remove_prefix(1);
+  }
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   return error == std::errc() && end == text.data() + text.size() && std::isfinite(value);
 }
@@ -90,7 +85,9 @@ tl::expected<std::string, std::string> evaluate_pairs(std::string_view csv) {
     const bool ended = newline != std::string_view::npos;
     csv.remove_prefix(ended ? newline + 1 : csv.size());
     const bool carriage_return = line.ends_with('\r');
-    if (carriage_return) line.remove_suffix(1);
+    if (carriage_return) {
+      line.remove_suffix(1);
+    }
     const auto append = [&](std::string_view what) {
       out += line;
       out += ',';
@@ -98,41 +95,52 @@ tl::expected<std::string, std::string> evaluate_pairs(std::string_view csv) {
       out += carriage_return ? "\r\n" : "\n";
     };
 
-    const auto cells = split(line);
+    const auto cells = tools::split_csv(line);
     if (columns == 0) {
       columns = cells.size();
-      for (std::size_t i = 0; i < columns; ++i)
-        if (trimmed(cells[i]) == kResult) return wrong(1, fmt::format("{}: is there already", kResult));
+      for (std::size_t i = 0; i < columns; ++i) {
+        if (trimmed(cells[i]) == kResult) {
+          return wrong(1, fmt::format("{}: is there already", kResult));
+        }
+      }
       for (std::size_t k = 0; k < kColumns.size(); ++k) {
         std::size_t found = 0;
         for (std::size_t i = 0; i < columns; ++i) {
-          if (trimmed(cells[i]) != kColumns[k].name) continue;
+          if (trimmed(cells[i]) != kColumns[k].name) {
+            continue;
+          }
           place[k] = i;
           ++found;
         }
-        if (found != 1)
+        if (found != 1) {
           return wrong(1, fmt::format("{}: {} of this column, needed: a_m,wd_m,c_m,h_m,E_Pa,nu",
                                       kColumns[k].name, found == 0 ? "none" : "more than one"));
+        }
       }
       append(kResult);
       continue;
     }
-    if (cells.size() != columns)
+    if (cells.size() != columns) {
       return wrong(line_number, fmt::format("{} columns, but the header has {}", cells.size(), columns));
+    }
     std::array<double, kColumns.size()> x{};
     for (std::size_t k = 0; k < kColumns.size(); ++k) {
       const std::string_view cell = cells[place[k]];
-      if (!number(cell, x[k]) || !kColumns[k].good(x[k]))
+      if (!number(cell, x[k]) || !kColumns[k].good(x[k])) {
         return wrong(line_number, fmt::format("{}: {} is not allowed, allowed: {}", kColumns[k].name,
                                               cell.empty() ? "nothing" : shown(cell), kColumns[k].allowed));
+      }
     }
-    if (x[kW] > 0 && !(x[kA] > x[kC]))
+    if (x[kW] > 0 && !(x[kA] > x[kC])) {
       return wrong(line_number, fmt::format("a_m: {} is not allowed, allowed: above c_m, which is {}",
                                             shown(cells[place[kA]]), shown(cells[place[kC]])));
+    }
     const double force_N = rt::membrane_force(x[kE], x[kNu], x[kH], x[kC], x[kW], x[kA]);
     append(fmt::format("{:.17g}", force_N));
   }
-  if (columns == 0) return wrong(1, "empty, needed: a_m,wd_m,c_m,h_m,E_Pa,nu");
+  if (columns == 0) {
+    return wrong(1, "empty, needed: a_m,wd_m,c_m,h_m,E_Pa,nu");
+  }
   return out;
 }
 
@@ -143,15 +151,24 @@ int evaluate_pairs_file(const std::string& input, const std::string& output) {
     return kBadInput;
   };
   std::error_code error;
-  if (fs::is_directory(input, error)) return fail(fmt::format("--input: {}: is a folder", input));
+  if (fs::is_directory(input, error)) {
+    return fail(fmt::format("--input: {}: is a folder", input));
+  }
   std::ifstream file(input, std::ios::binary);
-  if (!file) return fail(fmt::format("--input: {}: cannot be read", input));
+  if (!file) {
+    return fail(fmt::format("--input: {}: cannot be read", input));
+  }
   const std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (file.bad()) return fail(fmt::format("--input: {}: cannot be read", input));
+  if (file.bad()) {
+    return fail(fmt::format("--input: {}: cannot be read", input));
+  }
   const auto rows = evaluate_pairs(text);
-  if (!rows) return fail(fmt::format("{}: {}", input, rows.error()));
+  if (!rows) {
+    return fail(fmt::format("{}: {}", input, rows.error()));
+  }
 
-  // A whole file or none: beside its place first. What is no file (a pipe, a terminal) is just written to.
+  // The file is complete or absent: it is written under another name first. A pipe or a terminal is written
+  // directly.
   const bool plain = !fs::exists(output, error) || fs::is_regular_file(output, error);
   const std::string place = plain ? output + ".part" : output;
   std::ofstream out(place, std::ios::binary);
@@ -159,10 +176,16 @@ int evaluate_pairs_file(const std::string& input, const std::string& output) {
   out.close();
   if (out && plain) {
     fs::rename(place, output, error);
-    if (!error) return 0;
+    if (!error) {
+      return 0;
+    }
   }
-  if (out && !plain) return 0;
-  if (plain) fs::remove(place, error);
+  if (out && !plain) {
+    return 0;
+  }
+  if (plain) {
+    fs::remove(place, error);
+  }
   return fail(fmt::format("--output: {}: cannot be written", output));
 }
 

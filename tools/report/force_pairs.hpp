@@ -1,4 +1,4 @@
-// punctum-report force --input: measured dimples in, eq. 5's force out.
+// punctum-report force --input: the force of eq. 5 for measured dimples.
 #pragma once
 
 #include <string>
@@ -7,12 +7,12 @@
 
 namespace punctum::report {
 
-// CSV with a header that has the columns a_m,wd_m,c_m,h_m,E_Pa,nu in any order, others as one likes. Every
-// line comes back as it is with force_N appended, in 17 significant digits. The error is one line:
-// "line N: column: what is wrong, allowed: ...".
+// CSV with a header that has the columns a_m,wd_m,c_m,h_m,E_Pa,nu in any order, among
+// others. Every line is returned unchanged with force_N appended, in 17 significant digits. The error is one
+// line: "line N: column: what is wrong, allowed: ...".
 [[nodiscard]] tl::expected<std::string, std::string> evaluate_pairs(std::string_view csv);
 
-// The files of it: 0, or 2 with one line on stderr, and then no output is left.
+// The same for files. Exit code 0; or 2 with one line on stderr, and no output file.
 [[nodiscard]] int evaluate_pairs_file(const std::string& input, const std::string& output);
 
 }  // namespace punctum::report

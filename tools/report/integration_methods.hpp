@@ -4,8 +4,8 @@
 //   Real a(t, s), Slopes<Real> slopes(t, s)   acceleration and its derivatives in the present mode
 //   Real gap(t, s)                            the mode lasts until this falls below 0
 //   void change(t, s)                         to the next mode, at an event; may put s on the surface
-// Modes are not looked at inside a step. With located events the step is ended on the event and a new one
-// begun; without, the mode changes at the end of the step in which the event was.
+// Within a step the mode is constant. With located events the step ends on the event and a new one begins;
+// without, the mode changes at the end of the step in which the event was.
 #pragma once
 
 #include <algorithm>
@@ -26,7 +26,7 @@ struct Slopes {
   Real x = 0, v = 0, t = 0;
 };
 
-// v takes the old acceleration, x the old velocity.
+// v uses the old acceleration, x the old velocity.
 struct ExplicitEuler {
   static constexpr const char* name = "explicit Euler";
   static constexpr int order = 1;
@@ -77,7 +77,9 @@ struct ImplicitMidpoint {
       const Slopes<Real> d = law.slopes(t + half, middle);
       const Real change = (s.v + half * law.a(t + half, middle) - v) / (1 - half * (half * d.x + d.v));
       v += change;
-      if (std::abs(change) <= 8 * std::numeric_limits<Real>::epsilon() * std::abs(v)) break;
+      if (std::abs(change) <= 8 * std::numeric_limits<Real>::epsilon() * std::abs(v)) {
+        break;
+      }
     }
     return {s.x + h * v, s.v + 2 * (v - s.v)};
   }
@@ -104,7 +106,7 @@ struct ExponentialRosenbrock {
       c1 = p1 + square / 2 * (p1 - 2 * p2 + 2 * p3) - d1 * mean;
       c2 = p2 + square / 2 * (p2 - 4 * p3 + 6 * p4) - d2 * mean;
     } else if (square > 0) {
-      // The smaller one without cancellation: their product is -h^2 d.x.
+      // The smaller one without cancellation, since their product is -h^2 d.x.
       const Real large = mean < 0 ? mean - root : mean + root;
       const Real small = -h * h * d.x / large;
       const auto l = phi(large), n = phi(small);
@@ -160,14 +162,16 @@ struct ExponentialRosenbrock {
 
 inline constexpr int kEventsPerStep = 16;
 
-// From t, s over h. Ends on each event in turn.
+// One step h from t and s, with a step of the method up to each event.
 template <class Method, class Real, class Law>
 Motion<Real> step_located(Law& law, Real t, Motion<Real> s, Real h) {
   for (int event = 0; event < kEventsPerStep && h > 0; ++event) {
     const Motion<Real> end = Method::step(law, t, s, h);
     Real gap_high = law.gap(t + h, end);
-    if (!(gap_high < 0)) return end;
-    // Regula falsi on the length of the step (Illinois); halves while it starts on the surface.
+    if (!(gap_high < 0)) {
+      return end;
+    }
+    // Regula falsi on the length of the step (Illinois); bisection while the step starts on the surface.
     Real low = 0, high = h, gap_low = law.gap(t, s);
     int side = 0;
     const Real fine = std::numeric_limits<Real>::epsilon() * (t + h);
@@ -182,12 +186,16 @@ Motion<Real> step_located(Law& law, Real t, Motion<Real> s, Real h) {
       if (gap < 0) {
         high = at;
         gap_high = gap;
-        if (side == -1) gap_low /= 2;
+        if (side == -1) {
+          gap_low /= 2;
+        }
         side = -1;
       } else {
         low = at;
         gap_low = gap;
-        if (side == 1) gap_high /= 2;
+        if (side == 1) {
+          gap_high /= 2;
+        }
         side = 1;
       }
     }
@@ -202,7 +210,9 @@ Motion<Real> step_located(Law& law, Real t, Motion<Real> s, Real h) {
 template <class Method, class Real, class Law>
 Motion<Real> step_unlocated(Law& law, Real t, Motion<Real> s, Real h) {
   s = Method::step(law, t, s, h);
-  if (law.gap(t + h, s) < 0) law.change(t + h, s);
+  if (law.gap(t + h, s) < 0) {
+    law.change(t + h, s);
+  }
   return s;
 }
 

@@ -1,5 +1,5 @@
-// What the integrators are measured on: the plant's own stiff and discontinuous motions, each with a
-// reference that comes from elsewhere.
+// The problems that the integrators are measured on: stiff and discontinuous motions of the plant, each with
+// an independent reference.
 //
 //   Handle    a mass held by an arm whose intention moves, dry friction: it stops, turns, sticks, breaks away
 //   Wall      a mass under a held force against a damped spring: contact, and away again
@@ -11,8 +11,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "hal/sim/cell.hpp"
-#include "hal/sim/hand.hpp"
+#include "hal/sim/plant/cell.hpp"
+#include "hal/sim/plant/hand.hpp"
 #include "tools/report/integration_methods.hpp"
 
 namespace punctum::report {
@@ -23,18 +23,20 @@ struct Reference {
 };
 #include "tools/report/integrators_reference.inc"
 
-// When the mode changed; the first few.
+// Times of the changes of the mode; the first eight.
 struct EventLog {
   std::array<double, 8> at_s{};
   std::int64_t count = 0;
   void add(double t_s) {
-    if (count < static_cast<std::int64_t>(at_s.size())) at_s[static_cast<std::size_t>(count)] = t_s;
+    if (count < static_cast<std::int64_t>(at_s.size())) {
+      at_s[static_cast<std::size_t>(count)] = t_s;
+    }
     ++count;
   }
 };
 
-// What is shipped, in double: closed forms between events (hal/sim/hand.cpp), and a needle that is where its
-// drive is (hal/sim/cell.cpp).
+// What the program ships, in double: closed forms between events (hal/sim/plant/hand.cpp), and a needle that
+// is where its drive is (hal/sim/plant/cell.cpp).
 struct ClosedForm {
   static constexpr const char* name = "closed form";
   template <class Law>
@@ -65,15 +67,19 @@ struct Handle {
     return moving + Real(arm_N_m) * (Real(intention_m_s) * t - s.x);
   }
   [[nodiscard]] Real a(Real t, Motion<Real> s) const {
-    if (sign == 0) return 0;
+    if (sign == 0) {
+      return 0;
+    }
     return (pull(t, s) - Real(sign * coulomb_N) - Real(damping_Ns_m + arm_Ns_m) * s.v) / Real(mass_kg);
   }
   [[nodiscard]] Slopes<Real> slopes(Real, Motion<Real>) const {
-    if (sign == 0) return {};
+    if (sign == 0) {
+      return {};
+    }
     return {Real(-arm_N_m / mass_kg), Real(-(damping_Ns_m + arm_Ns_m) / mass_kg),
             Real(arm_N_m * intention_m_s / mass_kg)};
   }
-  // Rounding about rest is no motion.
+  // Rounding near standstill is no motion.
   [[nodiscard]] Real gap(Real t, Motion<Real> s) const {
     return sign == 0 ? Real(coulomb_N) - std::abs(pull(t, s))
                      : Real(sign) * s.v + 4 * std::numeric_limits<Real>::epsilon();
@@ -88,7 +94,7 @@ struct Handle {
     sign = std::abs(p) <= Real(coulomb_N) ? 0 : -sign;
     s.v = 0;
   }
-  // Over stops, turns and breaking away: it locates them by itself.
+  // sim::advance() locates stops, turns and breaking away by itself.
   [[nodiscard]] static Motion<double> closed_form(double t, Motion<double> s, double h) {
     sim::HandParams hand;
     hand.mass_kg = mass_kg;
@@ -126,7 +132,7 @@ struct Wall {
     events.add(static_cast<double>(t));
     inside = !inside;
   }
-  // In one mode; contact is located from outside, as for the other methods.
+  // Within one mode. Contact is located by step_located, as for the other methods.
   [[nodiscard]] Motion<double> closed_form(double, Motion<double> s, double h) const {
     sim::HandParams hand;
     hand.mass_kg = mass_kg;
@@ -163,10 +169,14 @@ class MembraneForce {
   struct Value {
     Real force_N, slope_N_m;
   };
-  // Finds its interval from the last one.
+  // Starts the search for the interval at the last one.
   [[nodiscard]] Value operator()(Real x_m) const {
-    while (last_ > 0 && x_m < cubics_[last_].from) --last_;
-    while (last_ + 1 < cubics_.size() && x_m >= cubics_[last_ + 1].from) ++last_;
+    while (last_ > 0 && x_m < cubics_[last_].from) {
+      --last_;
+    }
+    while (last_ + 1 < cubics_.size() && x_m >= cubics_[last_ + 1].from) {
+      ++last_;
+    }
     const Cubic& c = cubics_[last_];
     const Real d = x_m - c.from;
     return {c.c0 + d * (c.c1 + d * (c.c2 + d * c.c3)), c.c1 + d * (2 * c.c2 + d * 3 * c.c3)};
@@ -190,7 +200,7 @@ struct Puncture {
   static constexpr double end_s = 8e-3;
   static constexpr double mass_kg = 8e-10, drag_Ns_m = 2e-3, pipette_N_m = 500;
   static constexpr double start_m = -1e-6, set_point_m = 26e-6, lag_s = 4e-3;
-  static constexpr Motion<Real> start{Real(start_m), 0};  // at rest while its drive moves
+  static constexpr Motion<Real> start{Real(start_m), 0};  // at rest; its drive moves
 
   const MembraneForce<Real>* membrane;
   Real puncture_m;
@@ -214,7 +224,9 @@ struct Puncture {
             Real(pipette_N_m / mass_kg) * drive_m_s(t)};
   }
   [[nodiscard]] Real gap(Real, Motion<Real> s) const {
-    if (mode == outside) return -s.x;
+    if (mode == outside) {
+      return -s.x;
+    }
     return mode == intact ? puncture_m - s.x : Real(1);
   }
   void change(Real t, Motion<Real>&) {
@@ -223,16 +235,18 @@ struct Puncture {
   }
 };
 
-// Over a whole problem in equal steps, `step` being step_located<Method>, step_unlocated<Method> or alike.
+// Runs a whole problem in equal steps. step: step_located<Method>, step_unlocated<Method> or a like function.
 template <class Real, class Law, class Step>
 Motion<Real> integrate(Law& law, std::int64_t steps, Step step) {
   const Real h = Real(Law::end_s) / static_cast<Real>(steps);
   Motion<Real> s = Law::start;
-  for (std::int64_t i = 0; i < steps; ++i) s = step(law, static_cast<Real>(i) * h, s, h);
+  for (std::int64_t i = 0; i < steps; ++i) {
+    s = step(law, static_cast<Real>(i) * h, s, h);
+  }
   return s;
 }
 
-// For references: the modified midpoint rule extrapolated over 2, 4 .. 12 parts of a step, order 12.
+// For the reference: the modified midpoint rule extrapolated over 2, 4 .. 12 parts of a step, order 12.
 struct Extrapolated {
   static constexpr const char* name = "extrapolated midpoint";
   template <class Real, class Law>

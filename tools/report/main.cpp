@@ -1,5 +1,5 @@
-// punctum-report: error against run time of everything that trades one for the other, and where it stays
-// stable.
+// punctum-report: error against run time of everything that trades one for the other, and the limits of
+// stability.
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <unistd.h>
@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "tools/report/output.hpp"
+#include "tools/shared/version.hpp"
 
 namespace {
 
@@ -35,17 +36,24 @@ int bad(const std::string& text) {
 void write(const fs::path& path, const std::string& text) {
   std::ofstream file(path, std::ios::binary);
   file << text;
-  if (!file.flush()) throw std::runtime_error(path.string() + ": cannot be written");
+  if (!file.flush()) {
+    throw std::runtime_error(path.string() + ": cannot be written");
+  }
 }
 
-// What is wrong with the folder; empty if nothing.
+// Makes the folder. Returns what is wrong with it; empty if nothing is.
 std::string prepare(const fs::path& out) {
   std::error_code ec;
   fs::create_directories(out, ec);
-  if (ec) return fmt::format("--out: {}: {}", out.string(), ec.message());
-  if (!fs::is_directory(out, ec)) return fmt::format("--out: {}: is not a folder", out.string());
-  if (access(out.c_str(), W_OK | X_OK) != 0)
+  if (ec) {
+    return fmt::format("--out: {}: {}", out.string(), ec.message());
+  }
+  if (!fs::is_directory(out, ec)) {
+    return fmt::format("--out: {}: is not a folder", out.string());
+  }
+  if (access(out.c_str(), W_OK | X_OK) != 0) {
     return fmt::format("--out: {}: cannot be written to", out.string());
+  }
   return {};
 }
 
@@ -57,9 +65,14 @@ Finished finish(const Topic& topic, bool quick, const fs::path& out, const Prove
       Progress progress(done.topic);
       done.result = topic.run({.quick = quick, .out = out, .progress = progress});
     }
-    for (const Table& t : done.result.tables) write(out / (t.name + ".csv"), csv(t, from));
-    for (const Figure& f : done.result.figures)
-      if (const auto drawn = draw(f, out); !drawn) fmt::print(stderr, "{}.svg: {}\n", f.name, drawn.error());
+    for (const Table& t : done.result.tables) {
+      write(out / (t.name + ".csv"), csv(t, from));
+    }
+    for (const Figure& f : done.result.figures) {
+      if (const auto drawn = punctum::tools::draw(f, out / (f.name + ".svg")); !drawn) {
+        fmt::print(stderr, "{}.svg: {}\n", f.name, drawn.error());
+      }
+    }
   } catch (const std::exception& e) {
     done.error = e.what();
   }
@@ -81,6 +94,7 @@ int main_or_throw(int argc, char** argv) {
       std::find_if(topics().begin(), topics().end(), [](const Topic& t) { return t.evaluate != nullptr; });
   CLI::App app{about};
   app.failure_message([](const CLI::App*, const CLI::Error& e) { return std::string(e.what()) + "\n"; });
+  app.set_version_flag("--version", punctum::tools::version_line("punctum-report"));
   std::vector<std::string> wanted;
   std::string folder, input, output;
   bool quick = false;
@@ -104,27 +118,38 @@ int main_or_throw(int argc, char** argv) {
   }
 
   const bool all = std::find(wanted.begin(), wanted.end(), "all") != wanted.end();
-  for (const std::string& w : wanted)
+  for (const std::string& w : wanted) {
     if (w != "all" &&
-        std::none_of(topics().begin(), topics().end(), [&w](const Topic& t) { return t.name == w; }))
+        std::none_of(topics().begin(), topics().end(), [&w](const Topic& t) { return t.name == w; })) {
       return bad(fmt::format("{}TOPIC: {}: there is no such topic, allowed: {}", kLeftOut, w, names));
+    }
+  }
   if (in != nullptr && in->count() > 0) {
-    if (wanted != std::vector{std::string(evaluates->name)})
+    if (wanted != std::vector{std::string(evaluates->name)}) {
       return bad(fmt::format("--input: allowed with the one topic {}", evaluates->name));
+    }
     return evaluates->evaluate(input, output);
   }
-  if (to_folder->count() > 0 && folder.empty()) return bad("--out: names no folder");
+  if (to_folder->count() > 0 && folder.empty()) {
+    return bad("--out: names no folder");
+  }
   const fs::path out = fs::absolute(
       folder.empty() ? fmt::format("reports/report-{:%Y%m%d-%H%M%S}", fmt::localtime(std::time(nullptr)))
                      : folder);
-  if (const auto wrong = prepare(out); !wrong.empty()) return bad(wrong);
+  if (const auto wrong = prepare(out); !wrong.empty()) {
+    return bad(wrong);
+  }
 
-  if (all) fmt::print("{}", kLeftOut);
+  if (all) {
+    fmt::print("{}", kLeftOut);
+  }
   const Provenance from = provenance();
   std::vector<Finished> finished;
-  for (const Topic& t : topics())
-    if (all || std::find(wanted.begin(), wanted.end(), t.name) != wanted.end())
+  for (const Topic& t : topics()) {
+    if (all || std::find(wanted.begin(), wanted.end(), t.name) != wanted.end()) {
       finished.push_back(finish(t, quick, out, from));
+    }
+  }
   write(out / "index.html", page(finished, from, out));
   fmt::print("{}\n", (out / "index.html").string());
   const bool failed =

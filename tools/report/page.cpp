@@ -30,20 +30,27 @@ nav a { margin-right: 1rem; }
 
 std::string table_html(const Table& t) {
   std::vector<std::size_t> columns;
-  for (std::size_t i = 0; i < t.columns.size(); ++i)
-    if (t.shown.empty() || std::find(t.shown.begin(), t.shown.end(), t.columns[i]) != t.shown.end())
+  for (std::size_t i = 0; i < t.columns.size(); ++i) {
+    if (t.shown.empty() || std::find(t.shown.begin(), t.shown.end(), t.columns[i]) != t.shown.end()) {
       columns.push_back(i);
+    }
+  }
   std::vector<std::size_t> rows = t.shown_rows;
   if (rows.empty() || t.rows.size() <= kShortTable) {
     rows.resize(t.rows.size() <= kShortTable ? t.rows.size() : kRowsOfLong);
     std::iota(rows.begin(), rows.end(), std::size_t{0});
   }
   std::string what = t.name + ".csv";
-  if (rows.size() < t.rows.size()) what += fmt::format(", {} of {} rows", rows.size(), t.rows.size());
-  if (columns.size() < t.columns.size())
+  if (rows.size() < t.rows.size()) {
+    what += fmt::format(", {} of {} rows", rows.size(), t.rows.size());
+  }
+  if (columns.size() < t.columns.size()) {
     what += fmt::format(", {} of {} columns", columns.size(), t.columns.size());
+  }
   std::string s = "<div class=\"wide\"><table><caption>" + escaped(what) + "</caption>\n<tr>";
-  for (const std::size_t c : columns) s += "<th>" + escaped(t.columns[c]) + "</th>";
+  for (const std::size_t c : columns) {
+    s += "<th>" + escaped(t.columns[c]) + "</th>";
+  }
   s += "</tr>\n";
   const auto shipped =
       static_cast<std::size_t>(std::find(t.columns.begin(), t.columns.end(), "shipped") - t.columns.begin());
@@ -60,7 +67,7 @@ std::string table_html(const Table& t) {
   return s + "</table></div>\n";
 }
 
-// The drawing alone: what stands before <svg> belongs to a file of its own.
+// Only the <svg> element; what precedes it belongs to a separate file.
 std::string figure_html(const Figure& f, const fs::path& out) {
   std::ifstream in(out / (f.name + ".svg"), std::ios::binary);
   const std::string svg{std::istreambuf_iterator<char>(in), {}};
@@ -75,7 +82,8 @@ std::string figure_html(const Figure& f, const fs::path& out) {
 
 std::string escaped(const std::string& text) {
   std::string s;
-  for (const char c : text) switch (c) {
+  for (const char c : text) {
+    switch (c) {
       case '&':
         s += "&amp;";
         break;
@@ -94,6 +102,7 @@ std::string escaped(const std::string& text) {
       default:
         s += c;
     }
+  }
   return s;
 }
 
@@ -105,28 +114,39 @@ std::string page(std::span<const Finished> topics, const Provenance& from, const
   s += kStyle;
   s += "</style>\n</head>\n<body>\n<h1>Error against run time</h1>\n<p class=\"about\">What each method of "
        "the control "
-       "firmware costs, how far it is from the truth, and where it ends to be stable.</p>\n<dl>";
+       "firmware costs, how far it is from the truth, and where it stops being stable.</p>\n<dl>";
   for (const auto& [key, value] : {std::pair<const char*, std::string>{"machine", from.machine},
                                    {"compiler", from.compiler},
                                    {"flags", from.flags},
-                                   {"commit", from.commit}})
+                                   {"commit", from.commit}}) {
     s += fmt::format("<dt>{}</dt><dd>{}</dd>", key, escaped(value));
+  }
   s += "</dl>\n<nav>";
-  for (const Finished& t : topics) s += fmt::format("<a href=\"#{0}\">{0}</a>", escaped(t.topic));
+  for (const Finished& t : topics) {
+    s += fmt::format("<a href=\"#{0}\">{0}</a>", escaped(t.topic));
+  }
   s += "</nav>\n";
   for (const Finished& t : topics) {
     s += fmt::format("<section id=\"{0}\">\n<h2>{0}</h2>\n<p class=\"about\">{1}</p>\n", escaped(t.topic),
                      escaped(t.about));
-    if (!t.error.empty()) s += "<p class=\"failed\">failed: " + escaped(t.error) + "</p>\n";
-    if (!t.result.reading.empty()) s += "<p class=\"reading\">" + escaped(t.result.reading) + "</p>\n";
-    for (const Figure& f : t.result.figures) s += figure_html(f, out);
-    for (const Table& table : t.result.tables) s += table_html(table);
+    if (!t.error.empty()) {
+      s += "<p class=\"failed\">failed: " + escaped(t.error) + "</p>\n";
+    }
+    if (!t.result.reading.empty()) {
+      s += "<p class=\"reading\">" + escaped(t.result.reading) + "</p>\n";
+    }
+    for (const Figure& f : t.result.figures) {
+      s += figure_html(f, out);
+    }
+    for (const Table& table : t.result.tables) {
+      s += table_html(table);
+    }
     s += "</section>\n";
   }
   return s +
          "<section>\n<h2>How times were taken</h2>\n<p>Methods run in turns, in batches long enough for the "
          "clock, each "
-         "batch followed by the empty harness, which is taken off (column overhead_ns). One batch gives its "
+         "batch followed by the empty harness, which is subtracted (column overhead_ns). One batch gives its "
          "mean time "
          "per call; median, p99.9 and maximum are over batches, and over single calls where the column batch "
          "is 1. With "

@@ -27,17 +27,20 @@ struct Progress::Shared {
   void tell(bool now) {
     const auto t = Steady::now();
     const double since = std::chrono::duration<double>(t - told).count();
-    if (!now && since < (terminal ? kBarEvery_s : kLineEvery_s)) return;
+    if (!now && since < (terminal ? kBarEvery_s : kLineEvery_s)) {
+      return;
+    }
     told = t;
     const double part =
         steps > 0 ? std::clamp(static_cast<double>(done) / static_cast<double>(steps), 0.0, 1.0) : 0;
     const auto full = static_cast<std::size_t>(part * kBar);
     const double seconds = std::chrono::duration<double>(t - begun).count();
-    if (terminal)
+    if (terminal) {
       fmt::print(stderr, "\r{:<12}[{}{}] {:3.0f} %  {} {:.0f} s\033[K", topic, std::string(full, '#'),
                  std::string(kBar - full, '.'), part * 100, what, seconds);
-    else
+    } else {
       fmt::print(stderr, "{:<12}{:3.0f} %  {} {:.0f} s\n", topic, part * 100, what, seconds);
+    }
     (void)std::fflush(stderr);
   }
 };
@@ -47,7 +50,9 @@ Progress::Progress(std::string topic) : shared_(std::make_unique<Shared>()) {
 }
 
 Progress::~Progress() {
-  if (shared_->terminal) fmt::print(stderr, "\r\033[K");
+  if (shared_->terminal) {
+    fmt::print(stderr, "\r\033[K");
+  }
 }
 
 void Progress::start(const std::string& what, std::int64_t steps) {

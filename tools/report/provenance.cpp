@@ -6,22 +6,23 @@
 #include <thread>
 
 #include "tools/report/output.hpp"
+#include "tools/shared/version.hpp"
 
 namespace punctum::report {
-
-const char* built_commit();  // written by the build, from git
 
 namespace {
 
 std::string cpu_model() {
   std::ifstream in("/proc/cpuinfo");
-  for (std::string line; std::getline(in, line);)
-    if (const auto colon = line.find(": "); line.starts_with("model name") && colon != std::string::npos)
+  for (std::string line; std::getline(in, line);) {
+    if (const auto colon = line.find(": "); line.starts_with("model name") && colon != std::string::npos) {
       return line.substr(colon + 2);
+    }
+  }
   return "unknown processor";
 }
 
-// Commas would make every reader unquote.
+// So that the cells need no quotes.
 std::string without_commas(std::string s) {
   std::replace(s.begin(), s.end(), ',', ';');
   return s;
@@ -43,7 +44,7 @@ Provenance provenance() {
                                                 system.sysname, system.release)),
           .compiler = compiler,
           .flags = without_commas(PUNCTUM_BUILD_FLAGS),
-          .commit = built_commit()};
+          .commit = tools::built_commit()};
 }
 
 }  // namespace punctum::report

@@ -25,8 +25,8 @@ hal::Frame frame_of(const cv::Mat& m) {
   return f;
 }
 
-// Share of the labelled ooplasm and of the contour's inside that both have; needle and sperm inside count as
-// ooplasm. Labels: 85 needle, 170 ooplasm, 255 sperm.
+// Intersection over union of the labelled ooplasm and the inside of the contour. Needle and sperm inside the
+// ooplasm belong to it. Labels: 85 needle, 170 ooplasm, 255 sperm.
 double intersection_over_union(const vision::Contour& contour, const cv::Mat& label) {
   const cv::Mat ooplasm = label == 170;
   cv::Mat closed;
@@ -46,7 +46,9 @@ void see_oocytes(const fs::path& folder, Table& table) {
     const std::string stem = (folder / "icsi_").string() + number;
     const cv::Mat picture = cv::imread(stem + "_img.png", cv::IMREAD_GRAYSCALE);
     const cv::Mat label = cv::imread(stem + "_label.png", cv::IMREAD_GRAYSCALE);
-    if (picture.empty() || label.size() != picture.size()) continue;
+    if (picture.empty() || label.size() != picture.size()) {
+      continue;
+    }
     vision::VisionConfig config;
     config.pixel_m = 0.85e-6;
     vision::Tracker tracker(config, picture.cols, picture.rows);
@@ -56,12 +58,16 @@ void see_oocytes(const fs::path& folder, Table& table) {
   }
 }
 
-// One embryo of many, cut out of each picture.
+// One of many embryos, cut out of each picture.
 void see_embryo(const fs::path& folder, Table& table, Progress& progress) {
   auto camera = recorded::Camera::open(folder.string(), 25);
-  if (!camera) return;
+  if (!camera) {
+    return;
+  }
   const cv::Rect part(700, 140, 420, 420);
-  if (camera->width() < part.br().x || camera->height() < part.br().y) return;
+  if (camera->width() < part.br().x || camera->height() < part.br().y) {
+    return;
+  }
   vision::VisionConfig config;
   config.pixel_m = 3.25e-6;
   config.holder.reset();
@@ -92,15 +98,17 @@ RealFrames see_real_frames(bool quick, Progress& progress) {
   Table table{.name = "vision_real",
               .columns = {"picture", "frame", "width_px", "height_px", "total_us", "started", "outer_ok",
                           "inner_ok", "inner_iou"}};
-  if (fs::is_directory(data / "icsi")) see_oocytes(data / "icsi", table);
+  if (fs::is_directory(data / "icsi")) {
+    see_oocytes(data / "icsi", table);
+  }
   if (!quick && fs::is_directory(data / "zebrafish-timelapse")) {
     see_embryo(data / "zebrafish-timelapse", table, progress);
   }
   if (table.rows.empty()) {
-    out.said = "Real frames: none found, PUNCTUM_DATA names their folder.";
+    out.summary = "Real frames: none were found; PUNCTUM_DATA names their folder.";
     return out;
   }
-  out.said = fmt::format("Real frames: {} seen, in vision_real.csv.", table.rows.size());
+  out.summary = fmt::format("Real frames: {} seen, in vision_real.csv.", table.rows.size());
   out.table = std::move(table);
   return out;
 }

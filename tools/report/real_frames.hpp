@@ -1,4 +1,4 @@
-// Real microscope pictures, where they are at hand: $PUNCTUM_DATA or ../shared/data.
+// Real microscope pictures from the folder $PUNCTUM_DATA, or ../shared/data; they are not part of this tree.
 #pragma once
 
 #include <optional>
@@ -9,8 +9,8 @@
 namespace punctum::report {
 
 struct RealFrames {
-  std::optional<Table> table;  // vision_real: time, and what of the scene was seen
-  std::string said;            // one sentence; why there is none
+  std::optional<Table> table;  // vision_real: times, and what of the scene was seen
+  std::string summary;         // one sentence: how many were seen, or that there are none
 };
 
 [[nodiscard]] RealFrames see_real_frames(bool quick, Progress& progress);

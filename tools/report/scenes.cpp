@@ -1,4 +1,4 @@
-// What each built-in scene costs, and that what it leaves out costs nothing.
+// Topic scenes: what each built-in scene costs, and that a table which a scene leaves out costs nothing.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,8 +15,11 @@ const std::set<std::string> kEffects = {"membrane",  "cone",     "axis",     "da
 
 std::vector<std::string> effects_of(const tools::Scene& scene) {
   std::vector<std::string> effects;
-  for (const auto& t : tools::tables(scene))
-    if (t.present && kEffects.contains(t.name)) effects.push_back(t.name);
+  for (const auto& t : tools::tables(scene)) {
+    if (t.present && kEffects.contains(t.name)) {
+      effects.push_back(t.name);
+    }
+  }
   return effects;
 }
 
@@ -48,29 +51,36 @@ Table scenes_table(const std::vector<SceneCost>& costs) {
 Table processes_table(const std::vector<SceneCost>& costs) {
   Table t{"scenes_processes",
           {"scene", "process", "threads", "libraries", "opencv_libraries", "locked_kB", "most_resident_kB"}};
-  for (const SceneCost& c : costs)
-    for (const Process& p : c.processes)
+  for (const SceneCost& c : costs) {
+    for (const Process& p : c.processes) {
       t.add({c.scene.name, p.name, p.threads, p.libraries.size(), opencv_among(p.libraries), p.locked_kB,
              p.resident_kB});
+    }
+  }
   return t;
 }
 
 Table removals_table(const std::vector<SceneCost>& costs) {
   Table t{"scenes_tables",
           {"scene", "removed", "instructions_before", "instructions_after", "saved", "fault"}};
-  for (const SceneCost& c : costs)
-    for (std::size_t i = 0; i + 1 < c.ticks.size(); ++i)
+  for (const SceneCost& c : costs) {
+    for (std::size_t i = 0; i + 1 < c.ticks.size(); ++i) {
       t.add({c.scene.name, c.chain[i].name, c.ticks[i].instructions, c.ticks[i + 1].instructions, c.saved(i),
              c.ticks[i + 1].fault});
+    }
+  }
   return t;
 }
 
 Table steps_table(const std::vector<SceneCost>& costs) {
   Table t{"scenes_steps", {"scene", "step", "instructions_per_tick"}};
-  for (const SceneCost& c : costs)
-    if (!c.ticks.empty())
-      for (const auto& [step, instructions] : c.ticks.front().steps)
+  for (const SceneCost& c : costs) {
+    if (!c.ticks.empty()) {
+      for (const auto& [step, instructions] : c.ticks.front().steps) {
         t.add({c.scene.name, step, instructions});
+      }
+    }
+  }
   return t;
 }
 
@@ -78,15 +88,18 @@ Table stages_table(const std::vector<SceneCost>& costs) {
   Table t{"scenes_stages",
           {"scene", "stage", "frames", "ran", "frames_far", "ran_far", "frames_near", "ran_near"}};
   for (const SceneCost& c : costs) {
-    if (!c.scene.vision) continue;
-    for (const auto& stage : kStages)
+    if (!c.scene.vision) {
+      continue;
+    }
+    for (const auto& stage : kStages) {
       t.add({c.scene.name, stage, c.stages.all.frames, c.stages.all.of(stage), c.stages.far.frames,
              c.stages.far.of(stage), c.stages.near.frames, c.stages.near.of(stage)});
+    }
   }
   return t;
 }
 
-// A panel of bars; parts appear in the order they are first added to.
+// A panel of bars. Its parts appear in the order in which they are first added to.
 Panel& bars(Figure& f, const std::string& title, const std::string& label, std::vector<std::string> names) {
   Panel& p = f.panels.emplace_back(Panel{.title = title, .x_label = label});
   p.bars = Bars{.names = std::move(names)};
@@ -95,8 +108,9 @@ Panel& bars(Figure& f, const std::string& title, const std::string& label, std::
 void add(Panel& p, const std::string& part, std::size_t bar, double length) {
   auto& parts = p.bars->parts;
   auto it = std::find_if(parts.begin(), parts.end(), [&](const Series& s) { return s.name == part; });
-  if (it == parts.end())
+  if (it == parts.end()) {
     it = parts.insert(it, {.name = part, .y = std::vector<double>(p.bars->names.size(), 0.0)});
+  }
   it->y[bar] += length;
 }
 
@@ -105,7 +119,9 @@ Figure figure(const std::vector<SceneCost>& costs) {
   std::vector<std::string> scenes, near_and_far;
   for (const SceneCost& c : costs) {
     scenes.push_back(c.scene.name);
-    if (!c.scene.vision) continue;
+    if (!c.scene.vision) {
+      continue;
+    }
     near_and_far.push_back(c.scene.name + ", far");
     near_and_far.push_back(c.scene.name + ", near");
   }
@@ -113,8 +129,11 @@ Figure figure(const std::vector<SceneCost>& costs) {
     Panel& tables = bars(f, "One tick of the servo, by table of the scene", "instructions per tick", scenes);
     for (std::size_t i = 0; i < costs.size(); ++i) {
       add(tables, "what every scene has", i, costs[i].ticks.back().instructions);
-      for (std::size_t r = costs[i].chain.size(); r-- > 0;)
-        if (const double saved = costs[i].saved(r); saved > 0) add(tables, costs[i].chain[r].name, i, saved);
+      for (std::size_t r = costs[i].chain.size(); r-- > 0;) {
+        if (const double saved = costs[i].saved(r); saved > 0) {
+          add(tables, costs[i].chain[r].name, i, saved);
+        }
+      }
     }
     Panel& steps = bars(f, "The same, by step", "instructions per tick", scenes);
     for (std::size_t i = 0; i < costs.size(); ++i) {
@@ -131,19 +150,25 @@ Figure figure(const std::vector<SceneCost>& costs) {
         bars(f, "One frame of vision, far from the cell and at it", "stages per frame", near_and_far);
     std::size_t bar = 0;
     for (const SceneCost& c : costs) {
-      if (!c.scene.vision) continue;
+      if (!c.scene.vision) {
+        continue;
+      }
       for (const StageRuns* runs : {&c.stages.far, &c.stages.near}) {
-        for (const auto& stage : kStages)
-          if (const auto n = runs->of(stage); n > 0)
+        for (const auto& stage : kStages) {
+          if (const auto n = runs->of(stage); n > 0) {
             add(stages, stage, bar, static_cast<double>(n) / static_cast<double>(runs->frames));
+          }
+        }
         ++bar;
       }
     }
   }
   Panel& libraries = bars(f, "Libraries mapped, by process", "libraries", scenes);
-  for (std::size_t i = 0; i < costs.size(); ++i)
-    for (const Process& p : costs[i].processes)
+  for (std::size_t i = 0; i < costs.size(); ++i) {
+    for (const Process& p : costs[i].processes) {
       add(libraries, p.name, i, static_cast<double>(p.libraries.size()));
+    }
+  }
   f.note =
       "Instructions: what callgrind counts below Servo::tick, over one recorded run per scene with devices "
       "that "
@@ -157,34 +182,43 @@ std::string reading(const std::vector<SceneCost>& costs) {
   };
   const auto opencv = [](const SceneCost& c) {
     std::int64_t n = 0;
-    for (const Process& p : c.processes) n += opencv_among(p.libraries);
+    for (const Process& p : c.processes) {
+      n += opencv_among(p.libraries);
+    }
     return n;
   };
   std::string text;
   for (const char* name : {"free", "icsi"}) {
     const auto c = of(name);
-    if (c == costs.end()) continue;
+    if (c == costs.end()) {
+      continue;
+    }
     text += fmt::format("{}{} runs {} processes with {} OpenCV libraries", text.empty() ? "" : ", ", name,
                         c->processes.size(), opencv(*c));
-    if (!c->ticks.empty())
+    if (!c->ticks.empty()) {
       text += fmt::format(" and {:.0f} instructions per tick", c->ticks.front().instructions);
+    }
   }
   std::size_t fell = 0, same = 0;
   std::vector<std::string> rose;
-  for (const SceneCost& c : costs)
+  for (const SceneCost& c : costs) {
     for (std::size_t i = 0; i + 1 < c.ticks.size(); ++i) {
       const double s = c.saved(i);
       fell += s > 0 ? 1 : 0;
       same += s == 0 ? 1 : 0;
-      if (s < 0) rose.push_back(fmt::format("{} of {}", c.chain[i].name, c.scene.name));
+      if (s < 0) {
+        rose.push_back(fmt::format("{} of {}", c.chain[i].name, c.scene.name));
+      }
     }
-  if (costs.front().ticks.empty())
+  }
+  if (costs.front().ticks.empty()) {
     text += "; instructions were not counted: valgrind is not installed";
-  else
+  } else {
     text += fmt::format(
         "; of {} tables taken out {} made the tick shorter and {} that are not in it left it as it was{}",
         fell + same + rose.size(), fell, same,
         rose.empty() ? std::string() : ", but longer without " + fmt::format("{}", fmt::join(rose, ", ")));
+  }
   std::int64_t far = 0, contact = 0;
   for (const SceneCost& c : costs) {
     far += c.stages.far.frames;

@@ -3,14 +3,14 @@
 #include <array>
 #include <cmath>
 
-#include "hal/sim/cell.hpp"
-#include "hal/sim/microscope.hpp"
+#include "hal/sim/camera/microscope.hpp"
+#include "hal/sim/plant/cell.hpp"
 
 namespace punctum::report {
 namespace {
 
 constexpr int kTicksPerFrame = 40;  // of 1 ms
-constexpr double kRecoil_s = 0.25;  // after a puncture: the membranes are under way
+constexpr double kRecoil_s = 0.25;  // after a puncture the membranes move
 constexpr double kTooLong_s = 30;
 
 }  // namespace
@@ -53,7 +53,9 @@ SimulatedInjection simulate_injection(const InjectionPlan& plan) {
     const bool through = state.outer.punctured && state.inner.punctured;
     if (through) {
       inside_s = inside_s < 0 ? 0 : inside_s + 1e-3;
-      if (inside_s > kRecoil_s + plan.inside_s) break;
+      if (inside_s > kRecoil_s + plan.inside_s) {
+        break;
+      }
     }
     const double speed = through ? 10e-6 : gap > 2e-6 ? plan.approach_m_s : plan.indentation_m_s;
     sim::TipMotion motion;
@@ -62,7 +64,9 @@ SimulatedInjection simulate_injection(const InjectionPlan& plan) {
     motion.tip_end_m = tip;
     motion.axis_begin = motion.axis_end = axis;
     const sim::CellForce truth = cell.step(state, motion, 1e-3);
-    if (tick % kTicksPerFrame != 0) continue;
+    if (tick % kTicksPerFrame != 0) {
+      continue;
+    }
 
     sim::PictureScene scene;
     scene.needle = sim::NeedleInPicture{tip, axis};
@@ -82,8 +86,12 @@ SimulatedInjection simulate_injection(const InjectionPlan& plan) {
     t.stretch = !broken ? (state.contact ? Stretch::indentation : Stretch::approach)
                 : !through || inside_s < kRecoil_s ? Stretch::recoil
                                                    : Stretch::inside;
-    for (const auto& [x, y] : shown.outer) t.outer.push_back(pixel(x, y));
-    for (const auto& [x, y] : shown.inner) t.inner.push_back(pixel(x, y));
+    for (const auto& [x, y] : shown.outer) {
+      t.outer.push_back(pixel(x, y));
+    }
+    for (const auto& [x, y] : shown.inner) {
+      t.inner.push_back(pixel(x, y));
+    }
     t.tip = pixel(tip.x(), tip.y());
     t.axis = {axis.x(), axis.y()};
     t.centre = pixel(shown.centre_m.x(), shown.centre_m.y());

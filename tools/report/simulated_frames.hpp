@@ -1,5 +1,4 @@
-// An injection on the simulated cell as the simulated microscope shows it, and what is really so in every
-// frame: approach, indentation, recoil, inside.
+// An injection into the simulated cell, as the simulated microscope shows it, with the truth of every frame.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +6,7 @@
 
 #include "hal/sim/config.hpp"
 #include "vision/config.hpp"
-#include "vision/contour.hpp"
+#include "vision/image/contour.hpp"
 
 namespace punctum::report {
 
@@ -16,7 +15,7 @@ inline constexpr int kStretches = 4;
 
 struct FrameTruth {
   Stretch stretch = Stretch::approach;
-  vision::Contour outer, inner;  // px; geometric edges before blur, arcs hidden by pipettes included
+  vision::Contour outer, inner;  // px; the edges before blur, with the arcs that pipettes hide
   vision::Point tip, axis;       // px, unit
   vision::Point centre;          // of the cell, px
   double wd_m = 0, a_m = 0, R_m = 0;
@@ -27,7 +26,7 @@ struct InjectionPlan {
   double noise = 2;  // grey levels
   double aim_m = 3e-6;
   double tilt_rad = 0.03;
-  double spread = 0.1;  // of cells
+  double spread = 0.1;  // of the sizes of cells
   double gap_m = 25e-6;
   double approach_m_s = 25e-6, indentation_m_s = 8e-6;
   double inside_s = 0.6;  // after the recoil

@@ -10,11 +10,14 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "hal/sim/cell.hpp"
+#include "hal/sim/plant/cell.hpp"
+#include "rt/control/local_membrane_model.hpp"
 #include "rt/forces/membrane.hpp"
 #include "tools/report/simulated_frames.hpp"
 #include "tools/report/topic.hpp"
-#include "vision/dimple.hpp"
+#include "vision/image/polar_contour.hpp"
+#include "vision/image/polyline.hpp"
+#include "vision/image/spline.hpp"
 #include "vision/tracker.hpp"
 
 namespace punctum::report {
@@ -28,53 +31,65 @@ constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
 using vision::Contour;
 using vision::Point;
 
-// The whole contour in the needle's plane, from the bottom of the dimple round and back.
+// The whole contour in a plane through the needle, beginning at the bottom of the dimple.
 Contour closed_contour(const DeformedCell& cell) {
   Contour c;
-  for (const auto& [x, r] : cell.meridian) c.emplace_back(x, r);
+  c = cell.meridian;
   for (std::size_t i = cell.meridian.size() - 1; i-- > 1;) {
-    c.emplace_back(cell.meridian[i][0], -cell.meridian[i][1]);
+    c.emplace_back(cell.meridian[i].x, -cell.meridian[i].y);
   }
   return c;
 }
 
-// So many points at equal distances along a closed polygon, beginning with its first.
+// `count` points at equal distances along a closed polygon, beginning at its first point.
 Contour equally_spaced(const Contour& polygon, int count) {
   const std::size_t n = polygon.size();
   std::vector<double> at(n + 1, 0.0);
-  for (std::size_t i = 0; i < n; ++i) at[i + 1] = at[i] + cv::norm(polygon[(i + 1) % n] - polygon[i]);
+  for (std::size_t i = 0; i < n; ++i) {
+    at[i + 1] = at[i] + cv::norm(polygon[(i + 1) % n] - polygon[i]);
+  }
   Contour out;
   std::size_t i = 0;
   for (int k = 0; k < count; ++k) {
     const double s = at[n] * k / count;
-    while (i + 1 < n && at[i + 1] <= s) ++i;
+    while (i + 1 < n && at[i + 1] <= s) {
+      ++i;
+    }
     const double t = (s - at[i]) / std::max(at[i + 1] - at[i], 1e-300);
     out.push_back(polygon[i] + t * (polygon[(i + 1) % n] - polygon[i]));
   }
   return out;
 }
 
-// The same closed contour, beginning where the axis crosses it on the needle's side, counter-clockwise.
+// The same closed contour, counter-clockwise, beginning where the axis crosses it on the side of the needle.
 Contour from_the_dimple(Contour c) {
-  if (vision::signed_area(c) < 0) std::reverse(c.begin(), c.end());
+  if (vision::signed_area(c) < 0) {
+    std::reverse(c.begin(), c.end());
+  }
   const std::size_t n = c.size();
   std::size_t best = n;
   for (std::size_t i = 0; i < n; ++i) {
     const Point &p = c[i], &q = c[(i + 1) % n];
-    if (p.y < 0 && q.y >= 0 && p.x > 0 && (best == n || p.x < c[best].x)) best = i;
+    if (p.y < 0 && q.y >= 0 && p.x > 0 && (best == n || p.x < c[best].x)) {
+      best = i;
+    }
   }
-  if (best == n) return {};
+  if (best == n) {
+    return {};
+  }
   const Point &p = c[best], &q = c[(best + 1) % n];
   Contour out{p + p.y / (p.y - q.y) * (q - p)};
   for (std::size_t i = 1; i <= n; ++i) {
     const Point& next = c[(best + i) % n];
-    if (cv::norm(next - out.back()) > 1e-9) out.push_back(next);
+    if (cv::norm(next - out.back()) > 1e-9) {
+      out.push_back(next);
+    }
   }
   return out;
 }
 
-// The upper half of a contour turned into its lower half round the axis; one picture tells no more. `line`
-// begins at the axis, has 2 (along - 1) points, equally spaced.
+// Turns the upper half of a contour about the axis into its lower half; one picture does not tell more.
+// `line` begins at the axis and has 2 (along - 1) equally spaced points.
 void revolve(const Contour& line, Net& net) {
   const std::size_t around = static_cast<std::size_t>(net.around);
   for (int i = 0; i < net.along; ++i) {
@@ -101,32 +116,37 @@ Surface spline(Contour nodes) {
 
 // ---- sphere and profile ----
 
-// A surface of revolution whose meridian (x, r) is known at each place `along`, 0 .. 1.
+// A surface of revolution. at(s) is its meridian (x, r), s = 0 .. 1 from pole to pole.
 template <class Meridian>
 void revolve_meridian(const Meridian& at, Net& net) {
   const std::size_t around = static_cast<std::size_t>(net.around);
   for (int i = 0; i < net.along; ++i) {
-    const Point2 p = at(static_cast<double>(i) / (net.along - 1));
+    const Point p = at(static_cast<double>(i) / (net.along - 1));
     std::array<double, 3>* row = &net.points[static_cast<std::size_t>(i) * around];
-    for (std::size_t j = 0; j < around; ++j) row[j] = {p[0], p[1] * net.cosine[j], p[1] * net.sine[j]};
+    for (std::size_t j = 0; j < around; ++j) {
+      row[j] = {p.x, p.y * net.cosine[j], p.y * net.sine[j]};
+    }
   }
 }
 
 Surface sphere(double R) {
   return [R](Net& net) {
-    revolve_meridian([R](double s) { return Point2{R * std::cos(kPi * s), R * std::sin(kPi * s)}; }, net);
+    revolve_meridian([R](double s) { return Point{R * std::cos(kPi * s), R * std::sin(kPi * s)}; }, net);
   };
 }
 
-// Eq. 4: w(r) = k [ln(a/r) - (a^2 - r^2)/(2 a^2)], w(c) = w_d, taken off the sphere; flat under the tip.
+// Eq. 4: w(r) = k [ln(a/r) - (a^2 - r^2)/(2 a^2)], w(c) = w_d, subtracted from the sphere; flat under the
+// tip.
 Surface dimpled_sphere(double R, double c, double wd, double a) {
   return [=](Net& net) {
     const double k = wd / (std::log(a / c) - (a * a - c * c) / (2 * a * a));
     revolve_meridian(
         [=](double s) {
-          Point2 p{R * std::cos(kPi * s), R * std::sin(kPi * s)};
-          const double r = std::max(p[1], c);
-          if (p[0] > 0 && r < a) p[0] -= k * (std::log(a / r) - (a * a - r * r) / (2 * a * a));
+          Point p{R * std::cos(kPi * s), R * std::sin(kPi * s)};
+          const double r = std::max(p.y, c);
+          if (p.x > 0 && r < a) {
+            p.x -= k * (std::log(a / r) - (a * a - r * r) / (2 * a * a));
+          }
           return p;
         },
         net);
@@ -135,8 +155,7 @@ Surface dimpled_sphere(double R, double c, double wd, double a) {
 
 // ---- the tracker's own contours ----
 
-// Cells whose tracker's contour is known, near these depths: an injection along the axis, as the shipped
-// tracker sees it.
+// Cells with a contour of the shipped tracker, near these depths, from an injection along the axis.
 std::vector<DeformedCell> seen_cells(const std::vector<double>& depths_um) {
   InjectionPlan plan;
   plan.aim_m = plan.tilt_rad = plan.spread = 0;
@@ -151,7 +170,9 @@ std::vector<DeformedCell> seen_cells(const std::vector<double>& depths_um) {
   for (std::size_t f = 0; f < injection.truth.size() && !left.empty(); ++f) {
     const vision::Result& r = tracker.process(injection.frame(f));
     const FrameTruth& t = injection.truth[f];
-    if (!r.outer.ok || t.stretch != Stretch::indentation || t.wd_m * 1e6 < left.front()) continue;
+    if (!r.outer.ok || t.stretch != Stretch::indentation || t.wd_m * 1e6 < left.front()) {
+      continue;
+    }
     left.erase(left.begin());
     cells.push_back(deformed_cell(truth.table(sim::Membrane::outer).shape(), t.R_m * 1e6, t.wd_m * 1e6));
     for (const Point& p : r.outer.contour) {
@@ -160,8 +181,166 @@ std::vector<DeformedCell> seen_cells(const std::vector<double>& depths_um) {
     }
     cells.back().seen = from_the_dimple(cells.back().seen);
   }
-  if (cells.empty()) throw std::runtime_error("the tracker saw no indented cell");
+  if (cells.empty()) {
+    throw std::runtime_error("the tracker saw no indented cell");
+  }
   return cells;
+}
+
+constexpr int kSide = 64;  // points along and around of the net that is timed
+
+struct Entry {
+  const SurfaceMethod* method;
+  double value;
+  std::vector<SurfaceError> errors;  // per depth
+};
+
+// Every method at each of its values.
+std::vector<Entry> all_entries() {
+  std::vector<Entry> entries;
+  for (const SurfaceMethod& m : surface_methods()) {
+    for (const double value : m.values) {
+      entries.push_back({&m, value, {}});
+    }
+  }
+  return entries;
+}
+
+void measure_distances(std::vector<Entry>& entries, const std::vector<DeformedCell>& cells,
+                       Progress& progress) {
+  progress.start("distances", static_cast<std::int64_t>(entries.size()));
+  for (Entry& e : entries) {
+    for (const DeformedCell& cell : cells) {
+      e.errors.push_back(surface_error(cell, e.method->given(cell, e.value)));
+    }
+    progress.step();
+  }
+}
+
+std::vector<CallTime> measure_times(const std::vector<Entry>& entries, const DeformedCell& cell, bool quick) {
+  std::vector<Timed> timed;
+  for (const Entry& e : entries) {
+    timed.emplace_back([f = e.method->given(cell, e.value), net = Net(kSide, kSide)]() mutable {
+      f(net);
+      keep(net.points.front());
+    });
+  }
+  return time_interleaved(timed, {.batches = 1000, .batch_us = 20, .seconds = quick ? 2.0 : 20.0});
+}
+
+// rms distance against time, per depth.
+std::vector<std::vector<Work>> works_by_depth(const std::vector<Entry>& entries,
+                                              const std::vector<CallTime>& times, std::size_t depths) {
+  std::vector<std::vector<Work>> works(depths);
+  for (std::size_t d = 0; d < depths; ++d) {
+    for (std::size_t i = 0; i < entries.size(); ++i) {
+      const Entry& e = entries[i];
+      works[d].push_back({.method = e.method->name,
+                          .knob = fmt::format(fmt::runtime(e.method->knob), e.value),
+                          .error = e.errors[d].rms_um,
+                          .time = times[i],
+                          .shipped = e.value == e.method->shipped});
+    }
+  }
+  return works;
+}
+
+// The largest distance of all depths against time.
+std::vector<Work> worst_works(const std::vector<Entry>& entries, const std::vector<Work>& any_depth) {
+  std::vector<Work> worst = any_depth;
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    worst[i].error = 0;
+    for (const SurfaceError& e : entries[i].errors) {
+      worst[i].error = std::max(worst[i].error, e.max_um);
+    }
+  }
+  return worst;
+}
+
+Table table_of(const std::vector<Entry>& entries, const std::vector<DeformedCell>& cells,
+               const std::vector<std::vector<Work>>& works) {
+  Table table{.name = "surface",
+              .columns = {"method", "knob", "wd_um", "rms_um", "dimple_rms_um", "max_um", "point_ns"},
+              .rows = {},
+              .shown = {"method", "knob", "wd_um", "rms_um", "dimple_rms_um", "max_um", "median_ns",
+                        "on_front", "shipped"}};
+  for (const auto& c : time_columns()) {
+    table.columns.push_back(c);
+  }
+  table.columns.insert(table.columns.end(), {"on_front", "shipped"});
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    for (std::size_t d = 0; d < cells.size(); ++d) {
+      const Work& w = works[d][i];
+      const SurfaceError& e = entries[i].errors[d];
+      Row row{w.method,
+              w.knob,
+              cells[d].wd_um,
+              e.rms_um,
+              e.dimple_rms_um,
+              e.max_um,
+              w.time.median_ns / (kSide * kSide)};
+      for (const auto& c : time_cells(w.time)) {
+        row.push_back(c);
+      }
+      const bool front = better_than(w, works[d]) == nullptr;
+      row.emplace_back(front);
+      row.emplace_back(w.shipped);
+      if (d + 1 == cells.size() && (front || w.shipped)) {
+        table.shown_rows.push_back(table.rows.size());
+      }
+      table.add(std::move(row));
+    }
+  }
+  return table;
+}
+
+// The meridian of a dimple: the true one and the described ones.
+Panel meridian_panel(const DeformedCell& cell) {
+  Panel shape{.title = fmt::format("w_d = {:.1f} um", cell.wd_um),
+              .x_label = "distance from the needle's axis [um]",
+              .y_label = "along the axis [um]"};
+  const auto draw = [&shape](const std::string& name, const Surface& surface) {
+    Net net(257, 2);
+    surface(net);
+    Series s{.name = name, .x = {}, .y = {}, .style = Style::line};
+    for (std::size_t i = 0; i < net.points.size() && net.points[i][0] >= 0; i += 2) {
+      s.x.push_back(net.points[i][1]);
+      s.y.push_back(net.points[i][0]);
+    }
+    shape.series.push_back(std::move(s));
+  };
+  draw("true", polygon(closed_contour(cell)));
+  for (const SurfaceMethod& m : surface_methods()) {
+    if (m.name != "polygon" && m.name != "periodic spline") {
+      draw(m.name, m.given(cell, m.values[m.values.size() / 2]));
+    }
+  }
+  return shape;
+}
+
+std::string reading_of(const DeformedCell& cell, const std::vector<Work>& works) {
+  const auto error_of = [&works](const std::string& method) {
+    const auto w = std::find_if(works.begin(), works.end(), [&](const Work& other) {
+      return other.method == method && other.knob.empty();
+    });
+    return w == works.end() ? kNothing : w->error;
+  };
+  double seen_best = std::numeric_limits<double>::infinity();
+  for (const Work& w : works) {
+    if (w.method == "periodic spline as seen") {
+      seen_best = std::min(seen_best, w.error);
+    }
+  }
+  const auto enough = std::find_if(works.begin(), works.end(), [seen_best](const Work& w) {
+    return w.method == "periodic spline" && w.error < seen_best;  // the fewest nodes come first
+  });
+  return fmt::format(
+      "At w_d = {:.1f} um the undeformed sphere is {:.2f} um rms off the surface, eq. 4 on it {:.2f} um with "
+      "a from w_d and {:.2f} um with a as seen; what the tracker sees is good to {:.2f} um, so a spline "
+      "needs no more than {}; of the whole surface, {}.",
+      cell.wd_um, error_of("undeformed sphere"), error_of("sphere with eq. 4 (a from w_d)"),
+      error_of("sphere with eq. 4 (true a)"), seen_best,
+      enough == works.end() ? "nothing tried" : enough->knob, front_sentence(works));
 }
 
 }  // namespace
@@ -178,20 +357,23 @@ DeformedCell deformed_cell(const sim::MembraneShape& shape, double R_um, double 
   };
   if (!(wd_um > 0)) {
     arc(0, kPi, 4096, 0);
-    cell.meridian.push_back({-R_um, 0});
+    cell.meridian.emplace_back(-R_um, 0);
     return cell;
   }
   sim::MembraneSolution x;
-  constexpr double kStep = 0.02;  // of R: Newton's method goes on from the solution before
+  constexpr double kStep = 0.02;  // of R: Newton's method starts from the solution before
   const double w = wd_um / R_um;
   for (double at = std::min(kStep, w);; at = std::min(at + kStep, w)) {
     if (!sim::solve_membrane(shape, at, kIntervals, x)) {
       throw std::runtime_error(fmt::format("no equilibrium of the membrane at depth {} R", at));
     }
-    if (at >= w) break;
+    if (at >= w) {
+      break;
+    }
   }
   cell.a_um = x.half_width * R_um;
-  // The patch under the tip moves as a whole, the one in the seat stays; between them cubics through nodes.
+  // The patch under the tip moves as a whole, the patch in the seat stays; between them are cubics through
+  // the nodes.
   arc(0, tip, 64, wd_um);
   for (std::size_t i = 0; i + 1 < x.theta.size(); ++i) {
     const double h = x.theta[i + 1] - x.theta[i];
@@ -206,7 +388,7 @@ DeformedCell deformed_cell(const sim::MembraneShape& shape, double R_um, double 
     }
   }
   arc(seat, kPi, 512, 0);
-  cell.meridian.push_back({-R_um, 0});
+  cell.meridian.emplace_back(-R_um, 0);
   return cell;
 }
 
@@ -267,24 +449,24 @@ SurfaceError surface_error(const DeformedCell& cell, const Surface& surface) {
   Net net(kAlong, kAround);
   surface(net);
   SurfaceError out;
-  const Polyline truth(cell.meridian);
+  const vision::Polyline truth(cell.meridian);
   double area = 0, sum = 0, dimple_area = 0, dimple_sum = 0;
-  for (int j = 0; j <= kAround / 2; ++j) {  // above, beside, below
-    std::vector<Point2> line;
+  for (int j = 0; j <= kAround / 2; ++j) {  // above, beside and below the axis
+    Contour line;
     for (int i = 0; i < kAlong; ++i) {
       const auto& p = net.points[static_cast<std::size_t>(i * kAround + j)];
-      line.push_back({p[0], std::hypot(p[1], p[2])});
+      line.emplace_back(p[0], std::hypot(p[1], p[2]));
       out.max_um = std::max(out.max_um, truth.distance(line.back()));
     }
-    const Polyline described(std::move(line));
+    const vision::Polyline described(std::move(line));
     for (std::size_t i = 0; i + 1 < cell.meridian.size(); ++i) {
-      const Point2 &p = cell.meridian[i], &q = cell.meridian[i + 1];
-      const double weight = 0.5 * (p[1] + q[1]) * std::hypot(q[0] - p[0], q[1] - p[1]);
+      const Point &p = cell.meridian[i], &q = cell.meridian[i + 1];
+      const double weight = 0.5 * (p.y + q.y) * cv::norm(q - p);
       const double d = described.distance(p);
       area += weight;
       sum += weight * d * d;
       out.max_um = std::max(out.max_um, d);
-      if (p[1] < cell.a_um && p[0] > 0) {
+      if (p.y < cell.a_um && p.x > 0) {
         dimple_area += weight;
         dimple_sum += weight * d * d;
       }
@@ -296,139 +478,33 @@ SurfaceError surface_error(const DeformedCell& cell, const Surface& surface) {
 }
 
 Result run_surface(const Job& job) {
-  constexpr int kSide = 64;  // points along and around of the net that is timed
   job.progress.start("an injection to look at", 1);
   const std::vector<DeformedCell> cells =
       seen_cells(job.quick ? std::vector<double>{5, 20} : std::vector<double>{2, 5, 10, 15, 20});
   job.progress.step();
+  const DeformedCell& deepest = cells.back();
 
-  struct Entry {
-    const SurfaceMethod* method;
-    double value;
-    std::vector<SurfaceError> errors;  // per depth
-  };
-  std::vector<Entry> entries;
-  std::vector<Timed> timed;
-  for (const SurfaceMethod& m : surface_methods()) {
-    for (double value : m.values) {
-      entries.push_back({&m, value, {}});
-      timed.emplace_back([f = m.given(cells.back(), value), net = Net(kSide, kSide)]() mutable {
-        f(net);
-        keep(net.points.front());
-      });
-    }
-  }
-  job.progress.start("distances", static_cast<std::int64_t>(entries.size()));
-  for (Entry& e : entries) {
-    for (const DeformedCell& cell : cells) {
-      e.errors.push_back(surface_error(cell, e.method->given(cell, e.value)));
-    }
-    job.progress.step();
-  }
-  const std::vector<CallTime> times =
-      time_interleaved(timed, {.batches = 1000, .batch_us = 20, .seconds = job.quick ? 2.0 : 20.0});
+  std::vector<Entry> entries = all_entries();
+  measure_distances(entries, cells, job.progress);
+  const std::vector<CallTime> times = measure_times(entries, deepest, job.quick);
+  const auto works = works_by_depth(entries, times, cells.size());
+  const Limit limits[] = {{"one pixel", sim::MicroscopeParams{}.pixel_m * 1e6}};
 
   Result out;
-  Table table{.name = "surface",
-              .columns = {"method", "knob", "wd_um", "rms_um", "dimple_rms_um", "max_um", "point_ns"},
-              .rows = {},
-              .shown = {"method", "knob", "wd_um", "rms_um", "dimple_rms_um", "max_um", "median_ns",
-                        "on_front", "shipped"}};
-  for (const auto& c : time_columns()) table.columns.push_back(c);
-  table.columns.insert(table.columns.end(), {"on_front", "shipped"});
-  const double pixel_um = sim::MicroscopeParams{}.pixel_m * 1e6;
-  const Limit limits[] = {{"one pixel", pixel_um}};
-  std::vector<std::vector<Work>> works(cells.size());  // per depth
-  std::vector<Work> worst;                             // max over depths
-  for (std::size_t d = 0; d < cells.size(); ++d) {
-    for (std::size_t i = 0; i < entries.size(); ++i) {
-      const Entry& e = entries[i];
-      works[d].push_back({.method = e.method->name,
-                          .knob = fmt::format(fmt::runtime(e.method->knob), e.value),
-                          .error = e.errors[d].rms_um,
-                          .time = times[i],
-                          .shipped = e.value == e.method->shipped});
-    }
-  }
-  for (std::size_t i = 0; i < entries.size(); ++i) {
-    worst.push_back(works.back()[i]);
-    worst.back().error = 0;
-    for (std::size_t d = 0; d < cells.size(); ++d) {
-      const Work& w = works[d][i];
-      const SurfaceError& e = entries[i].errors[d];
-      worst.back().error = std::max(worst.back().error, e.max_um);
-      Row row{w.method,
-              w.knob,
-              cells[d].wd_um,
-              e.rms_um,
-              e.dimple_rms_um,
-              e.max_um,
-              w.time.median_ns / (kSide * kSide)};
-      for (const auto& c : time_cells(w.time)) row.push_back(c);
-      const bool front = better_than(w, works[d]) == nullptr;
-      row.emplace_back(front);
-      row.emplace_back(w.shipped);
-      if (d + 1 == cells.size() && (front || w.shipped)) table.shown_rows.push_back(table.rows.size());
-      table.add(std::move(row));
-    }
-  }
-
-  // The meridian at the deepest dimple: what it is, and what is made of it.
-  const DeformedCell& deepest = cells.back();
-  Panel shape{.title = fmt::format("w_d = {:.1f} um", deepest.wd_um),
-              .x_label = "distance from the needle's axis [um]",
-              .y_label = "along the axis [um]"};
-  const auto draw = [&](const std::string& name, const Surface& surface, Style style) {
-    Net net(257, 2);
-    surface(net);
-    Series s{.name = name, .x = {}, .y = {}, .style = style};
-    for (std::size_t i = 0; i < net.points.size(); i += 2) {
-      if (net.points[i][0] < 0) break;
-      s.x.push_back(net.points[i][1]);
-      s.y.push_back(net.points[i][0]);
-    }
-    shape.series.push_back(std::move(s));
-  };
-  draw("true", polygon(closed_contour(deepest)), Style::line);
-  for (const SurfaceMethod& m : surface_methods()) {
-    if (m.name == "polygon" || m.name == "periodic spline") continue;
-    draw(m.name, m.given(deepest, m.values[m.values.size() / 2]), Style::line);
-  }
-
   out.figures.push_back(
       {.name = "surface",
        .panels = {work_precision(fmt::format("whole surface, w_d = {:.1f} um", deepest.wd_um),
                                  "rms distance [um]", works.back(), limits),
-                  work_precision("worst place of all depths", "largest distance [um]", worst, limits), shape},
+                  work_precision("worst place of all depths", "largest distance [um]",
+                                 worst_works(entries, works.back()), limits),
+                  meridian_panel(deepest)},
        .columns = 2,
        .note = fmt::format(
            "A call builds the description and evaluates a net of {0} x {0} points. Nodes lie on the "
            "true contour, except those of the contour as seen (noise {1} grey levels).",
            kSide, InjectionPlan{}.noise)});
-  out.tables.push_back(std::move(table));
-  const auto find = [&](const std::string& name, const std::string& knob) {
-    for (std::size_t i = 0; i < entries.size(); ++i) {
-      if (works.back()[i].method == name && works.back()[i].knob == knob) return works.back()[i].error;
-    }
-    return kNothing;
-  };
-  double seen_best = std::numeric_limits<double>::infinity();
-  std::string enough;  // nodes of the true contour that err less than seeing does
-  for (const Work& w : works.back()) {
-    if (w.method == "periodic spline as seen") seen_best = std::min(seen_best, w.error);
-  }
-  for (const Work& w : works.back()) {
-    if (w.method == "periodic spline" && w.error < seen_best && enough.empty()) enough = w.knob;
-  }
-  out.reading = fmt::format(
-      "At w_d = {:.1f} um the undeformed sphere is {:.2f} um rms off the surface, eq. 4 on it {:.2f} um with "
-      "a from "
-      "w_d and {:.2f} um with a as seen; what the tracker sees is good to {:.2f} um, so a spline needs no "
-      "more "
-      "than {}; of the whole surface, {}.",
-      deepest.wd_um, find("undeformed sphere", ""), find("sphere with eq. 4 (a from w_d)", ""),
-      find("sphere with eq. 4 (true a)", ""), seen_best, enough.empty() ? "nothing tried" : enough,
-      front_sentence(works.back()));
+  out.tables.push_back(table_of(entries, cells, works));
+  out.reading = reading_of(deepest, works.back());
   return out;
 }
 

@@ -1,6 +1,6 @@
-// punctum-tick-cost TAPE SCENE VARIANT...: takes the servo of a scene through recorded ticks, once for each
-// variant (overrides with ',' between them, "" for the scene as it is). For the topic `scenes`, which runs it
-// under callgrind and reads what each variant executed.
+// punctum-tick-cost TAPE SCENE VARIANT...: runs the servo of a scene through recorded ticks, once for each
+// variant: overrides separated by ',', or "" for the scene itself. Topic scenes runs this program under
+// callgrind and reads the instructions of each variant.
 #include <fmt/format.h>
 
 #include <string>
@@ -8,25 +8,26 @@
 #include <vector>
 
 #include "tools/report/tick_tape.hpp"
+#include "tools/shared/csv.hpp"
+#include "tools/shared/version.hpp"
 
 namespace punctum::report {
 
 std::vector<std::string> overrides_of(std::string_view variant) {
-  std::vector<std::string> overrides;
-  while (!variant.empty()) {
-    const std::size_t comma = variant.find(',');
-    overrides.emplace_back(variant.substr(0, comma));
-    variant = comma == std::string_view::npos ? std::string_view{} : variant.substr(comma + 1);
-  }
-  return overrides;
+  const auto parts = tools::split_csv(variant);
+  return variant.empty() ? std::vector<std::string>{} : std::vector<std::string>(parts.begin(), parts.end());
 }
 
-// callgrind writes its counts each time this returns.
+// callgrind writes its counts each time this function returns.
 [[gnu::noinline]] rt::Fault run_variant(const tools::Scene& scene, const std::vector<TickTold>& tape) {
   return replay_ticks(scene, tape);
 }
 
 int run(int argc, char** argv) {
+  if (argc == 2 && std::string_view(argv[1]) == "--version") {
+    fmt::print("{}\n", tools::version_line("punctum-tick-cost"));
+    return 0;
+  }
   if (argc < 4) {
     fmt::print(stderr,
                "punctum-tick-cost TAPE SCENE VARIANT...; `punctum-report scenes` starts this program\n");

@@ -13,13 +13,13 @@
 #include "hal/sim/truth.hpp"
 #include "hal/sim/world.hpp"
 #include "rt/station/station.hpp"
-#include "tools/truth_observer.hpp"
+#include "tools/shared/truth_observer.hpp"
 
 namespace punctum::report {
 namespace {
 
-// Devices between servo and tape: with a device behind them they note what it says, without they say what was
-// noted.
+// Devices between servo and tape. With a device behind them they record what it returns; without one they
+// return what was recorded.
 struct TapedHand final : hal::HapticDevice {
   TickTold* told = nullptr;
   hal::HapticDevice* device = nullptr;
@@ -36,6 +36,7 @@ struct TapedHand final : hal::HapticDevice {
       out.orientation =
           hal::Quat(told->hand_wxyz[0], told->hand_wxyz[1], told->hand_wxyz[2], told->hand_wxyz[3]);
       out.buttons = told->buttons;
+      out.sample_ns = told->release_ns;
     }
     return told->hand_status;
   }
@@ -54,10 +55,16 @@ struct TapedStage final : hal::Stage {
       told->axis = out.axis;
       told->following_error_m = out.following_error_m;
       told->stage_enabled = out.enabled;
+      told->stage_powered = out.powered;
       told->stage_at_standstill = out.at_standstill;
     } else if (told->stage_status == hal::Status::ok) {
-      out = {told->tip_m.vec(), told->axis.vec(), told->following_error_m.vec(), told->stage_enabled,
-             told->stage_at_standstill};
+      out = {.tip_m = told->tip_m.vec(),
+             .axis = told->axis.vec(),
+             .following_error_m = told->following_error_m.vec(),
+             .enabled = told->stage_enabled,
+             .powered = told->stage_powered,
+             .at_standstill = told->stage_at_standstill,
+             .sample_ns = told->release_ns};
     }
     return told->stage_status;
   }
@@ -65,10 +72,14 @@ struct TapedStage final : hal::Stage {
     return device != nullptr ? device->command(set_point) : hal::Status::ok;
   }
   void quick_stop() noexcept override {
-    if (device != nullptr) device->quick_stop();
+    if (device != nullptr) {
+      device->quick_stop();
+    }
   }
   void enable(bool on) noexcept override {
-    if (device != nullptr) device->enable(on);
+    if (device != nullptr) {
+      device->enable(on);
+    }
   }
 };
 
@@ -82,41 +93,52 @@ struct TapedEstop final : hal::EstopChain {
       told->estop = out;
     } else {
       out = told->estop;
+      out.sample_ns = told->release_ns;
     }
     return status;
   }
   void heartbeat(bool level) noexcept override {
-    if (device != nullptr) device->heartbeat(level);
+    if (device != nullptr) {
+      device->heartbeat(level);
+    }
   }
 };
 
-// Played back, it does at once what the gate asks: a scene may ask at other times than the recorded one.
+// When it plays, it obeys the gate at once, since a scene may open the gate at other times than the recorded
+// one.
 struct TapedInjector final : hal::Injector {
+  TickTold* told = nullptr;
   hal::Injector* device = nullptr;
   bool gate_open = false;
   void gate(bool open) noexcept override {
     gate_open = open;
-    if (device != nullptr) device->gate(open);
+    if (device != nullptr) {
+      device->gate(open);
+    }
   }
-  hal::Status read(bool& open) noexcept override {
-    if (device != nullptr) return device->read(open);
-    open = gate_open;
+  hal::Status read(hal::InjectorState& out) noexcept override {
+    if (device != nullptr) {
+      return device->read(out);
+    }
+    out.open = gate_open;
+    out.sample_ns = told->release_ns;
     return hal::Status::ok;
   }
 };
 
 // Holding vacuum or force sensor: one number.
-template <class Device, double TickTold::*number>
+template <class Device, class Reading, double Reading::* value, double TickTold::* number>
 struct TapedNumber final : Device {
   TickTold* told = nullptr;
   Device* device = nullptr;
-  hal::Status read(double& out) noexcept override {
+  hal::Status read(Reading& out) noexcept override {
     if (device != nullptr) {
       const hal::Status status = device->read(out);
-      told->*number = out;
+      told->*number = out.*value;
       return status;
     }
-    out = told->*number;
+    out.*value = told->*number;
+    out.sample_ns = told->release_ns;
     return hal::Status::ok;
   }
 };
@@ -126,11 +148,15 @@ struct TapedDevices {
   TapedStage stage;
   TapedEstop estop;
   TapedInjector injector;
-  TapedNumber<hal::HoldingVacuum, &TickTold::vacuum_Pa> vacuum;
-  TapedNumber<hal::ForceSensor, &TickTold::axial_N> force_sensor;
+  TapedNumber<hal::HoldingVacuum, hal::VacuumState, &hal::VacuumState::pressure_Pa, &TickTold::vacuum_Pa>
+      vacuum;
+  TapedNumber<hal::ForceSensor, hal::ForceState, &hal::ForceState::axial_force_N, &TickTold::axial_N>
+      force_sensor;
 
-  void at(TickTold& told) { hand.told = stage.told = estop.told = vacuum.told = force_sensor.told = &told; }
-  // Those that the scene has.
+  void at(TickTold& told) {
+    hand.told = stage.told = estop.told = injector.told = vacuum.told = force_sensor.told = &told;
+  }
+  // The devices that the scene has.
   [[nodiscard]] rt::Devices of(const tools::Scene& scene) {
     return {hand,
             &stage,
@@ -155,10 +181,15 @@ struct OnItsWay {
 }  // namespace
 
 std::vector<TickTold> record_ticks(const tools::Scene& scene, double seconds) {
+  if (!scene.sim) {
+    throw std::runtime_error(scene.name + ": no device of it is simulated");
+  }
   if (scene.recorded) {
     auto icsi = tools::load_scene("icsi");
-    if (!icsi) throw std::runtime_error(icsi.error());
-    icsi->sim->person = scene.sim->person;
+    if (!icsi) {
+      throw std::runtime_error(icsi.error());
+    }
+    icsi->sim->operator_params = scene.sim->operator_params;
     return record_ticks(*icsi, seconds);
   }
   const double period_s = 1 / scene.servo.rate_Hz;
@@ -171,11 +202,12 @@ std::vector<TickTold> record_ticks(const tools::Scene& scene, double seconds) {
   devices.injector.device = world.injector();
   devices.vacuum.device = world.vacuum();
   devices.force_sensor.device = world.force_sensor();
-  const auto station = std::make_unique<rt::Station>();
-  const auto servo = std::make_unique<rt::Servo>(scene.servo, devices.of(scene), *station);
+  const auto station = std::make_unique<rt::LocalStation>();
+  const auto servo = std::make_unique<rt::Servo>(scene.servo, devices.of(scene), station->station);
 
-  const std::int64_t frame_ns = scene.vision ? nanoseconds(1 / scene.sim->microscope->fps) : 0;
-  const std::int64_t latency_ns = scene.vision ? nanoseconds(scene.sim->microscope->latency_s) : 0;
+  const bool seen = scene.vision && scene.simulated_camera();
+  const std::int64_t frame_ns = seen ? nanoseconds(1 / scene.sim->microscope->fps) : 0;
+  const std::int64_t latency_ns = seen ? nanoseconds(scene.sim->microscope->latency_s) : 0;
   std::int64_t next_frame_ns = start_ns;
   std::uint64_t frame = 0;
   std::deque<OnItsWay> on_its_way;
@@ -201,7 +233,7 @@ std::vector<TickTold> record_ticks(const tools::Scene& scene, double seconds) {
       told.observed = true;
       told.observation = on_its_way.front().observation;
       on_its_way.pop_front();
-      station->observation.push(told.observation);
+      station->observation.slot.push(told.observation);
     }
     servo->tick(tick_info(told, period_s));
   }
@@ -210,11 +242,13 @@ std::vector<TickTold> record_ticks(const tools::Scene& scene, double seconds) {
 
 rt::Fault replay_ticks(const tools::Scene& scene, const std::vector<TickTold>& tape) {
   TapedDevices devices;
-  const auto station = std::make_unique<rt::Station>();
-  const auto servo = std::make_unique<rt::Servo>(scene.servo, devices.of(scene), *station);
+  const auto station = std::make_unique<rt::LocalStation>();
+  const auto servo = std::make_unique<rt::Servo>(scene.servo, devices.of(scene), station->station);
   for (TickTold told : tape) {
     devices.at(told);
-    if (told.observed) station->observation.push(told.observation);
+    if (told.observed) {
+      station->observation.slot.push(told.observation);
+    }
     servo->tick(tick_info(told, 1 / scene.servo.rate_Hz));
   }
   return servo->fault();
@@ -222,18 +256,26 @@ rt::Fault replay_ticks(const tools::Scene& scene, const std::vector<TickTold>& t
 
 tl::expected<void, std::string> write_tape(const std::string& path, const std::vector<TickTold>& tape) {
   std::FILE* file = std::fopen(path.c_str(), "wb");
-  if (file == nullptr) return tl::unexpected(fmt::format("{}: cannot be written", path));
+  if (file == nullptr) {
+    return tl::unexpected(fmt::format("{}: cannot be written", path));
+  }
   const bool all = std::fwrite(tape.data(), sizeof(TickTold), tape.size(), file) == tape.size();
-  if (std::fclose(file) != 0 || !all) return tl::unexpected(fmt::format("{}: cannot be written", path));
+  if (std::fclose(file) != 0 || !all) {
+    return tl::unexpected(fmt::format("{}: cannot be written", path));
+  }
   return {};
 }
 
 tl::expected<std::vector<TickTold>, std::string> read_tape(const std::string& path) {
   std::FILE* file = std::fopen(path.c_str(), "rb");
-  if (file == nullptr) return tl::unexpected(fmt::format("{}: cannot be read", path));
+  if (file == nullptr) {
+    return tl::unexpected(fmt::format("{}: cannot be read", path));
+  }
   std::vector<TickTold> tape;
   TickTold told;
-  while (std::fread(&told, sizeof told, 1, file) == 1) tape.push_back(told);
+  while (std::fread(&told, sizeof told, 1, file) == 1) {
+    tape.push_back(told);
+  }
   (void)std::fclose(file);
   return tape;
 }

@@ -1,5 +1,5 @@
-// What the devices and vision told the servo in every tick of one simulated run, to be told again without
-// the simulated world: the same hand, stage and observations, whatever the scene leaves out.
+// A recording of the servo's inputs in every tick of one simulated run, to be played without the simulated
+// world: the same hand, stage and observations for every scene.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 #include "hal/devices.hpp"
 #include "hal/sim/point.hpp"
 #include "rt/control/servo.hpp"
-#include "tools/scene.hpp"
+#include "tools/scene/scene.hpp"
 
 namespace punctum::report {
 
@@ -22,7 +22,7 @@ struct TickTold {
   double hand_wxyz[4] = {1, 0, 0, 0};
   std::uint32_t buttons = 0;
   hal::Status hand_status = hal::Status::no_data, stage_status = hal::Status::no_data;
-  bool stage_enabled = false, stage_at_standstill = false;
+  bool stage_enabled = false, stage_powered = false, stage_at_standstill = false;
   sim::Point tip_m, axis, following_error_m;
   hal::EstopState estop;
   bool observed = false;
@@ -31,11 +31,13 @@ struct TickTold {
 };
 static_assert(std::is_trivially_copyable_v<TickTold>);
 
-// The run of a simulated scene in virtual time, seen by an observer that reads the truth, until its task is
-// done, at most `seconds`. A scene whose pictures are recorded is told its person's run of `icsi`.
+// Records the run of a simulated scene in virtual time, with observations of the truth, until its task ends
+// or `seconds` have passed. For a scene with recorded pictures it is a run of `icsi` with the scene's own
+// operator.
 [[nodiscard]] std::vector<TickTold> record_ticks(const tools::Scene& scene, double seconds);
 
-// A servo for this scene goes through the tape once. The devices of the scene are there and only copy.
+// Runs a servo with the scene's parameters through the tape. The devices of the scene only copy the
+// recording.
 [[nodiscard]] rt::Fault replay_ticks(const tools::Scene& scene, const std::vector<TickTold>& tape);
 
 [[nodiscard]] tl::expected<void, std::string> write_tape(const std::string& path,

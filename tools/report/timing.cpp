@@ -16,10 +16,13 @@ double time_batch_ns(const Timed& f, std::size_t from, std::int64_t n) {
   return std::chrono::duration<double, std::nano>(Steady::now() - begin).count();
 }
 
-// The smallest batch, doubled from 1, that lasts long enough. Warms the caches on the way.
+// The smallest batch, doubled from 1, that lasts long enough. It also warms the caches.
 std::int64_t fitting_batch(const Timed& f, double wanted_ns) {
-  for (std::int64_t n = 1; n < kLargestBatch; n *= 2)
-    if (std::min(time_batch_ns(f, 0, n), time_batch_ns(f, 0, n)) >= wanted_ns) return n;
+  for (std::int64_t n = 1; n < kLargestBatch; n *= 2) {
+    if (std::min(time_batch_ns(f, 0, n), time_batch_ns(f, 0, n)) >= wanted_ns) {
+      return n;
+    }
+  }
   return kLargestBatch;
 }
 
@@ -35,14 +38,18 @@ std::vector<CallTime> time_interleaved(std::span<const Timed> methods, const Tim
   const std::size_t count = methods.size();
   const Timed empty([](std::size_t i) { return i; });
   std::vector<std::int64_t> batch(count);
-  for (std::size_t m = 0; m < count; ++m) batch[m] = fitting_batch(methods[m], plan.batch_us * 1e3);
+  for (std::size_t m = 0; m < count; ++m) {
+    batch[m] = fitting_batch(methods[m], plan.batch_us * 1e3);
+  }
 
   std::vector<std::vector<double>> spent(count), harness(count);  // per call
   std::vector<std::size_t> calls(count, 0);
   const auto end = Steady::now() + std::chrono::duration<double>(plan.seconds);
   const std::int64_t rounds = std::max(plan.batches, kFewestBatches);
   for (std::int64_t round = 0; round < rounds; ++round) {
-    if (round >= kFewestBatches && Steady::now() > end) break;
+    if (round >= kFewestBatches && Steady::now() > end) {
+      break;
+    }
     for (std::size_t k = 0; k < count; ++k) {
       const std::size_t m = (k + static_cast<std::size_t>(round)) % count;
       const auto n = static_cast<double>(batch[m]);

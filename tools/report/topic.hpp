@@ -1,6 +1,6 @@
-// What a topic of punctum-report is made of: measured tables, figures and one sentence of reading.
-// A topic is one function, Result run_NAME(const Job&), listed in topics.cpp; it throws std::exception when
-// it cannot do its work. Nothing here runs in the control core.
+// The parts of a topic of punctum-report: measured tables, figures, and one sentence that reads them.
+// A topic is one function, Result run_NAME(const Job&), listed in topics.cpp. It throws std::exception when
+// it fails. Nothing here runs in the control core.
 #pragma once
 
 #include <atomic>
@@ -19,6 +19,8 @@
 #include <utility>
 #include <variant>
 #include <vector>
+
+#include "tools/shared/figure.hpp"
 
 namespace punctum::report {
 
@@ -44,99 +46,58 @@ class Cell {
 };
 using Row = std::vector<Cell>;
 
-// Becomes NAME.csv, with where it was measured in its last columns.
+// Becomes NAME.csv. Its last columns say on which machine, and by which program, it was measured.
 struct Table {
   std::string name{};
   std::vector<std::string> columns{};  // unit in the name: t_s, force_N
   std::vector<Row> rows{};
-  // What index.html shows of it. Empty: all columns; all rows, or the first ones of many.
+  // What index.html shows. Empty: all columns; all rows, or the first of many.
   std::vector<std::string> shown{};
   std::vector<std::size_t> shown_rows{};
-  void add(Row row);  // throws std::logic_error when it does not fit the columns
+  void add(Row row);  // throws std::logic_error for a row that does not fit the columns
 };
 
 // ---- figures ----
 
-enum class Style : std::uint8_t {
-  line,
-  points,
-  line_points,
-  limit,  // dashed and grey: a known limit
-  front   // broad and pale, under the others
-};
-
-struct Series {
-  std::string name{};  // empty: not in the key
-  std::vector<double> x{}, y{};
-  Style style = Style::line;
-};
-
-// A point worth pointing at, mostly the shipped default.
-struct Mark {
-  double x = 0, y = 0;
-  std::string label{};
-};
-
-// Coloured cells at (x, y). With categories, `value` is an index into them, drawn in this order: green,
-// amber, red, blue, grey; without, it is a scale of colours.
-struct Map {
-  std::vector<double> x{}, y{}, value{};
-  std::vector<std::string> categories{};
-  std::string value_label{};
-  bool log_value = false;
-};
-
-// Lying bars, one per name, from the top; parts[k].y[i] is how much part k adds to bar i.
-struct Bars {
-  std::vector<std::string> names{};
-  std::vector<Series> parts{};
-};
-
-struct Panel {
-  std::string title{}, x_label{}, y_label{};
-  bool log_x = false, log_y = false;
-  std::vector<Series> series{};  // drawn over the map, where there is one
-  std::vector<Mark> marks{};
-  std::optional<Map> map{};
-  std::optional<Bars> bars{};
-};
-
-// Becomes NAME.svg. `note`: one sentence under it in index.html.
-struct Figure {
-  std::string name{};
-  std::vector<Panel> panels{};
-  int columns = 2;
-  std::string note{};
-};
+using tools::Bars;
+using tools::Figure;
+using tools::Map;
+using tools::Mark;
+using tools::Panel;
+using tools::Series;
+using tools::Style;
 
 // ---- run time ----
 
-// Per call, the empty harness taken off. Calls are repeated in batches long enough for the clock; one batch
-// gives one value, its mean. So median, p99.9 and max are over the means of batches; where batch is 1, over
-// single calls. With fewer than 1000 batches p99.9 is the largest. Calls follow each other in warm caches and
-// may overlap in the processor.
+// Per call, without the time of the empty harness. Calls are repeated in batches that are long enough for the
+// clock, and a batch gives one value, its mean. So median, p99.9 and max are over the means of batches; where
+// batch is 1, over single calls. With fewer than 1000 batches p99.9 is the largest value. The caches are
+// warm, and successive calls may overlap in the processor.
 struct CallTime {
   double median_ns = 0, p99_9_ns = 0, max_ns = 0;
-  double overhead_ns = 0;  // per call, of the empty harness: already taken off
+  double overhead_ns = 0;  // per call, of the empty harness; already subtracted
   std::int64_t batch = 1;  // calls in one batch
   std::int64_t batches = 0;
 };
 
-// The compiler has to compute `value`.
+// Makes the compiler compute `value`.
 template <class T>
 void keep(const T& value) noexcept {
   asm volatile("" : : "m"(value) : "memory");
 }
 
-// A call to be timed: f() or f(i), where i counts the calls from 0 on (to walk through prepared inputs). What
-// it returns is kept. It should read its inputs from memory (captured containers do): what is known to the
-// compiler is not computed again.
+// A call to be timed: f() or f(i), where i counts the calls from 0 on (to step through prepared inputs). Its
+// result is kept. It should read its inputs from memory, for example from captured containers: the compiler
+// computes what it knows only once.
 class Timed {
  public:
   template <class F>
-  requires(!std::same_as<std::remove_cvref_t<F>, Timed>) Timed(F f)
+    requires(!std::same_as<std::remove_cvref_t<F>, Timed>)
+  Timed(F f)
       : batch_([f = std::move(f)](std::size_t from, std::int64_t n) mutable {
-          for (std::int64_t k = 0; k < n; ++k) once(f, from + static_cast<std::size_t>(k));
+          for (std::int64_t k = 0; k < n; ++k) {
+            once(f, from + static_cast<std::size_t>(k));
+          }
         }) {}
   void run(std::size_t from, std::int64_t n) const { batch_(from, n); }
 
@@ -163,11 +124,11 @@ class Timed {
 struct TimingPlan {
   std::int64_t batches = 1000;  // of each method
   double batch_us = 20;         // a batch lasts about this long
-  double seconds = 3;           // all together; ended earlier than `batches` then, but not before 11
+  double seconds = 3;           // for all methods; then it ends before `batches` are done, but not before 11
 };
 
-// In one run, in turns and in changing order, each followed by the empty harness with the same batch: what
-// disturbs the machine hits all alike.
+// The methods run in turns and in changing order, each followed by the empty harness with the same batch, so
+// that a disturbance of the machine hits all alike.
 [[nodiscard]] std::vector<CallTime> time_interleaved(std::span<const Timed> methods,
                                                      const TimingPlan& plan = {});
 [[nodiscard]] CallTime time_calls(const Timed& f, const TimingPlan& plan = {});
@@ -179,8 +140,8 @@ struct TimingPlan {
 // ---- error against run time ----
 
 struct Work {
-  std::string method{};  // one line in the figure; "membrane float" beside "membrane double"
-  std::string knob{};    // what is turned along that line: "h = 1 ms", "order 3"
+  std::string method{};  // one line in the figure
+  std::string knob{};    // the value that changes along that line: "h = 1 ms", "order 3"
   double error = 0;      // >= 0
   CallTime time{};
   bool shipped = false;  // the default of the program; at most one
@@ -200,11 +161,11 @@ struct Limit {
 [[nodiscard]] Table work_table(const std::string& name, const std::string& error_column,
                                std::span<const Work> works);
 
-// What is neither slower nor less exact than something else, from the fastest to the most exact.
+// Those that no other exceeds in both speed and accuracy, from the fastest to the most exact.
 [[nodiscard]] std::vector<Work> pareto_front(std::span<const Work> works);
 
-// The one that is as exact as `than` and faster by more than the noise of timing (a part of its time); of
-// several the fastest; nullptr: none, `than` is on the front.
+// One that is as exact as `than` and faster by more than the noise of timing (a share of its time); of
+// several the fastest. nullptr: there is none, so `than` is on the front.
 inline constexpr double kTimingNoise = 0.15;
 [[nodiscard]] const Work* better_than(const Work& than, std::span<const Work> works,
                                       double noise = kTimingNoise);
@@ -216,7 +177,8 @@ inline constexpr double kTimingNoise = 0.15;
 
 // ---- a topic ----
 
-// A bar on a terminal, else a line now and then, both on stderr. step() may be called from several threads.
+// A bar on a terminal, otherwise a line every 15 s; both on stderr. step() may be called from several
+// threads.
 class Progress {
  public:
   explicit Progress(std::string topic);
@@ -246,9 +208,9 @@ struct Result {
 
 struct Topic {
   std::string_view name;
-  std::string_view about;  // for --help and index.html: what is compared
+  std::string_view about;  // what is compared; for --help and index.html
   Result (*run)(const Job&);
-  // --input FILE --output FILE: the rows of a file, evaluated. 0, or 2 with one line on stderr.
+  // --input FILE --output FILE: evaluates the rows of a file. Exit code 0; or 2 with one line on stderr.
   int (*evaluate)(const std::string& input, const std::string& output) = nullptr;
 };
 [[nodiscard]] std::span<const Topic> topics();

@@ -1,11 +1,11 @@
-// Ways to the hand's velocity that the core does not ship, for comparison with those that it does
-// (rt/forces/velocity.hpp): the same samples, the same treatment of late ones.
+// Velocity estimators that the core does not ship, for comparison with those that it does
+// (rt/control/velocity.hpp). They get the same samples and treat late ones in the same way.
 #pragma once
 
 #include <array>
 #include <cmath>
 
-#include "rt/forces/velocity.hpp"
+#include "rt/control/velocity.hpp"
 
 namespace punctum::report {
 
@@ -21,9 +21,12 @@ class Difference {
     Sample& newest = samples_[count_ % kLongest];
     newest = {position_m, count_ > 0 ? dt_s : 0};
     span_s_ += newest.since_s;
-    if (count_ > stride_) span_s_ -= samples_[(count_ - stride_) % kLongest].since_s;
-    if (count_ >= stride_)
+    if (count_ > stride_) {
+      span_s_ -= samples_[(count_ - stride_) % kLongest].since_s;
+    }
+    if (count_ >= stride_) {
       velocity_ = (position_m - samples_[(count_ - stride_) % kLongest].position_m) / span_s_;
+    }
     ++count_;
     return velocity_;
   }
@@ -48,7 +51,9 @@ class Ema {
 
   explicit Ema(double cutoff_Hz) : omega_(static_cast<Real>(2 * 3.14159265358979323846 * cutoff_Hz)) {}
   Vector step(const Vector& position_m, Real dt_s) {
-    if (begun_) velocity_ += (1 - std::exp(-omega_ * dt_s)) * ((position_m - last_) / dt_s - velocity_);
+    if (begun_) {
+      velocity_ += (1 - std::exp(-omega_ * dt_s)) * ((position_m - last_) / dt_s - velocity_);
+    }
     begun_ = true;
     last_ = position_m;
     return velocity_;
@@ -61,7 +66,7 @@ class Ema {
   Vector velocity_ = Vector::Zero();
 };
 
-// FOAW and a first-order low-pass behind it.
+// FOAW, followed by a first-order low-pass.
 class SmoothedFoaw {
  public:
   SmoothedFoaw(const rt::VelocityParams& params) : foaw_(params), tau_s_(params.smooth_s) {}
@@ -77,8 +82,8 @@ class SmoothedFoaw {
   hal::Vec3 velocity_ = hal::Vec3::Zero();
 };
 
-// The Kalman filter of rt/forces with its covariance carried along: exact from the first sample on and over
-// late ones.
+// The Kalman filter of rt/control with its covariance updated in every step, so that it is optimal from the
+// first sample on and after late samples.
 class CovarianceKalman {
  public:
   explicit CovarianceKalman(const rt::VelocityParams& params)
@@ -110,8 +115,8 @@ class CovarianceKalman {
   Eigen::Matrix3d state_ = Eigen::Matrix3d::Zero();  // column 0 position, 1 velocity, 2 acceleration
 };
 
-// The shipped filter, told the force at the handle: an observer that knows mass and damping, and leaves to
-// the acceleration what the hand adds. force_N is what the device applied since the last sample.
+// The shipped filter with the force at the handle as an input: it knows mass and damping, and only the hand's
+// part of the acceleration is estimated. force_N: applied by the device since the last sample.
 class ForceKalman {
  public:
   ForceKalman(const rt::VelocityParams& params, double T_s, double mass_kg, double damping_Ns_m)
@@ -136,7 +141,7 @@ class ForceKalman {
   double per_kg_, damping_Ns_m_;
   bool begun_ = false;
   hal::Vec3 position_ = hal::Vec3::Zero(), velocity_ = hal::Vec3::Zero();
-  hal::Vec3 hand_ = hal::Vec3::Zero();  // acceleration by what is not the device
+  hal::Vec3 hand_ = hal::Vec3::Zero();  // acceleration by everything but the device
 };
 
 }  // namespace punctum::report

@@ -1,5 +1,5 @@
-// Motions of a hand whose position, velocity and device force are known in closed form, and what an encoder
-// says of them.
+// Motions of a hand whose position, velocity and device force are known in closed form, and their encoder
+// readings.
 #pragma once
 
 #include <array>
@@ -17,11 +17,11 @@ namespace punctum::report {
 enum class Motion : std::uint8_t {
   approach,   // minimum-jerk strokes with peaks of 0.2, 1, 5, 20 and 50 mm/s, and rests between
   tremor,     // eight lines in 8 .. 12 Hz, 0.25 mm rms
-  work,       // both together: a hand at work
-  hold,       // still between two counts, the encoder flickers
+  work,       // the sum of both: a hand at work
+  hold,       // still between two counts, so that the encoder flickers
   reach,      // 0.1 m with a peak of 0.3 m/s
   impact,     // 0.1 m/s into a wall of 800 N/m that the device renders, and back; 75 g
-  grip,       // held fast while the device pushes with 1 N, on and off
+  grip,       // held still while the device pushes with 1 N, on and off
   slow_sine,  // 5 mm at 1 Hz
   fast_sine,  // 5 mm at 4 Hz
 };
@@ -41,7 +41,7 @@ struct HandTruth {
 
 class HandMotion {
  public:
-  // One axis; another seed is another hand.
+  // One axis. Another seed gives another hand.
   HandMotion(Motion motion, std::uint64_t seed) : motion_(motion) {
     std::mt19937_64 random(seed);
     const auto uniform = [&random] { return static_cast<double>(random() >> 11) * 0x1p-53; };
@@ -116,7 +116,9 @@ class HandMotion {
       truth.position_m += before;
       begun += 1.875 * length[i] / peak[i] + kRest_s;
       before += length[i];
-      if (t < begun) break;
+      if (t < begun) {
+        break;
+      }
     }
     return truth;
   }
@@ -133,8 +135,12 @@ class HandMotion {
     constexpr double v = 0.1, K = 800, m = 0.075, before = 0.05;
     const double omega = std::sqrt(K / m);
     const double inside = t - before;
-    if (inside < 0) return {start_m_ + v * inside, v, 0};
-    if (omega * inside > kPi) return {start_m_ - v * (inside - kPi / omega), -v, 0};
+    if (inside < 0) {
+      return {start_m_ + v * inside, v, 0};
+    }
+    if (omega * inside > kPi) {
+      return {start_m_ - v * (inside - kPi / omega), -v, 0};
+    }
     const double depth = v / omega * std::sin(omega * inside);
     return {start_m_ + depth, v * std::cos(omega * inside), -K * depth};
   }
@@ -154,13 +160,13 @@ struct EncoderSampling {
   bool uneven = false;  // ticks wake up to some 10 us late, and one in 200 is 1 .. 4 periods late
 };
 
-// What a program gets, tick by tick, and the truth beside it.
+// What a program reads, tick by tick, and the truth.
 struct EncoderRecord {
   std::vector<hal::Vec3> position_m, velocity_m_s, force_N;
   std::vector<double> dt_s;
 };
 
-// Three axes, three different hands.
+// Three axes with three different hands.
 inline EncoderRecord record(Motion motion, const EncoderSampling& sampling, std::uint64_t seed = 1) {
   const std::array hands{HandMotion(motion, 3 * seed), HandMotion(motion, 3 * seed + 1),
                          HandMotion(motion, 3 * seed + 2)};
@@ -172,15 +178,18 @@ inline EncoderRecord record(Motion motion, const EncoderSampling& sampling, std:
   EncoderRecord out;
   double last = -T;
   for (std::int64_t k = 0; k < ticks; ++k) {
-    if (sampling.uneven && uniform() < 0.005) k += 1 + static_cast<std::int64_t>(4 * uniform());
+    if (sampling.uneven && uniform() < 0.005) {
+      k += 1 + static_cast<std::int64_t>(4 * uniform());
+    }
     const double t = static_cast<double>(k) * T + (sampling.uneven ? 10e-6 * std::abs(gaussian(random)) : 0);
     hal::Vec3 x, v, f;
     for (Eigen::Index i = 0; i < 3; ++i) {
       HandTruth truth = hands[static_cast<std::size_t>(i)].at(t);
       v[i] = truth.velocity_m_s;
       f[i] = truth.force_N;
-      if (motion == Motion::hold)
+      if (motion == Motion::hold) {
         truth.position_m = (std::floor(truth.position_m / d) + 0.5 + 0.05 * gaussian(random)) * d;
+      }
       x[i] = d * std::floor(truth.position_m / d + 0.5);
     }
     out.position_m.push_back(x);
@@ -192,7 +201,7 @@ inline EncoderRecord record(Motion motion, const EncoderSampling& sampling, std:
   return out;
 }
 
-inline constexpr double kSettled_s = 0.08;  // left out of every error
+inline constexpr double kSettled_s = 0.08;  // at the start: not part of any error
 
 // RMS over axes and time; step(k) is the estimate at sample k.
 template <class Step>
@@ -202,7 +211,9 @@ double rms_error_m_s(const EncoderRecord& samples, Step step) {
   for (std::size_t k = 0; k < samples.position_m.size(); ++k) {
     const hal::Vec3 estimate = step(k);
     t += samples.dt_s[k];
-    if (t < kSettled_s) continue;
+    if (t < kSettled_s) {
+      continue;
+    }
     sum += (estimate - samples.velocity_m_s[k]).squaredNorm();
     count += 3;
   }

@@ -1,0 +1,346 @@
+#include "rt/control/device_inputs.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "rt/forces/ramp.hpp"
+#include "rt/station/alarm.hpp"
+
+namespace punctum::rt {
+namespace {
+
+constexpr double kRounding_s = 1e-9;
+constexpr double kLongest_s = 1e6;  // times that are only compared with limits count no further
+
+constexpr double kEstopSilent_s = 0.02;  // an e-stop chain without data for longer: estop_lost
+// A contact that chatters disagrees with the other one again and again: agreement makes up for a tenth of it.
+constexpr double kAgreementCounts = 0.1;
+constexpr double kResetHeld_s = 0.02;  // a finger is on the button for longer, interference is not
+
+constexpr double kStageReach_m = 1;  // no stage that carries a needle travels as far
+constexpr double kUnit = 1e-3;       // the axis' length is as near to 1
+// From switched-on to operation: a CiA 402 drive charges its DC link, releases its brake and answers each of
+// three transitions; vendors state up to 2 s.
+constexpr double kEnablesWithin_s = 3;
+
+constexpr double kPressureMax_Pa = 2e5;  // no pump below ambient reaches more than 1e5
+
+constexpr double kContactSilent_s = 0.1;  // of the injector
+
+constexpr double kSensorTau_s = 0.005;  // low-pass of the force sensor
+constexpr double kSensorSilent_s = 0.1;
+constexpr double kSensorRange_N = 1;  // no sensor that tells a micronewton measures more
+// What a sample counts at most, in hard limits: one bad sample stops nothing and hides nothing for longer
+// than the low-pass takes, twice the limit for good is found all the same.
+constexpr double kSensorCounts = 2;
+
+[[nodiscard]] bool is_within(const hal::Vec3& v, double largest) NONBLOCKING {
+  return std::abs(v.x()) <= largest && std::abs(v.y()) <= largest && std::abs(v.z()) <= largest;
+}
+[[nodiscard]] bool can_be_true(const hal::StageState& stage) NONBLOCKING {
+  return is_within(stage.tip_m, kStageReach_m) && is_within(stage.following_error_m, kStageReach_m) &&
+         is_within(stage.axis, 1 + kUnit) && std::abs(stage.axis.norm() - 1) <= kUnit;
+}
+
+}  // namespace
+
+DeviceInputs::DeviceInputs(const ServoConfig& config, const Devices& devices) NONBLOCKING
+    : config_(config),
+      devices_(devices),
+      hand_clock_(config.hand_timeout_s),
+      hand_check_(config.hand_jump_m / 1e-3, config.velocity.d_m),
+      stage_clock_(config.stage_timeout_s),
+      following_(config.stage_timeout_s),
+      estop_clock_(kEstopSilent_s),
+      vacuum_clock_(config.vacuum ? config.vacuum->window_s : 0),
+      injector_clock_(kContactSilent_s),
+      sensor_clock_(kSensorSilent_s) {
+  readings_.has_stage = devices.stage != nullptr;
+  readings_.has_estop = devices.estop != nullptr;
+  if (config.enabling) {
+    enabling_.emplace(config.enabling->release_s);
+  }
+}
+
+const Readings& DeviceInputs::read(const TickTime& time, const LastOutput& last) NONBLOCKING {
+  // Every device is read on every tick; the most urgent cause comes first.
+  readings_.alarms = 0;
+  readings_.estop_fault = read_estop(time);
+  Fault fault = read_hand(time, last);
+  fault = first_of(fault, judge_enabling(time, last));
+  fault = first_of(fault, read_stage(time, last));
+  fault = first_of(fault, read_vacuum(time, last));
+  readings_.device_fault = first_of(fault, read_injector(time, last));
+  read_force_sensor(time);
+  return readings_;
+}
+
+Fault DeviceInputs::read_estop(const TickTime& time) NONBLOCKING {
+  readings_.estop_discrepancy = false;
+  if (!devices_.estop) {
+    return Fault::none;
+  }
+  hal::EstopState read;
+  const hal::Status status = devices_.estop->read(read);
+  estop_clock_.step(time.elapsed_s);
+  const bool answered = status == hal::Status::ok;
+  const SampleIs sample = answered ? estop_clock_.take(read.sample_ns, time.now_ns) : SampleIs::untimely;
+  readings_.estop_readable = sample != SampleIs::untimely && !estop_clock_.timed_out();
+  if (sample == SampleIs::fresh) {
+    readings_.estop = read;
+    reset_held_s_ = read.reset_pressed ? std::min(reset_held_s_ + time.elapsed_s, 2 * kResetHeld_s) : 0;
+    readings_.reset_down = read.reset_pressed;
+    readings_.estop.reset_pressed = reset_held_s_ > kResetHeld_s;
+  } else if (answered) {  // an open contact counts, whatever its time
+    readings_.estop.contact_a_closed = readings_.estop.contact_a_closed && read.contact_a_closed;
+    readings_.estop.contact_b_closed = readings_.estop.contact_b_closed && read.contact_b_closed;
+  }
+  if (!readings_.estop_readable) {
+    readings_.alarms |= alarm_sensor;
+  }
+  if ((!answered && status != hal::Status::no_data) || estop_clock_.timed_out()) {
+    return Fault::estop_lost;
+  }
+  const bool a = readings_.estop.contact_a_closed;
+  const bool b = readings_.estop.contact_b_closed;
+  const double longest_s = config_.estop.discrepancy_s;
+  contacts_differ_s_ += a != b ? time.elapsed_s : -kAgreementCounts * time.elapsed_s;
+  if (contacts_differ_s_ > longest_s) {
+    discrepancy_ = true;
+  }
+  contacts_differ_s_ = std::clamp(contacts_differ_s_, 0.0, 2 * longest_s);
+  if (!a && !b) {
+    discrepancy_ = false;  // both contacts have shown that they open
+    contacts_differ_s_ = 0;
+  }
+  if (!a || !b || (answered && read.pulse_seen)) {
+    readings_.estop_discrepancy = discrepancy_;
+    return Fault::estop;
+  }
+  return discrepancy_ ? Fault::estop_discrepancy : Fault::none;
+}
+
+Fault DeviceInputs::read_hand(const TickTime& time, const LastOutput& last) NONBLOCKING {
+  hal::HandState read;
+  const hal::Status status = devices_.hand.read(read);
+  hand_clock_.step(time.elapsed_s);
+  readings_.hand_age_s += time.elapsed_s;
+  readings_.hand_fresh = false;
+  readings_.hand_begins = false;
+  const bool answered = status == hal::Status::ok;
+  const SampleIs sample = answered ? hand_clock_.take(read.sample_ns, time.now_ns) : SampleIs::untimely;
+  const bool contradicts = sample == SampleIs::repeated && read.position_m != newest_hand_m_;
+  if (sample == SampleIs::untimely || contradicts) {
+    readings_.alarms |= alarm_sensor;
+  }
+  if ((!answered && status != hal::Status::no_data) || hand_clock_.timed_out()) {
+    readings_.alarms |= alarm_sensor;
+    release_buttons();
+    return Fault::hand_lost;
+  }
+  if (sample == SampleIs::fresh) {
+    newest_hand_m_ = read.position_m;
+    hand_is_ = hand_check_.judge(read);
+    if (hand_is_ == HandCheck::Is::good || hand_is_ == HandCheck::Is::begins) {
+      take_hand(read, last);
+      return Fault::none;
+    }
+  }
+  if (hand_is_ == HandCheck::Is::ignored && readings_.hand_seen) {
+    readings_.alarms |= alarm_sensor;
+    if (readings_.hand_age_s > config_.hand_timeout_s + kRounding_s) {
+      hand_check_.distrust();
+      hand_is_ = HandCheck::Is::invalid;
+    }
+  }
+  if (hand_is_ == HandCheck::Is::invalid) {
+    readings_.alarms |= alarm_sensor;
+    release_buttons();
+    return Fault::hand_invalid;
+  }
+  if (readings_.hand_stuck) {
+    readings_.alarms |= alarm_sensor;
+  }
+  return Fault::none;
+}
+
+void DeviceInputs::take_hand(const hal::HandState& read, const LastOutput& last) NONBLOCKING {
+  readings_.hand_fresh = true;
+  readings_.hand_begins = hand_is_ == HandCheck::Is::begins;
+  readings_.between_hand_s = readings_.hand_begins
+                                 ? readings_.hand_age_s
+                                 : 1e-9 * static_cast<double>(read.sample_ns - readings_.hand.sample_ns);
+  readings_.hand = read;
+  readings_.hand.orientation.normalize();
+  buttons_held_ &= read.buttons;
+  readings_.hand.buttons = read.buttons & ~buttons_held_;
+  readings_.hand_seen = true;
+  readings_.hand_age_s = hand_clock_.age_s();
+  hand_watch_.step(read.position_m, last.hand_force_N, readings_.between_hand_s);
+  readings_.hand_stuck = hand_watch_.stuck();
+  if (readings_.hand_stuck) {
+    readings_.alarms |= alarm_sensor;
+  }
+}
+
+// A button that is held all the time is no new press when the hand comes back, or it would inject by itself
+// or call for the next cell. The clutch counts as it is: it only keeps the needle where it is.
+void DeviceInputs::release_buttons() NONBLOCKING {
+  readings_.hand.buttons = 0;
+  buttons_held_ = hal::kButtonInject | hal::kButtonNextCell;
+}
+
+Fault DeviceInputs::judge_enabling(const TickTime& time, const LastOutput& last) NONBLOCKING {
+  if (!enabling_) {
+    return Fault::none;
+  }
+  if (readings_.hand_fresh) {
+    enabling_->read(readings_.hand.buttons);
+  }
+  const Fault fault = enabling_->step(last.running, time.elapsed_s);
+  readings_.enabled = enabling_->enabled();
+  readings_.pressed_anew = enabling_->pressed_anew();
+  if (last.running && !readings_.enabled) {
+    readings_.alarms |= alarm_not_enabled;
+  }
+  return fault;
+}
+
+Fault DeviceInputs::read_stage(const TickTime& time, const LastOutput& last) NONBLOCKING {
+  if (!devices_.stage) {
+    return Fault::none;
+  }
+  if (last.uncoupled) {
+    following_.restart();
+  }
+  if (last.stage_commanded) {
+    following_.sent(last.set_point_m);
+  }
+  hal::StageState read;
+  const hal::Status status = devices_.stage->read(read);
+  stage_clock_.step(time.elapsed_s);
+  following_.step(time.elapsed_s);
+  readings_.stage_fresh = false;
+  readings_.stage_age_s = stage_clock_.age_s();
+  if (status == hal::Status::fault || status == hal::Status::disconnected) {
+    readings_.alarms |= alarm_sensor;
+    return status == hal::Status::fault ? Fault::stage_fault : Fault::stage_lost;
+  }
+  if (status == hal::Status::ok && !can_be_true(read)) {
+    readings_.alarms |= alarm_sensor;
+    return Fault::stage_fault;
+  }
+  const SampleIs sample =
+      status == hal::Status::ok ? stage_clock_.take(read.sample_ns, time.now_ns) : SampleIs::untimely;
+  if (sample == SampleIs::untimely || stage_clock_.timed_out()) {
+    readings_.alarms |= alarm_sensor;
+  }
+  if (sample != SampleIs::fresh) {
+    return stage_clock_.timed_out() ? Fault::stage_lost : not_enabled(time, last);
+  }
+  readings_.stage = read;
+  readings_.stage.axis.normalize();
+  readings_.stage_seen = true;
+  readings_.stage_fresh = true;
+  readings_.stage_age_s = stage_clock_.age_s();
+  return first_of(judge_stage(last), not_enabled(time, last));
+}
+
+Fault DeviceInputs::judge_stage(const LastOutput& last) NONBLOCKING {
+  const hal::StageState& stage = readings_.stage;
+  if (!last.running || !readings_.enabled) {
+    stage_was_enabled_ = false;
+    return Fault::none;
+  }
+  if (stage_was_enabled_ && !stage.enabled) {
+    return Fault::stage_fault;  // the drive took its power away without being asked
+  }
+  stage_was_enabled_ = stage.enabled;
+  const double limit_m = config_.limits.following_error_m;
+  const bool follows = stage.following_error_m.norm() <= limit_m && following_.follows(stage.tip_m, limit_m);
+  return stage.enabled && !follows ? Fault::stage_following : Fault::none;
+}
+
+Fault DeviceInputs::not_enabled(const TickTime& time, const LastOutput& last) NONBLOCKING {
+  const bool waits = last.running && readings_.enabled && readings_.stage_seen && !readings_.stage.enabled;
+  not_enabled_s_ = waits ? std::min(not_enabled_s_ + time.elapsed_s, 2 * kEnablesWithin_s) : 0;
+  return not_enabled_s_ > kEnablesWithin_s ? Fault::stage_not_enabled : Fault::none;
+}
+
+Fault DeviceInputs::read_vacuum(const TickTime& time, const LastOutput& last) NONBLOCKING {
+  if (!devices_.vacuum || !config_.vacuum) {
+    return Fault::none;
+  }
+  hal::VacuumState vacuum;
+  vacuum_clock_.step(time.elapsed_s);
+  const bool answered =
+      devices_.vacuum->read(vacuum) == hal::Status::ok && std::abs(vacuum.pressure_Pa) <= kPressureMax_Pa;
+  const SampleIs sample = answered ? vacuum_clock_.take(vacuum.sample_ns, time.now_ns) : SampleIs::untimely;
+  vacuum_same_s_ = std::min(vacuum_same_s_ + time.elapsed_s, kLongest_s);
+  if (sample == SampleIs::fresh) {
+    vacuum_same_s_ = vacuum.pressure_Pa == readings_.vacuum_Pa ? vacuum_same_s_ : 0;
+    readings_.vacuum_Pa = vacuum.pressure_Pa;
+  }
+  const bool read = sample != SampleIs::untimely && !vacuum_clock_.timed_out();
+  const double still_s = config_.vacuum->still_s;
+  if (!read || (still_s > 0 && vacuum_same_s_ > still_s)) {
+    readings_.alarms |= alarm_sensor;
+  }
+  const bool holds = read && readings_.vacuum_Pa >= config_.vacuum->min_Pa;
+  // Counted up and down, so that single good readings do not hide a loss.
+  const double window_s = config_.vacuum->window_s;
+  vacuum_low_s_ = std::clamp(vacuum_low_s_ + (holds ? -time.elapsed_s : time.elapsed_s), 0.0, 2 * window_s);
+  return vacuum_low_s_ > window_s && !last.between_cells ? Fault::vacuum_lost : Fault::none;
+}
+
+Fault DeviceInputs::read_injector(const TickTime& time, const LastOutput& last) NONBLOCKING {
+  readings_.injected = false;
+  if (!devices_.injector || !config_.injector) {
+    return Fault::none;
+  }
+  hal::InjectorState injector;
+  const hal::Status status = devices_.injector->read(injector);
+  injector_clock_.step(time.elapsed_s);
+  const SampleIs sample =
+      status == hal::Status::ok ? injector_clock_.take(injector.sample_ns, time.now_ns) : SampleIs::untimely;
+  if (sample == SampleIs::fresh) {
+    readings_.injector_open = injector.open;
+  }
+  if (sample == SampleIs::untimely || injector_clock_.timed_out()) {
+    readings_.alarms |= alarm_sensor;
+  } else {
+    readings_.injected = readings_.injector_open && last.gate_open;
+  }
+  const bool unasked = readings_.injector_open && !last.gate_open;
+  open_unasked_s_ = unasked ? std::min(open_unasked_s_ + time.elapsed_s, kLongest_s) : 0;
+  return open_unasked_s_ > config_.injector->shut_within_s ? Fault::injector_open : Fault::none;
+}
+
+void DeviceInputs::read_force_sensor(const TickTime& time) NONBLOCKING {
+  if (!devices_.force_sensor || !config_.force_sensor) {
+    return;
+  }
+  hal::ForceState force;
+  const hal::Status status = devices_.force_sensor->read(force);
+  const double axial_N = force.axial_force_N;
+  sensor_clock_.step(time.elapsed_s);
+  const SampleIs sample = status == hal::Status::ok && std::abs(axial_N) <= kSensorRange_N
+                              ? sensor_clock_.take(force.sample_ns, time.now_ns)
+                              : SampleIs::untimely;
+  if (sample == SampleIs::untimely) {
+    readings_.alarms |= alarm_sensor;
+  }
+  if (sample == SampleIs::fresh) {
+    const double since_s = 1e-9 * static_cast<double>(force.sample_ns - sensor_ns_);
+    const double part = sensor_seen_ ? low_pass_part(since_s, kSensorTau_s) : 1.0;
+    readings_.sensor_N = axial_N;
+    const double most_N = kSensorCounts * config_.limits.tip_force_hard_N;
+    readings_.sensor_filtered_N +=
+        part * (std::clamp(axial_N, -most_N, most_N) - readings_.sensor_filtered_N);
+    sensor_seen_ = true;
+    sensor_ns_ = force.sample_ns;
+  }
+  readings_.sensor_fresh = sensor_seen_ && !sensor_clock_.timed_out();
+}
+
+}  // namespace punctum::rt

@@ -1,0 +1,57 @@
+#include "rt/control/force_limits.hpp"
+
+#include <algorithm>
+
+#include "hal/frames.hpp"
+#include "rt/station/alarm.hpp"
+
+namespace punctum::rt {
+namespace {
+
+constexpr double kSoftHysteresis = 0.9;  // of the soft tip-force limit
+// No device needs to change its force faster. It is 3 N in 10 ms: a handle of 75 g that nobody holds has then
+// moved by 0.7 mm, where a leap of 3 N would have thrown it 2 mm. Injections without a fault stay below 50
+// N/s.
+constexpr double kSlew_N_s = 300;
+constexpr double kLongestStep = 2;  // nominal periods: a late tick is no licence for a leap
+
+}  // namespace
+
+ForceLimits::ForceLimits(const LimitParams& limits, double rate_Hz) NONBLOCKING
+    : limits_(limits),
+      longest_step_s_(kLongestStep / rate_Hz) {}
+
+LimitedForces ForceLimits::step(const hal::Vec3& wanted_N, double law_N, const Readings& readings,
+                                const hal::Vec3& last_N, double dt_s, double commanded_N) NONBLOCKING {
+  LimitedForces out;
+  // The law's or the measured one, whichever is larger: a sensor that hangs at zero lifts no limit.
+  const double tip_N = readings.sensor_fresh ? std::max(law_N, readings.sensor_filtered_N) : law_N;
+  const double soft_N = limits_.tip_force_soft_N;
+  tip_force_soft_ = tip_N > (tip_force_soft_ ? kSoftHysteresis * soft_N : soft_N);
+  out.tip_force_soft = tip_force_soft_;
+  if (tip_force_soft_) {
+    out.alarms |= alarm_tip_force;
+  }
+  if (tip_N > limits_.tip_force_hard_N) {
+    out.fault = Fault::tip_force;
+  }
+
+  const LimitedForce hand =
+      limit_hand_force(hand_from_world(wanted_N), std::min(limits_.hand_force_N, commanded_N));
+  if (hand.limited) {
+    out.alarms |= alarm_force_limited;
+  }
+  if (!hand.finite) {
+    out.fault = first_of(out.fault, Fault::not_finite);
+  }
+  if (hand.finite) {
+    // Between two forces within the limit: within the limit.
+    const hal::Vec3 change = hand.force_N - last_N;
+    const double most_N = kSlew_N_s * std::min(dt_s, longest_step_s_);
+    const double size_N = change.norm();
+    out.hand_force_N = size_N > most_N ? hal::Vec3(last_N + change * (most_N / size_N)) : hand.force_N;
+  }
+  return out;
+}
+
+}  // namespace punctum::rt

@@ -1,0 +1,39 @@
+// The limits of forces, last of all before the safety latch: the needle's on the cell, the hand's on the
+// operator.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+
+#include "hal/realtime.hpp"
+#include "rt/control/device_inputs.hpp"
+#include "rt/control/limits.hpp"
+
+namespace punctum::rt {
+
+struct LimitedForces {
+  hal::Vec3 hand_force_N = hal::Vec3::Zero();  // device frame, bounded, without a jolt, and finite
+  bool tip_force_soft = false;                 // the needle is not pushed further
+  Fault fault = Fault::none;
+  std::uint32_t alarms = 0;
+};
+
+class ForceLimits {
+ public:
+  ForceLimits(const LimitParams& limits, double rate_Hz) NONBLOCKING;
+
+  // wanted_N: world axes. law_N: the needle's force by the membrane law. last_N: what was written to the hand
+  // on the last tick, device frame. commanded_N: a lower limit of the hand's force than the scene's.
+  [[nodiscard]] LimitedForces step(const hal::Vec3& wanted_N, double law_N, const Readings& readings,
+                                   const hal::Vec3& last_N, double dt_s,
+                                   double commanded_N = std::numeric_limits<double>::infinity()) NONBLOCKING;
+
+  [[nodiscard]] bool last_tip_force_soft() const NONBLOCKING { return tip_force_soft_; }
+
+ private:
+  LimitParams limits_;
+  double longest_step_s_;
+  bool tip_force_soft_ = false;
+};
+
+}  // namespace punctum::rt

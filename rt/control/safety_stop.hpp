@@ -1,0 +1,43 @@
+// The safety latch round the force to the hand: while a stop is latched the last force before it fades to
+// zero.
+#pragma once
+
+#include <cstdint>
+
+#include "hal/realtime.hpp"
+#include "rt/control/device_inputs.hpp"
+#include "rt/control/drive_check.hpp"
+#include "rt/control/safety_latch.hpp"
+
+namespace punctum::rt {
+
+struct SafetyOutput {
+  LatchOutput latch;
+  bool running = true;                         // no stop is latched
+  hal::Vec3 hand_force_N = hal::Vec3::Zero();  // device frame: what goes out
+  Fault cause = Fault::none;                   // of the stop, the first one
+  StopStage stage = StopStage::running;
+  std::uint64_t faults_latched = 0;  // bit f: Fault f was latched in this run
+};
+
+class SafetyStop {
+ public:
+  explicit SafetyStop(const EstopParams& params) NONBLOCKING : latch_(params) {}
+
+  // cause: the most urgent one of this tick, Fault::none if nothing is wrong.
+  [[nodiscard]] SafetyOutput step(Fault cause, const hal::Vec3& hand_force_N, const Readings& readings,
+                                  double elapsed_s) NONBLOCKING;
+
+  [[nodiscard]] Fault cause() const NONBLOCKING { return latch_.cause(); }
+  [[nodiscard]] StopStage stage() const NONBLOCKING { return latch_.stage(); }
+
+ private:
+  void remember(Fault fault) NONBLOCKING { faults_latched_ |= 1ULL << static_cast<unsigned>(fault); }
+
+  SafetyLatch latch_;
+  DriveCheck drive_;
+  hal::Vec3 force_before_stop_N_ = hal::Vec3::Zero();
+  std::uint64_t faults_latched_ = 0;
+};
+
+}  // namespace punctum::rt

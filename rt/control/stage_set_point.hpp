@@ -1,0 +1,62 @@
+// The path of the needle: follows the hand at needle scale, then makes set-points of it that the stage may
+// get.
+#pragma once
+
+#include <cstdint>
+
+#include "hal/realtime.hpp"
+#include "rt/control/cell_observer.hpp"
+#include "rt/control/device_inputs.hpp"
+#include "rt/control/limits.hpp"
+#include "rt/control/master_to_stage.hpp"
+
+namespace punctum::rt {
+
+// What was true at the end of the last tick; the hand is followed before this tick's observation is taken.
+struct FollowInput {
+  bool running = true;  // no stop is latched
+  bool vision_fresh = true;
+  bool clutched = false;  // the operator or the end of the run has uncoupled hand and needle
+  bool may_tilt = true;   // the handle's orientation turns the approach axis
+  StageConstraint constraint;
+  double elapsed_s = 0;  // since the last tick
+};
+
+class StageSetPoint {
+ public:
+  explicit StageSetPoint(const ServoConfig& config) NONBLOCKING;
+
+  // Moves hand_point_m() with the hand. Alarms of the limits that hold it.
+  [[nodiscard]] std::uint32_t follow_hand(const Readings& readings, const FollowInput& in) NONBLOCKING;
+
+  // The set-point of this tick, once hand and needle are coupled. Alarms of the limits that hold it.
+  [[nodiscard]] std::uint32_t step(const StageConstraint& constraint, double dt_s) NONBLOCKING;
+
+  // From here on the hand moves the needle relative to where both are now, once both were seen.
+  void anchor(const Readings& readings) NONBLOCKING;
+
+  [[nodiscard]] bool anchored() const NONBLOCKING { return mapping_.anchored(); }
+  [[nodiscard]] bool uncoupled() const NONBLOCKING {
+    return uncoupled_;
+  }  // on this tick, by a stop or no power
+  [[nodiscard]] const hal::Vec3& hand_point_m() const NONBLOCKING { return mapping_.hand_point(); }
+  // For the stage; null until hand and needle are coupled.
+  [[nodiscard]] const hal::StageCommand* command() const NONBLOCKING {
+    return anchored() ? &limits_.set_point() : nullptr;
+  }
+  [[nodiscard]] const hal::StageCommand& set_point() const NONBLOCKING { return limits_.set_point(); }
+
+ private:
+  void anchor_at(const hal::HandState& hand, const hal::Vec3& tip_m, const hal::Vec3& axis) NONBLOCKING;
+
+  MasterToStage mapping_;
+  StageLimits limits_;
+  double lag_s_;    // of the whole way from the hand to the set-point
+  double slack_m_;  // at needle scale
+  bool uncoupled_ = false;
+  bool last_withdrawal_only_ = false;
+  bool last_hand_stuck_ = false;
+  bool last_clutched_ = false;
+};
+
+}  // namespace punctum::rt

@@ -1,0 +1,45 @@
+// How much time a tick counts, whatever the clock reads, and whether too many ticks were missed.
+#pragma once
+
+#include <cstdint>
+
+#include "hal/realtime.hpp"
+#include "rt/control/config.hpp"
+#include "rt/station/fault.hpp"
+
+namespace punctum::rt {
+
+struct TickInfo {
+  std::uint64_t tick = 0;              // of the absolute grid, from 0; gaps are missed releases
+  std::int64_t release_ns = 0;         // of this tick on the grid
+  std::int64_t start_ns = 0;           // when it really began; devices are read at this time
+  double period_s = 0;                 // really elapsed since the previous tick
+  std::uint64_t missed_in_window = 0;  // missed releases in the last ServoConfig::overrun_window_s
+};
+
+struct TickTime {
+  std::int64_t now_ns = 0;  // rises: where the clock goes back it stands still until the clock is there again
+  double elapsed_s = 0;     // really, since the last tick; > 0
+  double dt_s = 0;          // bounded: what ramps and filters advance by
+  bool first = false;
+  Fault fault = Fault::none;
+  std::uint32_t alarms = 0;
+};
+
+class TickTiming {
+ public:
+  // degraded: without real-time rights, which is an alarm on every tick.
+  TickTiming(const ServoConfig& config, bool degraded) NONBLOCKING;
+
+  [[nodiscard]] TickTime step(const TickInfo& now) NONBLOCKING;
+
+ private:
+  double nominal_s_;
+  std::uint64_t missed_limit_;
+  bool real_actuators_;
+  std::uint32_t standing_alarms_;
+  bool stepped_ = false;
+  std::int64_t last_ns_ = 0;
+};
+
+}  // namespace punctum::rt

@@ -1,0 +1,766 @@
+// What holds in every run of the servo, whatever its devices tell it: one number, one name and one check per
+// invariant. rt/control/README.md has the table with formulas and tolerances.
+//
+// The checker sees one tick after the other: what is true, what the servo was told, what it wrote, and its
+// telemetry sample. It knows nothing of how the servo works. A checker is a value: it can be copied with the
+// run that it watches.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "hal/devices.hpp"
+#include "hal/frames.hpp"
+#include "rt/control/config.hpp"
+#include "rt/forces/list.hpp"
+#include "rt/station/observation.hpp"
+#include "rt/station/telemetry.hpp"
+
+namespace punctum::rt::test {
+
+enum class Invariant : std::uint8_t {
+  finite_writes,
+  finite_telemetry,
+  force_bounded,
+  force_slew,
+  force_gone_after_stop,
+  force_returns_from_zero,
+  fixtures_fade,
+  work_bounded,
+  moves_with_the_hand,
+  deeper_by_the_hand,
+  depth_bounded,
+  inside_workspace,
+  speed_bounded,
+  acceleration_bounded,
+  jerk_bounded,
+  lateral_bounded,
+  vision_rate,
+  vision_sum,
+  blind_only_outwards,
+  no_set_point_in_stop,
+  begins_at_the_needle,
+  no_motion_unpowered,
+  gate_in_phase,
+  gate_own_press,
+  gate_one_opening,
+  gate_not_cut_short,
+  gate_seen,
+  gate_time,
+  gate_shut_in_stop,
+  relay_inputs_fresh,
+  relay_stage_obeys,
+  relay_off_when_distrusted,
+  relay_alive,
+  leaves_stop_by_reset,
+  first_cause_kept,
+  stops_on_estop,
+  stops_on_silence,
+  stops_on_command,
+  quick_stop_in_time,
+  power_off_in_time,
+  phase_order,
+  puncture_confirmed,
+  over_at_rest,
+  count
+};
+inline constexpr std::size_t kInvariants = static_cast<std::size_t>(Invariant::count);
+
+struct InvariantName {
+  const char* number;
+  const char* name;
+};
+inline constexpr std::array<InvariantName, kInvariants> kInvariantNames{{
+    {"N1", "finite_writes"},
+    {"N2", "finite_telemetry"},
+    {"F1", "force_bounded"},
+    {"F2", "force_slew"},
+    {"F3", "force_gone_after_stop"},
+    {"F4", "force_returns_from_zero"},
+    {"F5", "fixtures_fade"},
+    {"E1", "work_bounded"},
+    {"M1", "moves_with_the_hand"},
+    {"M2", "deeper_by_the_hand"},
+    {"M3", "depth_bounded"},
+    {"M4", "inside_workspace"},
+    {"M5", "speed_bounded"},
+    {"M6", "acceleration_bounded"},
+    {"M7", "jerk_bounded"},
+    {"M8", "lateral_bounded"},
+    {"M9", "vision_rate"},
+    {"M10", "vision_sum"},
+    {"M11", "blind_only_outwards"},
+    {"M12", "no_set_point_in_stop"},
+    {"M13", "begins_at_the_needle"},
+    {"M14", "no_motion_unpowered"},
+    {"G1", "gate_in_phase"},
+    {"G2", "gate_own_press"},
+    {"G3", "gate_one_opening"},
+    {"G4", "gate_not_cut_short"},
+    {"G5", "gate_seen"},
+    {"G6", "gate_time"},
+    {"G7", "gate_shut_in_stop"},
+    {"H1", "relay_inputs_fresh"},
+    {"H2", "relay_stage_obeys"},
+    {"H3", "relay_off_when_distrusted"},
+    {"H4", "relay_alive"},
+    {"L1", "leaves_stop_by_reset"},
+    {"L2", "first_cause_kept"},
+    {"L3", "stops_on_estop"},
+    {"L4", "stops_on_silence"},
+    {"L5", "stops_on_command"},
+    {"L6", "quick_stop_in_time"},
+    {"L7", "power_off_in_time"},
+    {"P1", "phase_order"},
+    {"P2", "puncture_confirmed"},
+    {"P3", "over_at_rest"},
+}};
+[[nodiscard]] constexpr const InvariantName& name(Invariant i) {
+  return kInvariantNames[static_cast<std::size_t>(i)];
+}
+
+// A limit that the scene may have, or what is asked for without it.
+template <class Limits>
+[[nodiscard]] double lateral_limit_m(const Limits& limits) {
+  if constexpr (requires { limits.lateral_m; }) {
+    return limits.lateral_m;
+  }
+  return 5e-6;
+}
+template <class Limits>
+[[nodiscard]] double jerk_limit_m_s3(const Limits& limits) {
+  if constexpr (requires { limits.stage_jerk_m_s3; }) {
+    return limits.stage_jerk_m_s3;
+  }
+  return std::numeric_limits<double>::infinity();
+}
+
+// The numbers in the checks. They follow from the scene where it has a limit; the others are stated here.
+struct Bounds {
+  explicit Bounds(const ServoConfig& config)
+      : c(config),
+        nominal_s(1 / config.rate_Hz),
+        stale_s(config.local_model ? config.local_model->stale_after_s : 0) {}
+
+  ServoConfig c;
+  double nominal_s;
+  double stale_s;
+
+  double slew_N_s = 300;       // an injection without a fault takes 50
+  double work_J = 3e-3;        // 0.28 m/s of a handle of 75 g; 1 mJ of it is 3 N on 0.3 m/s for a period
+  double work_W = 2e-3;        // a fifth of what a hand gives that presses 0.5 N at 20 mm/s
+  double path_slack_m = 1e-6;  // encoder steps and the ends of the tremor filter
+  double overshoot = 1.15;     // path of the filter's answer over the path of its input: 1.09 for a step
+  // What one false reading of up to 20 ms may move the needle by, there and again back: less than a pixel.
+  double false_motion_m = 0.5e-6;
+  double brief_s = 0.02;
+  double filter_s = 0.3;                                // the tremor filter has settled
+  double vision_sum_m = 8.5e-6;                         // from first contact on
+  double truth_m = 3e-6;                                // the core knows the membrane's place to this
+  double lateral_m = lateral_limit_m(c.limits) + 2e-6;  // the tip follows the set-point late
+  double jerk_m_s3 = jerk_limit_m_s3(c.limits);
+  double shortest_opening_s = 0.02;
+  double brake_s = 0.03;  // v/a, and two periods of the slowest check
+  double relay_s = 0.02;  // beyond the stop's own time
+  int punctured_frames = 2;
+};
+
+// One tick.
+struct Seen {
+  double elapsed_s = 0;  // really, since the last tick
+  std::int64_t now_ns = 0;
+  bool clock_true = true;  // the servo was told that time
+
+  // The hand. true: of the handle; false: what a lie adds to its position.
+  hal::Status hand_status = hal::Status::ok;
+  hal::HandState hand;
+  hal::Vec3 hand_true_m = hal::Vec3::Zero();
+  double hand_false_m = 0;
+  double hand_work_J = 0;  // of the written force on the true handle, since the last tick
+  int hand_writes = 0;
+  hal::Vec3 force_N = hal::Vec3::Zero();  // that acts
+  hal::Vec3 asked_N = hal::Vec3::Zero();  // the same, unless the device refused it
+
+  hal::Status stage_status = hal::Status::ok;
+  hal::StageState stage;
+  hal::Vec3 tip_true_m = hal::Vec3::Zero();  // in the frame of the stage's encoders
+  bool stage_true = true;                    // it has obeyed and told the truth so far
+  bool stage_moves = false;                  // in truth
+  int commands = 0;
+  hal::StageCommand command;
+  int quick_stops = 0;
+  bool power = false;  // as last asked for
+
+  hal::Status estop_status = hal::Status::ok;
+  hal::EstopState estop;
+  bool level = false;  // of the heartbeat
+
+  // Vision: exposure of the newest observation that was delivered, of those that a core may believe.
+  std::int64_t seen_ns = 0;
+  int punctured_frames = 0;  // delivered with this tick
+  bool gate = false;
+  bool injector_stuck = false;
+  bool stop_commanded = false;
+  bool ending = false;
+  bool finished = false;
+  const TelemetrySample* sample = nullptr;
+};
+
+struct Broken {
+  Invariant what = Invariant::count;
+  int tick = 0;
+  double found = 0;
+  double allowed = 0;
+  double worst = 0;  // of the whole run
+};
+
+class Invariants {
+ public:
+  explicit Invariants(const ServoConfig& config) : b_(config) {}
+
+  // The first violation of each invariant, in the order of the ticks.
+  [[nodiscard]] std::span<const Broken> broken() const { return {broken_.data(), broken_count_}; }
+  [[nodiscard]] bool holds(Invariant i) const { return !was_broken_[static_cast<std::size_t>(i)]; }
+  [[nodiscard]] const Bounds& bounds() const { return b_; }
+  [[nodiscard]] double largest(Invariant i) const { return largest_[static_cast<std::size_t>(i)]; }
+
+  // From here on the run is judged: what was moved and worked before is settled.
+  void begin() {
+    tick_ = 0;
+    broken_count_ = 0;
+    was_broken_.fill(false);
+    largest_.fill(0);
+    settle_paths();
+    settle_work();
+  }
+
+  void step(const Seen& s) {
+    const TelemetrySample& t = *s.sample;
+    const bool running = t.stop == StopStage::running;
+    watch_inputs(s);
+    numbers(s, t);
+    force(s, t, running);
+    latch(s, t, running);
+    motion(s, t, running);
+    vision(s, t);
+    gate(s, t, running);
+    relay(s, t, running);
+    phase(s, t);
+    remember(s, t, running);
+    ++tick_;
+  }
+
+ private:
+  using I = Invariant;
+  using Vec3 = hal::Vec3;
+
+  // A value that must not be larger than allowed; NaN is larger than everything.
+  void at_most(I what, double found, double allowed) {
+    const auto k = static_cast<std::size_t>(what);
+    if (found <= allowed) {
+      largest_[k] = std::max(largest_[k], found);
+      return;
+    }
+    if (!was_broken_[k]) {
+      was_broken_[k] = true;
+      broken_[broken_count_++] = {what, tick_, found, allowed, found};
+      return;
+    }
+    for (std::size_t i = 0; i < broken_count_; ++i) {
+      if (broken_[i].what == what) {
+        broken_[i].worst = std::max(broken_[i].worst, found);
+      }
+    }
+  }
+  void must(I what, bool holds, double found = 1) { at_most(what, holds ? 0 : found, 0); }
+
+  static bool open(const hal::EstopState& e) {
+    return !e.contact_a_closed || !e.contact_b_closed || e.pulse_seen;
+  }
+
+  // ---- what was told ----
+  void watch_inputs(const Seen& s) {
+    const double dt = s.elapsed_s;
+    hand_silent_s_ += dt;
+    stage_silent_s_ += dt;
+    estop_silent_s_ += dt;
+    if (s.hand_status == hal::Status::ok && s.hand.sample_ns != hand_sample_ns_) {
+      hand_sample_ns_ = s.hand.sample_ns;
+      hand_silent_s_ =
+          std::min(hand_silent_s_, std::max(0.0, 1e-9 * static_cast<double>(s.now_ns - s.hand.sample_ns)));
+      buttons_were_ = buttons_;
+      buttons_ = s.hand.buttons;
+      if (!hand_known_) {
+        buttons_were_ = buttons_;
+      }
+      hand_known_ = true;
+    } else {
+      buttons_were_ = buttons_;
+    }
+    const bool held = (buttons_ & hal::kButtonEnable) != 0;
+    const bool was_held = (buttons_were_ & hal::kButtonEnable) != 0;
+    press_edge_ = !was_running_ && held && (press_edge_ || !was_held);
+    if (s.stage_status == hal::Status::ok && s.stage.sample_ns != stage_sample_ns_) {
+      stage_sample_ns_ = s.stage.sample_ns;
+      stage_silent_s_ =
+          std::min(stage_silent_s_, std::max(0.0, 1e-9 * static_cast<double>(s.now_ns - s.stage.sample_ns)));
+      stage_told_before_m_ = stage_known_ ? stage_told_.tip_m : s.stage.tip_m;
+      stage_told_ = s.stage;
+      stage_known_ = true;
+    }
+    stage_new_ = stage_silent_s_ < 0.5 * s.elapsed_s;
+    if (s.estop_status == hal::Status::ok) {
+      estop_silent_s_ = 0;
+      // A press that began in this stop with the contacts closed, and was held with them closed since.
+      if (s.estop.reset_pressed && !reset_ && !was_running_) {
+        reset_edge_ = true;
+      }
+      reset_edge_ = reset_edge_ && s.estop.reset_pressed && !open(s.estop) && !was_running_;
+      reset_ = s.estop.reset_pressed;
+    }
+    unseen_s_ = 1e-9 * static_cast<double>(s.now_ns - s.seen_ns);
+    blind_s_ = s.seen_ns > 0 && unseen_s_ > b_.stale_s + 2 * b_.nominal_s ? blind_s_ + dt : 0;
+  }
+
+  // ---- N ----
+  void numbers(const Seen& s, const TelemetrySample& t) {
+    if (s.hand_writes > 0) {
+      must(I::finite_writes, s.asked_N.allFinite());
+    }
+    if (s.commands > 0) {
+      must(I::finite_writes, s.command.tip_m.allFinite() && s.command.axis.allFinite() &&
+                                 std::abs(s.command.axis.norm() - 1) < 1e-6);
+    }
+    bool finite = std::isfinite(t.t_s);
+    for (const std::span<const double> part : {std::span<const double>(t.x_m),
+                                               {t.v_m_s},
+                                               {t.tip_m},
+                                               {t.cmd_m},
+                                               {t.force_N},
+                                               {t.effect_N},
+                                               {t.entry_m},
+                                               {t.axis},
+                                               {&t.wd_m, 6}}) {
+      for (const double x : part) {
+        finite = finite && std::isfinite(x);
+      }
+    }
+    for (const double x : {t.guard_N, t.obs_age_s, t.sensor_N, t.vacuum_Pa, t.stored_energy_J,
+                           t.injected_energy_J, t.obs_gap_m}) {
+      finite = finite && std::isfinite(x);
+    }
+    must(I::finite_telemetry, finite);
+  }
+
+  // ---- F, E ----
+  void force(const Seen& s, const TelemetrySample& t, bool running) {
+    const double f = s.asked_N.norm();
+    at_most(I::force_bounded, f, b_.c.limits.hand_force_N * (1 + 1e-9));
+    stop_clock_true_ = (running || stop_clock_true_) && s.clock_true;
+    stop_s_ = running ? 0 : stop_s_ + (was_running_ ? 0 : s.elapsed_s);
+    if (running && was_running_ && known_) {
+      at_most(I::force_slew, (s.asked_N - asked_N_).norm(),
+              b_.slew_N_s *
+                      (s.clock_true ? std::clamp(s.elapsed_s, b_.nominal_s, 2 * b_.nominal_s)
+                                    : 2 * b_.nominal_s) *
+                      (1 + 1e-9) +
+                  1e-9);
+    }
+    if (!running) {
+      if (stop_clock_true_ && stop_s_ >= b_.c.estop.hand_ramp_s - 0.5 * b_.nominal_s) {
+        at_most(I::force_gone_after_stop, f, 0);
+      }
+      if (known_) {
+        at_most(I::force_gone_after_stop, f, asked_N_.norm() + 1e-12);
+      }
+    }
+    if (running && !was_running_ && known_) {
+      at_most(I::force_returns_from_zero, f, 1e-9);
+    }
+    // Forces of the cell: none once vision has been silent for long enough, none of the axis outside.
+    const bool inside =
+        t.phase == Phase::puncture || t.phase == Phase::injection || t.phase == Phase::withdrawal;
+    const double ramp_s = std::min(s.elapsed_s, 0.02);  // one late tick moves no ramp by more
+    outside_s_ = inside ? 0 : outside_s_ + ramp_s;
+    faded_s_ = blind_s_ > 0 ? faded_s_ + ramp_s : 0;
+    if (b_.c.local_model && faded_s_ > b_.c.local_model->fade_s + b_.brake_s) {
+      at_most(I::fixtures_fade,
+              t.effect_N[effect_membrane] + t.effect_N[effect_cone] + t.effect_N[effect_axis], 1e-9);
+    }
+    if (b_.c.axis && outside_s_ > b_.c.axis->ramp_s + b_.brake_s) {
+      at_most(I::fixtures_fade, t.effect_N[effect_axis], 1e-9);
+    }
+    work_J_ += s.hand_work_J - b_.work_W * s.elapsed_s;
+    stored_J_ = std::clamp(t.stored_energy_J, 0.0, 0.02);
+    at_most(I::work_bounded, work_J_ - credit_J_, b_.work_J);
+    credit_J_ = std::min(credit_J_, work_J_ + stored_J_);
+  }
+  void settle_work() {
+    work_J_ = 0;
+    credit_J_ = stored_J_;
+  }
+
+  // ---- L ----
+  void latch(const Seen& s, const TelemetrySample& t, bool running) {
+    if (running && !was_running_ && known_) {
+      const bool may = stop_ == StopStage::stopped && s.estop_status == hal::Status::ok && !open(s.estop) &&
+                       (reset_edge_ || (fault_ == Fault::enabling_released && press_edge_)) &&
+                       fault_ != Fault::command_stop;
+      must(I::leaves_stop_by_reset, may);
+    }
+    if (running) {
+      must(I::first_cause_kept, t.fault == Fault::none);
+    } else if (!was_running_) {
+      must(I::first_cause_kept, t.fault == fault_);
+    } else {
+      must(I::first_cause_kept, t.fault != Fault::none);
+    }
+    if (s.estop_status == hal::Status::ok && open(s.estop)) {
+      must(I::stops_on_estop, !running && s.quick_stops > 0 && !s.gate);
+    }
+    const double two = 2 * b_.nominal_s + std::max(s.elapsed_s, last_elapsed_s_);
+    if (hand_known_ && hand_silent_s_ > b_.c.hand_timeout_s + two) {
+      must(I::stops_on_silence, !running, hand_silent_s_);
+    }
+    if (stage_known_ && stage_silent_s_ > b_.c.stage_timeout_s + two) {
+      must(I::stops_on_silence, !running, stage_silent_s_);
+    }
+    if (estop_silent_s_ > 0.05 + two) {
+      must(I::stops_on_silence, !running, estop_silent_s_);
+    }
+    commanded_ticks_ = s.stop_commanded || commanded_ticks_ > 0 ? commanded_ticks_ + 1 : 0;
+    if (commanded_ticks_ > 2) {
+      must(I::stops_on_command, !running);
+    }
+    // A quick stop on the tick of the stop or on the next.
+    if (running) {
+      since_stop_ = 0;
+      quick_stopped_ = false;
+    } else {
+      ++since_stop_;
+      quick_stopped_ = quick_stopped_ || s.quick_stops > 0;
+      if (since_stop_ >= 2) {
+        must(I::quick_stop_in_time, quick_stopped_);
+      }
+    }
+    // Drive power: gone at the limit, never while the needle still brakes.
+    if (!running && stop_clock_true_ && stop_s_ > b_.c.estop.power_off_after_s + two) {
+      must(I::power_off_in_time, !s.power);
+    }
+    if (!s.power && power_ && known_ && stop_clock_true_) {
+      must(I::power_off_in_time, !running && (stage_told_.at_standstill ||
+                                              stop_s_ >= b_.c.estop.power_off_after_s - 2 * b_.nominal_s));
+    }
+    if (s.power && !power_ && known_) {
+      must(I::power_off_in_time, running);
+    }
+  }
+
+  // ---- M ----
+  void motion(const Seen& s, const TelemetrySample& t, bool running) {
+    const Vec3 axis = -Vec3::UnitX();
+    const bool clutched = (buttons_ & hal::kButtonClutch) != 0 || (buttons_were_ & hal::kButtonClutch) != 0;
+    const Vec3 hand = world_from_hand(s.hand_true_m) / b_.c.mapping.position_scale;
+    const bool coupled = running && was_running_ && !clutched;
+    clutched_s_ = clutched ? clutched_s_ + s.elapsed_s : 0;
+    if (!running || clutched_s_ > b_.filter_s) {
+      settle_paths();
+    } else if (known_ && !clutched) {
+      hand_path_m_ += (hand - hand_m_).norm();
+      if (blind_s_ == 0) {
+        hand_inward_m_ += std::max(0.0, (hand - hand_m_).dot(axis));
+      }
+    }
+    // A false reading moves the needle by a little at most while it is brief; one that stays is a motion.
+    const double false_m = s.hand_false_m / b_.c.mapping.position_scale;
+    if (false_m != false_m_) {
+      false_for_s_ = 0;
+      false_paid_m_ = 0;
+    }
+    false_for_s_ += s.elapsed_s;
+    if (false_m != false_m_ || false_for_s_ > b_.brief_s) {
+      const double change_m = std::abs(false_m - (false_m != false_m_ ? false_m_ : 0.0));
+      const double due_m = false_for_s_ > b_.brief_s && false_m != 0 ? 2 * std::abs(false_m)
+                                                                     : std::min(change_m, b_.false_motion_m);
+      if (due_m > false_paid_m_) {
+        false_path_m_ += due_m - false_paid_m_;
+        false_paid_m_ = due_m;
+      }
+    }
+    if (s.commands == 0) {
+      way_known_ = sent_known_ = sent_known_ && coupled;
+    } else {
+      must(I::no_set_point_in_stop, running);
+      const Vec3& p = s.command.tip_m;
+      if (!sent_known_) {
+        if (stage_known_) {
+          // Hand and needle are coupled on this tick, or by the reset on the tick before.
+          at_most(I::begins_at_the_needle,
+                  std::min((p - stage_told_.tip_m).norm(), (p - stage_told_before_m_).norm()), 1e-6);
+        }
+        settle_paths();
+        way_known_ = false;
+      } else {
+        const Vec3 way = p - sent_m_;
+        const double length = way.norm();
+        path_m_ += length;
+        inward_m_ += std::max(0.0, way.dot(axis));
+        const double extra = false_path_m_ + b_.path_slack_m;
+        at_most(I::moves_with_the_hand, path_m_ - b_.overshoot * hand_path_m_, extra);
+        // A filter that overshoots on the way out comes back in by a part of that way.
+        at_most(I::deeper_by_the_hand, inward_m_ - hand_inward_m_ - (b_.overshoot - 1) * hand_path_m_, extra);
+        at_most(I::speed_bounded, length, b_.c.limits.stage_velocity_m_s * 2 * b_.nominal_s * (1 + 1e-6));
+        regular_ =
+            s.clock_true && std::abs(s.elapsed_s - b_.nominal_s) < 0.01 * b_.nominal_s ? regular_ + 1 : 0;
+        if (way_known_ && regular_ >= 2) {
+          const double gain = (length - way_m_.norm()) / b_.nominal_s / b_.nominal_s;
+          at_most(I::acceleration_bounded, gain, b_.c.limits.stage_acceleration_m_s2 * 1.02 + 1e-6);
+          // A position limit may stop the needle at once: nothing is left of its way across that limit.
+          const double most = b_.c.limits.stage_acceleration_m_s2 * 1.02;
+          Vec3 a = (way - way_m_) / b_.nominal_s / b_.nominal_s;
+          bool held = std::abs(way.dot(a)) <= 0.01 * std::abs(way_m_.dot(a));
+          // A curved limit takes it along a direction that only its alarm tells.
+          held = held || (t.alarms & (alarm_depth_limited | alarm_tip_force)) != 0;
+          for (int i = 0; i < 3; ++i) {
+            held = held || (std::abs(way[i]) <= 1e-12 && std::abs(way_m_[i]) > 1e-12);
+          }
+          if (held) {
+            a.setConstant(std::numeric_limits<double>::infinity());
+          }
+          if (regular_ >= 3 && a.norm() < most && a_m_s2_.norm() < most && length > 0 && way_m_.norm() > 0) {
+            at_most(I::jerk_bounded, (a - a_m_s2_).norm() / b_.nominal_s, b_.jerk_m_s3 * 1.1);
+          }
+          a_m_s2_ = a;
+        } else {
+          a_m_s2_.setConstant(std::numeric_limits<double>::infinity());
+        }
+        // All of it together: what is left of braking is less than a tenth of a micrometre.
+        blind_way_m_ = blind_s_ > b_.brake_s
+                           ? blind_way_m_ + std::max(0.0, way.dot(axis)) + (way - way.dot(axis) * axis).norm()
+                           : 0;
+        at_most(I::blind_only_outwards, blind_way_m_, 0.1e-6);
+        if (stage_known_ && !stage_told_.enabled && unpowered_ticks_ >= 2) {
+          at_most(I::no_motion_unpowered, length, 1e-9);
+        }
+        // Inside the travel, or no further outside.
+        for (int i = 0; i < 3; ++i) {
+          const double low = std::min(b_.c.mapping.workspace_min_m[i], sent_m_[i]);
+          const double high = std::max(b_.c.mapping.workspace_max_m[i], sent_m_[i]);
+          at_most(I::inside_workspace, std::max(p[i] - high, low - p[i]), 1e-9);
+        }
+        way_m_ = way;
+        way_known_ = true;
+      }
+      sent_m_ = p;
+      sent_known_ = true;
+    }
+    unpowered_ticks_ = stage_known_ && !stage_told_.enabled ? unpowered_ticks_ + 1 : 0;
+    hand_m_ = hand;
+    false_m_ = false_m;
+
+    // Depth by the needle's true place, from where the core first said contact. The needle has to come out
+    // before another contact counts as first.
+    if (t.phase == Phase::contact && phase_ != Phase::contact && !touched_) {
+      touched_ = true;
+      first_contact_m_ = s.tip_true_m;
+    }
+    const double depth = touched_ ? (s.tip_true_m - first_contact_m_).dot(axis) : 0;
+    if (touched_ && (depth < -1e-6 || t.cell != cell_)) {
+      touched_ = false;
+    }
+    if (touched_ && s.stage_true) {
+      at_most(I::depth_bounded, depth, b_.c.limits.penetration_depth_m + b_.vision_sum_m + b_.truth_m);
+    }
+    const bool inside =
+        t.phase == Phase::puncture || t.phase == Phase::injection || t.phase == Phase::withdrawal;
+    if (inside && !inside_) {
+      entered_m_ = s.tip_true_m;
+    }
+    if (inside && s.stage_true) {
+      const Vec3 off = s.tip_true_m - entered_m_;
+      at_most(I::lateral_bounded, (off - off.dot(axis) * axis).norm(), b_.lateral_m);
+    }
+    inside_ = inside;
+  }
+  void settle_paths() { path_m_ = inward_m_ = hand_path_m_ = hand_inward_m_ = false_path_m_ = 0; }
+
+  // ---- vision's corrections ----
+  void vision(const Seen& s, const TelemetrySample& t) {
+    const bool in = t.phase != Phase::free && t.phase != Phase::clear;
+    const Vec3 entry(t.entry_m[0], t.entry_m[1], t.entry_m[2]);
+    if (in && entry_known_ && t.cell == cell_ && b_.c.local_model) {
+      const double dt = s.clock_true ? std::min(s.elapsed_s, 0.02) : 0.02;
+      at_most(I::vision_rate, (entry - entry_m_).norm(),
+              2 * b_.c.local_model->max_rate_m_s * std::max(dt, b_.nominal_s) * 1.01 + 1e-9);
+      at_most(I::vision_sum, (entry - first_entry_m_).norm(), b_.vision_sum_m);
+    }
+    if (!in || !entry_known_) {
+      first_entry_m_ = entry;
+    }
+    entry_known_ = in;
+    entry_m_ = entry;
+  }
+
+  // ---- G ----
+  void gate(const Seen& s, const TelemetrySample& t, bool running) {
+    const bool pressed = (buttons_ & hal::kButtonInject) != 0;
+    const bool was_pressed = (buttons_were_ & hal::kButtonInject) != 0;
+    const bool within = t.phase == Phase::puncture || t.phase == Phase::injection;
+    const bool was_within = phase_ == Phase::puncture || phase_ == Phase::injection;
+    if (pressed && !was_pressed) {
+      own_press_ = within && was_within;
+      openings_ = 0;
+    }
+    if (!pressed || !within) {
+      own_press_ = false;
+    }
+    if (t.cell != cell_ || (known_ && t.phase == Phase::free)) {
+      open_in_cell_s_ = 0;
+    }
+    if (s.gate) {
+      must(I::gate_in_phase, t.phase == Phase::injection);
+      must(I::gate_shut_in_stop, running);
+      if (s.seen_ns > 0) {
+        must(I::gate_seen, unseen_s_ <= b_.stale_s + 2 * b_.nominal_s + 1e-9, unseen_s_);
+      }
+      if (!gate_) {
+        must(I::gate_own_press, own_press_);
+        ++openings_;
+        at_most(I::gate_one_opening, openings_, 1);
+        open_s_ = b_.nominal_s;
+      } else {
+        open_s_ += s.elapsed_s;
+      }
+      open_in_cell_s_ += s.elapsed_s;
+      if (b_.c.injector) {
+        at_most(I::gate_time, open_in_cell_s_,
+                b_.c.injector->max_open_s + std::max(s.elapsed_s, b_.nominal_s) + 1e-9);
+      }
+    } else if (gate_ && open_s_ < b_.shortest_opening_s - 0.5 * b_.nominal_s) {
+      const bool cause =
+          !s.clock_true || !running || t.phase != Phase::injection || s.ending ||
+          (t.alarms & alarm_vision_stale) != 0 ||
+          (b_.c.injector && open_in_cell_s_ + s.elapsed_s + b_.nominal_s >= b_.c.injector->max_open_s);
+      must(I::gate_not_cut_short, cause, open_s_);
+    }
+  }
+
+  // ---- H ----
+  void relay(const Seen& s, const TelemetrySample& t, bool running) {
+    const bool toggled = known_ && s.level != level_;
+    if (toggled) {
+      const double stop_takes_s = b_.c.estop.power_off_after_s + b_.relay_s;
+      at_most(I::relay_inputs_fresh, stage_known_ ? stage_silent_s_ - b_.c.stage_timeout_s : 0, stop_takes_s);
+      at_most(I::relay_inputs_fresh, estop_silent_s_ - 0.05, stop_takes_s);
+      at_most(I::relay_stage_obeys, disobeys_s_, b_.relay_s + 0.1);
+      must(I::relay_off_when_distrusted, !(t.stop == StopStage::stopped && stop_ == StopStage::stopped &&
+                                           asks_for(t.fault, SafetyAction::heartbeat_off)));
+    }
+    // The needle moves, or has power, although it was stopped and its power was taken.
+    const bool disobeys = t.stop == StopStage::stopped && stop_ == StopStage::stopped &&
+                          (s.stage_moves || (stage_new_ && stage_told_.enabled));
+    disobeys_s_ = disobeys ? disobeys_s_ + s.elapsed_s : 0;
+    still_ticks_ = toggled || !running ? 0 : still_ticks_ + 1;
+    at_most(I::relay_alive, still_ticks_, 10);
+  }
+
+  // ---- P ----
+  void phase(const Seen& s, const TelemetrySample& t) {
+    const int p = static_cast<int>(phase_);
+    const int n = static_cast<int>(t.phase);
+    if (known_ && n != p) {
+      const bool forth = n == p + 1 || (phase_ == Phase::contact && t.phase == Phase::puncture) ||
+                         (phase_ == Phase::puncture && t.phase == Phase::withdrawal) ||
+                         (phase_ == Phase::clear && t.phase == Phase::free);
+      const bool back = (phase_ == Phase::contact || phase_ == Phase::indentation) && n < p;
+      must(I::phase_order, forth || back, p + 0.1 * n);
+    }
+    if (s.finished) {
+      must(I::over_at_rest, s.asked_N.norm() == 0 && !s.gate);
+    }
+    if (t.phase == Phase::free || t.phase == Phase::clear) {
+      punctured_frames_ = 0;
+    }
+    punctured_frames_ += s.punctured_frames;
+    if (known_ && t.phase == Phase::puncture && phase_ != Phase::puncture) {
+      at_most(I::puncture_confirmed, b_.punctured_frames - punctured_frames_, 0);
+    }
+  }
+
+  void remember(const Seen& s, const TelemetrySample& t, bool running) {
+    known_ = true;
+    last_elapsed_s_ = s.elapsed_s;
+    was_running_ = running;
+    stop_ = t.stop;
+    fault_ = t.fault;
+    phase_ = t.phase;
+    cell_ = t.cell;
+    asked_N_ = s.asked_N;
+    gate_ = s.gate;
+    power_ = s.power;
+    level_ = s.level;
+  }
+
+  Bounds b_;
+  int tick_ = 0;
+  std::array<Broken, kInvariants> broken_{};
+  std::size_t broken_count_ = 0;
+  std::array<bool, kInvariants> was_broken_{};
+  std::array<double, kInvariants> largest_{};
+
+  // The last tick.
+  bool known_ = false, was_running_ = true;
+  StopStage stop_ = StopStage::running;
+  Fault fault_ = Fault::none;
+  Phase phase_ = Phase::free;
+  std::uint32_t cell_ = 0;
+  Vec3 asked_N_ = Vec3::Zero();
+  bool gate_ = false, power_ = false, level_ = false;
+  double last_elapsed_s_ = 0;
+
+  // What was told.
+  bool hand_known_ = false, stage_known_ = false, stage_new_ = false;
+  std::int64_t hand_sample_ns_ = -1, stage_sample_ns_ = -1;
+  double hand_silent_s_ = 0, stage_silent_s_ = 0, estop_silent_s_ = 0;
+  std::uint32_t buttons_ = 0, buttons_were_ = 0;
+  hal::StageState stage_told_;
+  Vec3 stage_told_before_m_ = Vec3::Zero();
+  bool reset_ = true, reset_edge_ = false;
+  bool press_edge_ = false;  // of the enabling device, in this stop
+  double unseen_s_ = 0, blind_s_ = 0;
+
+  double stop_s_ = 0, work_J_ = 0, credit_J_ = 0, stored_J_ = 0;
+  bool stop_clock_true_ = true;
+  double outside_s_ = 0, faded_s_ = 0;
+  int commanded_ticks_ = 0, since_stop_ = 0;
+  bool quick_stopped_ = false;
+
+  double path_m_ = 0, inward_m_ = 0, hand_path_m_ = 0, hand_inward_m_ = 0;
+  double clutched_s_ = 0;
+  double false_path_m_ = 0, false_m_ = 0, false_for_s_ = 0, false_paid_m_ = 0;
+  Vec3 hand_m_ = Vec3::Zero(), sent_m_ = Vec3::Zero(), way_m_ = Vec3::Zero();
+  bool sent_known_ = false, way_known_ = false;
+  int regular_ = 0, unpowered_ticks_ = 0;
+  double blind_way_m_ = 0;
+  Vec3 a_m_s2_ = Vec3::Zero();
+  bool touched_ = false, inside_ = false;
+  Vec3 first_contact_m_ = Vec3::Zero(), entered_m_ = Vec3::Zero();
+
+  bool entry_known_ = false;
+  Vec3 entry_m_ = Vec3::Zero(), first_entry_m_ = Vec3::Zero();
+
+  bool own_press_ = false;
+  int openings_ = 0;
+  double open_s_ = 0, open_in_cell_s_ = 0;
+  double disobeys_s_ = 0;
+  int still_ticks_ = 0;
+  int punctured_frames_ = 0;
+};
+
+}  // namespace punctum::rt::test

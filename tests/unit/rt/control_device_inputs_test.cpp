@@ -1,0 +1,466 @@
+// What the devices say, and how it is judged.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+
+#include "rt/control/device_inputs.hpp"
+#include "rt/station/alarm.hpp"
+#include "tests/support/fake_devices.hpp"
+
+namespace punctum::rt {
+namespace {
+
+using namespace test;
+
+struct Inputs {
+  explicit Inputs(const ServoConfig& with = all_devices())
+      : config(with), inputs(config, {hand, &stage, &estop, &injector, &vacuum, &sensor}) {
+    stage.on = true;
+  }
+  static ServoConfig all_devices() {
+    ServoConfig config;
+    config.injector.emplace();
+    config.vacuum.emplace();
+    config.force_sensor = true;
+    return config;
+  }
+  const Readings& read(double elapsed_s = 1e-3) {
+    now_ns += std::llround(1e9 * elapsed_s);
+    hand.now_ns = stage.now_ns = estop.now_ns = injector.now_ns = vacuum.now_ns = sensor.now_ns = now_ns;
+    return inputs.read({.now_ns = now_ns, .elapsed_s = elapsed_s, .dt_s = elapsed_s}, last);
+  }
+  void settle() {
+    for (int k = 0; k < 100; ++k) {
+      (void)read();
+    }
+  }
+
+  ServoConfig config;
+  FakeHand hand;
+  FakeStage stage{Vec3(60e-6, 2e-6, 0)};
+  FakeEstop estop;
+  FakeInjector injector;
+  FakeVacuum vacuum;
+  FakeSensor sensor;
+  LastOutput last;
+  std::int64_t now_ns = 5'000'000'000;
+  DeviceInputs inputs;
+};
+
+TEST(DeviceInputs, passes_good_values_on_without_fault_or_alarm) {
+  Inputs in;
+  in.sensor.force = 3e-6;
+  in.hand.buttons = hal::kButtonInject;
+  in.settle();
+  const Readings& r = in.inputs.readings();
+  EXPECT_EQ(r.estop_fault, Fault::none);
+  EXPECT_EQ(r.device_fault, Fault::none);
+  EXPECT_EQ(r.alarms, 0U);
+  EXPECT_TRUE(r.hand_fresh && r.stage_fresh && r.estop_readable && r.sensor_fresh);
+  EXPECT_TRUE(r.button(hal::kButtonInject));
+  EXPECT_EQ(r.stage.tip_m, in.stage.tip + in.stage.registration);
+  EXPECT_EQ(r.sensor_filtered_N, 3e-6);
+  EXPECT_NEAR(r.vacuum_Pa, 600, 0.1 + 1e-9);
+}
+
+TEST(DeviceInputs, keeps_the_last_good_value_of_a_silent_device_until_its_time_is_over) {
+  Inputs in;
+  in.hand.x = Vec3(0.03, 0, 0);
+  in.settle();
+  in.hand.status = in.stage.status = Status::no_data;
+  for (int k = 0; k < 19; ++k) {
+    const Readings& r = in.read();
+    EXPECT_EQ(r.device_fault, Fault::none) << k;
+    EXPECT_FALSE(r.hand_fresh || r.stage_fresh);
+    EXPECT_NEAR(r.hand.position_m.x(), 0.03, 1e-15);
+    EXPECT_EQ(r.alarms, alarm_sensor);
+  }
+  (void)in.read();
+  EXPECT_EQ(in.read().device_fault, Fault::hand_lost);  // the limit of both is 20 ms
+  in.hand.status = Status::ok;
+  EXPECT_EQ(in.read().device_fault, Fault::stage_lost);
+  EXPECT_NEAR(in.read().between_hand_s, 1e-3, 1e-12);
+}
+
+TEST(DeviceInputs, takes_each_sample_of_a_slow_hand_once_and_measures_time_by_the_samples) {
+  Inputs in;
+  in.settle();
+  in.hand.sample_every_ns = 4'000'000;
+  int fresh = 0;
+  for (int k = 1; k <= 400; ++k) {
+    in.hand.x.x() = 1e-5 * k;
+    const Readings& r = in.read();
+    EXPECT_EQ(r.alarms, 0U);
+    EXPECT_EQ(r.device_fault, Fault::none);
+    EXPECT_EQ(r.hand_fresh, k % 4 == 0) << k;
+    EXPECT_NEAR(r.hand_age_s, 1e-3 * (k % 4), 1e-12);
+    if (r.hand_fresh) {
+      ++fresh;
+      EXPECT_NEAR(r.between_hand_s, 4e-3, 1e-12);
+    }
+  }
+  EXPECT_EQ(fresh, 100);
+}
+
+TEST(DeviceInputs, calls_devices_lost_that_repeat_their_newest_sample_for_longer_than_their_limit) {
+  for (const bool hand : {true, false}) {
+    Inputs in;
+    in.settle();
+    (hand ? in.hand.sample_every_ns = 1'000'000'000 : in.stage.repeats = true);
+    for (int k = 0; k < 20; ++k) {
+      EXPECT_EQ(in.read().device_fault, Fault::none) << k;
+      EXPECT_EQ(in.inputs.readings().alarms, 0U);
+      EXPECT_NE(hand ? in.inputs.readings().hand_fresh : in.inputs.readings().stage_fresh, true);
+    }
+    EXPECT_EQ(in.read().device_fault, hand ? Fault::hand_lost : Fault::stage_lost);
+    EXPECT_EQ(in.inputs.readings().alarms, alarm_sensor);
+    // With the next sample all is well.
+    in.hand.sample_every_ns = 0;
+    in.stage.repeats = false;
+    EXPECT_EQ(in.read().device_fault, Fault::none);
+  }
+}
+
+TEST(DeviceInputs, does_not_believe_sample_times_ahead_of_the_clock_going_back_or_standing_still) {
+  struct Case {
+    std::int64_t first_ahead_ns, then_ahead_ns, step_ns;
+    bool trusted;
+  };
+  for (const Case& c :
+       {Case{0, 500'000, 0, true}, Case{0, 2'000'000, 0, false}, Case{0, std::int64_t{1} << 60, 0, false},
+        Case{0, -2'000'000, 0, false}, Case{0, -std::int64_t{1} << 60, 0, false},
+        Case{0, 0, -1'000'000, false}, Case{0, 0, -900'000, true}}) {
+    Inputs in;
+    in.hand.ahead_ns = c.first_ahead_ns;
+    in.settle();
+    in.hand.ahead_ns = c.then_ahead_ns;
+    in.hand.x.x() = 0.1e-3;
+    in.hand.ahead_ns += c.step_ns;
+    const Readings& r = in.read();
+    EXPECT_EQ(r.hand_fresh, c.trusted);
+    EXPECT_EQ(r.alarms, c.trusted ? 0U : alarm_sensor);
+    EXPECT_EQ(r.hand.position_m.x() > 0, c.trusted);
+    EXPECT_EQ(r.device_fault, Fault::none);
+  }
+}
+
+TEST(DeviceInputs, finds_a_device_whose_sample_times_never_move_and_takes_it_back_when_they_do) {
+  Inputs in;
+  for (int k = 0; k < 100; ++k) {
+    in.hand.ahead_ns = -1'000'000 * k;  // always the same time
+    in.hand.x.x() = 1e-5 * k;
+    const Readings& r = in.read();
+    EXPECT_EQ(r.device_fault, k <= 20 ? Fault::none : Fault::hand_lost) << k;
+  }
+  in.hand.ahead_ns = 0;
+  for (int k = 0; k < 30; ++k) {
+    (void)in.read();
+  }
+  EXPECT_EQ(in.inputs.readings().device_fault, Fault::none);
+  EXPECT_TRUE(in.inputs.readings().hand_fresh);
+}
+
+TEST(DeviceInputs, ignores_one_sample_of_the_hand_that_cannot_be_true_and_refuses_several) {
+  for (const double jump_m : {5e-3, -19e-3, 0.3, 1e9, 1.7e308, std::nan("")}) {
+    Inputs in;
+    in.settle();
+    in.hand.jump_m = jump_m;
+    const Readings& r = in.read();
+    EXPECT_EQ(r.device_fault, Fault::none) << jump_m;
+    EXPECT_EQ(r.alarms, alarm_sensor);
+    EXPECT_EQ(r.hand.position_m.x(), 0);
+    EXPECT_FALSE(r.hand_fresh);
+    EXPECT_GT(r.hand_age_s, 0);
+    in.hand.jump_m = 0;
+    (void)in.read();
+    EXPECT_EQ(r.device_fault, Fault::none) << jump_m;
+    EXPECT_EQ(r.alarms, 0U);
+    EXPECT_TRUE(r.hand_fresh);
+    EXPECT_NEAR(r.between_hand_s, 2e-3, 1e-12);
+    // Every second sample is too many.
+    Fault fault = Fault::none;
+    for (int k = 0; k < 20 && fault == Fault::none; ++k) {
+      in.hand.jump_m = k % 2 == 0 ? jump_m : 0;
+      fault = in.read().device_fault;
+      EXPECT_EQ(r.hand.position_m.x(), 0);
+    }
+    EXPECT_EQ(fault, Fault::hand_invalid) << jump_m;
+  }
+}
+
+TEST(DeviceInputs, takes_no_button_of_a_sample_that_cannot_be_true) {
+  for (const bool pressed : {false, true}) {
+    Inputs in;
+    in.hand.buttons = pressed ? hal::kButtonInject : 0;
+    in.settle();
+    in.hand.jump_m = 0.03;
+    in.hand.buttons = pressed ? 0 : hal::kButtonInject;
+    EXPECT_EQ(in.read().button(hal::kButtonInject), pressed);
+    in.hand.jump_m = 0;
+    EXPECT_EQ(in.read().button(hal::kButtonInject), !pressed);
+  }
+}
+
+TEST(DeviceInputs, releases_the_buttons_of_an_invalid_hand_until_they_are_pressed_anew) {
+  Inputs in;
+  in.hand.buttons = hal::kButtonInject | hal::kButtonNextCell | hal::kButtonClutch;
+  in.settle();
+  EXPECT_TRUE(in.inputs.readings().button(hal::kButtonInject));
+  in.hand.jump_m = std::nan("");
+  for (int k = 0; k < 5; ++k) {
+    (void)in.read();
+  }
+  EXPECT_EQ(in.inputs.readings().device_fault, Fault::hand_invalid);
+  EXPECT_EQ(in.inputs.readings().hand.buttons, 0U);
+  in.hand.jump_m = 0;
+  in.settle();
+  EXPECT_EQ(in.inputs.readings().hand.buttons, hal::kButtonClutch);  // the clutch only holds the needle
+  in.hand.buttons = 0;
+  (void)in.read();
+  in.hand.buttons = hal::kButtonInject;
+  EXPECT_TRUE(in.read().button(hal::kButtonInject));
+}
+
+TEST(DeviceInputs, refuses_an_orientation_that_is_none_or_turns_faster_than_a_hand) {
+  Inputs in;
+  in.settle();
+  in.hand.turn_rad = 1;
+  EXPECT_EQ(in.read().alarms, alarm_sensor);
+  EXPECT_EQ(in.inputs.readings().hand.orientation.w(), 1);
+  in.hand.turn_rad = 0.02;
+  EXPECT_EQ(in.read().alarms, 0U);
+  EXPECT_NEAR(in.inputs.readings().hand.orientation.norm(), 1, 1e-15);
+  for (const double length : {0.0, 1e-300, 0.9, 1.1, 1e160, 1e308}) {
+    Inputs other;
+    other.settle();
+    other.hand.length = length;
+    EXPECT_EQ(other.read().alarms, alarm_sensor) << length;
+  }
+  in.hand.length = 1 + 1e-4;
+  EXPECT_EQ(in.read().alarms, 0U);
+  EXPECT_NEAR(in.inputs.readings().hand.orientation.norm(), 1, 1e-15);
+}
+
+TEST(DeviceInputs, follows_the_fastest_hand_at_every_rate_of_samples) {
+  for (const double rate_Hz : {1000.0, 8000.0}) {
+    for (const std::int64_t every_ns : {0, 1'000'000, 5'000'000}) {
+      Inputs in;
+      in.settle();
+      // 5 m/s over 0.4 m and back, sped up and braked at 250 m/s^2.
+      const double T = 0.4 / 5 + 5.0 / 250;
+      for (double t = 0; t < 2 * T; t += 1 / rate_Hz) {
+        const double u = t < T ? t : 2 * T - t;
+        const double x = u < 0.02       ? 125 * u * u
+                         : u > T - 0.02 ? 0.4 - 125 * (T - u) * (T - u)
+                                        : 0.05 + 5 * (u - 0.02);
+        in.hand.x.x() = x;
+        in.hand.sample_every_ns = every_ns;
+        EXPECT_EQ(in.read(1 / rate_Hz).alarms, 0U) << rate_Hz << ' ' << every_ns << ' ' << t;
+      }
+    }
+  }
+}
+
+TEST(DeviceInputs, refuses_readings_of_the_stage_that_no_stage_gives) {
+  const double nan = std::nan("");
+  for (const double absurd : {1e308, 1e160, -1e200, 2.0, nan}) {
+    Inputs in;
+    in.settle();
+    const Vec3 tip = in.inputs.readings().stage.tip_m;
+    in.stage.tip.y() = absurd;
+    EXPECT_EQ(in.read().device_fault, Fault::stage_fault) << absurd;
+    EXPECT_EQ(in.inputs.readings().stage.tip_m, tip);
+    in.stage.tip.y() = 2e-6;
+    in.stage.extra_error_m = absurd;
+    const Fault fault = in.read().device_fault;
+    EXPECT_TRUE(fault == Fault::stage_fault || fault == Fault::stage_following) << absurd;
+    in.stage.extra_error_m = 0;
+    in.stage.axis = Vec3(absurd, 0, 0);
+    EXPECT_EQ(in.read().device_fault, Fault::stage_fault) << absurd;
+  }
+  Inputs in;
+  in.settle();
+  in.stage.axis = Vec3(-1.0004, 0, 0);
+  EXPECT_EQ(in.read().device_fault, Fault::none);
+  EXPECT_NEAR(in.inputs.readings().stage.axis.norm(), 1, 1e-15);
+}
+
+TEST(DeviceInputs, keeps_watching_the_tip_force_after_one_absurd_sample) {
+  for (const double absurd : {1.7e308, -1.7e308, 1e-310, 1e200, -0.5, 0.5}) {
+    Inputs in;
+    in.sensor.force = 10e-6;
+    in.settle();
+    in.sensor.force = absurd;
+    const Readings& r = in.read();
+    EXPECT_LT(r.sensor_filtered_N, in.config.limits.tip_force_hard_N) << absurd;  // one sample stops nothing
+    in.sensor.force = 500e-6;
+    for (int k = 0; k < 20; ++k) {
+      (void)in.read();
+    }
+    EXPECT_GT(r.sensor_filtered_N, in.config.limits.tip_force_hard_N) << absurd;
+    EXPECT_TRUE(r.sensor_fresh);
+    EXPECT_TRUE(std::isfinite(r.sensor_N));
+  }
+}
+
+TEST(DeviceInputs, takes_no_pressure_that_no_pump_makes_for_a_vacuum) {
+  for (const double absurd : {1e6, 1e308, -1e308}) {
+    Inputs in;
+    in.settle();
+    in.vacuum.pressure = absurd;
+    Fault fault = Fault::none;
+    for (int k = 0; k < 110; ++k) {
+      fault = in.read().device_fault;
+      EXPECT_EQ(in.inputs.readings().alarms, alarm_sensor);
+    }
+    EXPECT_EQ(fault, Fault::vacuum_lost) << absurd;
+    EXPECT_NEAR(in.inputs.readings().vacuum_Pa, 600, 1);
+  }
+}
+
+TEST(DeviceInputs, is_not_deceived_about_a_lost_vacuum_by_single_good_samples) {
+  Inputs in;
+  in.settle();
+  Fault fault = Fault::none;
+  for (int k = 0; k < 400 && fault == Fault::none; ++k) {
+    in.vacuum.pressure = k % 20 == 0 ? 600 : 100;
+    fault = in.read().device_fault;
+  }
+  EXPECT_EQ(fault, Fault::vacuum_lost);
+  // And it comes back within the window.
+  in.vacuum.pressure = 600;
+  for (int k = 0; k < 110; ++k) {
+    fault = in.read().device_fault;
+  }
+  EXPECT_EQ(fault, Fault::none);
+}
+
+TEST(DeviceInputs, takes_a_reset_only_from_a_button_that_is_held_for_as_long_as_a_finger_does) {
+  Inputs in;
+  in.settle();
+  for (int k = 0; k < 100; ++k) {  // a line that picks up interference
+    in.estop.state.reset_pressed = k % 3 != 0;
+    EXPECT_FALSE(in.read().estop.reset_pressed);
+  }
+  in.estop.state.reset_pressed = true;
+  for (int k = 0; k < 25; ++k) {
+    (void)in.read();
+  }
+  EXPECT_TRUE(in.inputs.readings().estop.reset_pressed);
+}
+
+TEST(DeviceInputs, finds_a_contact_that_chatters_while_the_other_never_opens) {
+  Inputs in;
+  in.settle();
+  for (int k = 0; k < 200; ++k) {
+    in.estop.state.contact_a_closed = k % 3 != 0;
+    const Fault fault = in.read().estop_fault;
+    if (!in.estop.state.contact_a_closed) {
+      EXPECT_EQ(fault, Fault::estop);
+    }
+  }
+  in.estop.state.contact_a_closed = true;
+  EXPECT_EQ(in.read().estop_fault, Fault::estop_discrepancy);
+}
+
+TEST(DeviceInputs, tells_an_open_contact_and_whether_the_two_had_disagreed_before) {
+  Inputs in;
+  in.estop.state.contact_a_closed = false;
+  for (int k = 0; k < 49; ++k) {
+    EXPECT_EQ(in.read().estop_fault, Fault::estop);
+    EXPECT_FALSE(in.inputs.readings().estop_discrepancy);
+  }
+  for (int k = 0; k < 3; ++k) {
+    (void)in.read();
+  }
+  EXPECT_TRUE(in.inputs.readings().estop_discrepancy);
+  in.estop.state.contact_a_closed = true;
+  EXPECT_EQ(in.read().estop_fault, Fault::estop_discrepancy);  // the other one never opened
+  in.estop.state.contact_a_closed = in.estop.state.contact_b_closed = false;
+  EXPECT_EQ(in.read().estop_fault, Fault::estop);
+  in.estop.state.contact_a_closed = in.estop.state.contact_b_closed = true;
+  EXPECT_EQ(in.read().estop_fault, Fault::none);
+}
+
+TEST(DeviceInputs, without_an_estop_chain_there_is_nothing_readable_and_nothing_wrong) {
+  FakeHand hand;
+  DeviceInputs inputs(ServoConfig{}, {hand});
+  const Readings& r = inputs.read({.elapsed_s = 1e-3, .dt_s = 1e-3}, LastOutput{});
+  EXPECT_FALSE(r.has_estop || r.estop_readable || r.has_stage);
+  EXPECT_TRUE(r.needle_known() && r.stage_ready() && r.at_standstill());
+  EXPECT_EQ(r.estop_fault, Fault::none);
+}
+
+TEST(DeviceInputs, compares_the_stage_with_the_set_points_that_were_sent) {
+  for (const bool same_place : {true, false}) {
+    Inputs in;
+    (void)in.read();
+    in.last.stage_commanded = true;
+    in.last.set_point_m = in.stage.tip + in.stage.registration;
+    if (!same_place) {
+      in.last.set_point_m.x() += 11e-6;
+    }
+    EXPECT_EQ(in.read().device_fault, same_place ? Fault::none : Fault::stage_following);
+    // From where the path begins anew nothing was sent yet.
+    in.last.stage_commanded = false;
+    in.last.uncoupled = true;
+    EXPECT_EQ(in.read().device_fault, Fault::none);
+  }
+}
+
+TEST(DeviceInputs, calls_power_that_went_away_unasked_a_fault_unless_a_stop_took_it) {
+  for (const bool running : {true, false}) {
+    Inputs in;
+    (void)in.read();
+    in.stage.on = false;
+    in.last.running = running;
+    EXPECT_EQ(in.read().device_fault, running ? Fault::stage_fault : Fault::none);
+  }
+}
+
+TEST(DeviceInputs, bears_a_low_vacuum_for_its_window_and_between_cells) {
+  Inputs in;
+  in.vacuum.pressure = 100;
+  Fault fault = Fault::none;
+  int ticks = 0;
+  while (fault == Fault::none && ticks < 200) {
+    fault = in.read().device_fault;
+    ++ticks;
+  }
+  EXPECT_EQ(fault, Fault::vacuum_lost);
+  EXPECT_NEAR(ticks, 101, 1);
+  in.last.between_cells = true;
+  EXPECT_EQ(in.read().device_fault, Fault::none);
+}
+
+TEST(DeviceInputs, counts_an_injection_only_while_gate_and_injector_are_both_open) {
+  Inputs in;
+  in.last.gate_open = true;
+  EXPECT_FALSE(in.read().injected);  // a valve that does not follow
+  in.injector.open = true;
+  EXPECT_TRUE(in.read().injected);
+  in.last.gate_open = false;
+  EXPECT_FALSE(in.read().injected);
+  Fault fault = Fault::none;
+  for (int k = 0; k < 260; ++k) {
+    fault = in.read().device_fault;
+  }
+  EXPECT_EQ(fault, Fault::injector_open);
+}
+
+TEST(DeviceInputs, forgets_a_force_sensor_that_gives_no_number_for_longer_than_its_limit) {
+  Inputs in;
+  in.sensor.force = 5e-6;
+  (void)in.read();
+  in.sensor.force = std::nan("");
+  EXPECT_TRUE(in.read().sensor_fresh);
+  EXPECT_EQ(in.inputs.readings().sensor_N, 5e-6);
+  for (int k = 0; k < 100; ++k) {
+    (void)in.read();
+  }
+  EXPECT_FALSE(in.inputs.readings().sensor_fresh);
+}
+
+}  // namespace
+}  // namespace punctum::rt

@@ -1,0 +1,80 @@
+// Hold to run: which press counts, and what a release does.
+#include <gtest/gtest.h>
+
+#include "rt/control/enabling_device.hpp"
+
+namespace punctum::rt {
+namespace {
+
+using hal::kButtonEnable;
+using hal::kButtonPanic;
+
+struct Held {
+  Fault tick(std::uint32_t buttons, bool running = true) {
+    device.read(buttons);
+    return device.step(running, 1e-3);
+  }
+  Fault ticks(std::uint32_t buttons, int n) {
+    Fault fault = Fault::none;
+    for (int k = 0; k < n; ++k) {
+      fault = first_of(fault, tick(buttons));
+    }
+    return fault;
+  }
+  EnablingDevice device{0.02};
+};
+
+TEST(EnablingDevice, takes_a_new_press_alone_for_an_act) {
+  Held h;
+  EXPECT_EQ(h.ticks(kButtonEnable, 1000), Fault::none);
+  EXPECT_FALSE(h.device.enabled());  // held from the start
+  EXPECT_EQ(h.ticks(0, 1), Fault::none);
+  EXPECT_FALSE(h.device.enabled());
+  EXPECT_EQ(h.tick(kButtonEnable), Fault::none);
+  EXPECT_TRUE(h.device.enabled());
+  EXPECT_TRUE(h.device.pressed_anew());
+  EXPECT_EQ(h.tick(kButtonEnable), Fault::none);
+  EXPECT_FALSE(h.device.pressed_anew());
+  EXPECT_EQ(h.ticks(kButtonEnable, 1000), Fault::none);
+  EXPECT_TRUE(h.device.enabled());
+}
+
+TEST(EnablingDevice, forgives_a_bounce_and_no_more) {
+  Held h;
+  h.ticks(0, 5);
+  h.ticks(kButtonEnable, 5);
+  EXPECT_EQ(h.ticks(0, 19), Fault::none);
+  EXPECT_EQ(h.ticks(kButtonEnable, 5), Fault::none);
+  EXPECT_TRUE(h.device.enabled());
+  EXPECT_EQ(h.ticks(0, 19), Fault::none);
+  EXPECT_EQ(h.ticks(0, 3), Fault::enabling_released);
+  EXPECT_FALSE(h.device.enabled());
+}
+
+TEST(EnablingDevice, stops_at_once_when_squeezed_and_is_let_go_before_it_enables_again) {
+  for (const std::uint32_t squeezed : {kButtonPanic, kButtonPanic | kButtonEnable}) {
+    Held h;
+    h.ticks(0, 5);
+    h.ticks(kButtonEnable, 5);
+    EXPECT_EQ(h.tick(squeezed), Fault::enabling_released);
+    EXPECT_EQ(h.tick(kButtonEnable, false), Fault::none);
+    EXPECT_FALSE(h.device.pressed_anew());
+    EXPECT_EQ(h.tick(0, false), Fault::none);
+    EXPECT_EQ(h.tick(kButtonEnable, false), Fault::none);
+    EXPECT_TRUE(h.device.pressed_anew());
+    EXPECT_EQ(h.tick(kButtonEnable), Fault::none);  // this press ended the stop
+    EXPECT_TRUE(h.device.enabled());
+  }
+}
+
+TEST(EnablingDevice, keeps_no_press_that_did_not_end_the_stop) {
+  Held h;
+  EXPECT_EQ(h.tick(0, false), Fault::none);
+  EXPECT_EQ(h.tick(kButtonEnable, false), Fault::none);
+  EXPECT_EQ(h.tick(kButtonEnable, false), Fault::none);
+  EXPECT_EQ(h.ticks(kButtonEnable, 100), Fault::none);  // the reset button ended it
+  EXPECT_FALSE(h.device.enabled());
+}
+
+}  // namespace
+}  // namespace punctum::rt

@@ -1,0 +1,127 @@
+// What the report measures, from samples and snapshots made up for the purpose.
+#include "tools/punctum/measures.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+namespace punctum::tools {
+namespace {
+
+Scene scene_of(const char* name) { return *load_scene(name); }
+
+// Gain of the band at one frequency, after it has settled.
+double gain(double f_Hz, double rate_Hz) {
+  TremorBand band(rate_Hz);
+  double in2 = 0, out2 = 0;
+  for (int i = 0; i < static_cast<int>(20 * rate_Hz); ++i) {
+    const double x = std::sin(2 * std::numbers::pi * f_Hz * i / rate_Hz);
+    const double y = band.next(x);
+    if (i > 10 * rate_Hz) {
+      in2 += x * x, out2 += y * y;
+    }
+  }
+  return std::sqrt(out2 / in2);
+}
+
+TEST(TremorBand, passes_eight_to_twelve_hertz_and_little_else) {
+  for (const double rate : {1000.0, 8000.0}) {
+    EXPECT_NEAR(gain(std::sqrt(96.0), rate), 1, 1e-3);
+    EXPECT_NEAR(gain(8, rate), 0.5, 0.02);  // two sections of half power each
+    EXPECT_NEAR(gain(12, rate), 0.5, 0.02);
+    EXPECT_LT(gain(1, rate), 2e-3);
+    EXPECT_LT(gain(50, rate), 0.02);
+  }
+}
+
+TEST(TremorBand, an_offset_at_the_start_rings_nothing) {
+  TremorBand band(1000);
+  for (int i = 0; i < 1000; ++i) {
+    EXPECT_EQ(band.next(0.3), 0);
+  }
+}
+
+TEST(Measures, the_tremor_ratio_is_the_motion_of_the_tip_scaled_back_to_the_hand) {
+  const Scene scene = scene_of("free");
+  Measures m(scene);
+  sim::Snapshot world;
+  for (int i = 0; i < 20'000; ++i) {
+    rt::TelemetrySample s;
+    s.tick = static_cast<std::uint64_t>(i);
+    s.t_s = i * 1e-3;
+    const double shake = std::sin(2 * std::numbers::pi * 10 * s.t_s);
+    world.hand.position_m.y = 0.3e-3 * shake + 0.01 * s.t_s;  // and a slow wander
+    world.stage.tip_m.y = 0.25 * 0.3e-3 * shake / scene.servo.mapping.position_scale + 1e-6 * s.t_s;
+    m.tick(s, &world);
+  }
+  m.finish();
+  ASSERT_TRUE(m.tremor_ratio().has_value());
+  EXPECT_NEAR(*m.tremor_ratio(), 0.25, 1e-3);
+}
+
+TEST(Measures, phases_cells_faults_and_gaps_are_counted_and_listed) {
+  const Scene scene = scene_of("icsi");
+  Measures m(scene);
+  std::uint64_t tick = 0;
+  const auto run = [&](rt::Phase phase, std::uint32_t cell, int ticks, rt::Fault fault = rt::Fault::none) {
+    for (int i = 0; i < ticks; ++i) {
+      rt::TelemetrySample s;
+      s.tick = tick++;
+      s.t_s = static_cast<double>(s.tick) * 1e-3;
+      s.phase = phase;
+      s.cell = cell;
+      s.fault = fault;
+      m.tick(s, nullptr);
+    }
+  };
+  using rt::Phase;
+  run(Phase::free, 0, 100);
+  run(Phase::contact, 0, 100);
+  run(Phase::indentation, 0, 100, rt::Fault::estop);
+  run(Phase::puncture, 0, 100);
+  tick += 7;  // missed
+  run(Phase::withdrawal, 0, 500);
+  run(Phase::clear, 0, 100);
+  run(Phase::free, 1, 100);
+  m.finish();
+
+  ASSERT_EQ(m.phases.size(), 7U);
+  EXPECT_EQ(m.phases[4].phase, Phase::withdrawal);
+  EXPECT_NEAR(m.phases[4].end_s - m.phases[4].start_s, 0.5, 1e-9);
+  EXPECT_EQ(m.phases[6].cell, 1U);
+  EXPECT_EQ(m.gaps, 7U);
+  EXPECT_EQ(m.cell_count, 2U);
+  EXPECT_EQ(m.cells_done, 1U);
+  ASSERT_EQ(m.faults.size(), 1U);
+  EXPECT_EQ(m.faults[0].fault, rt::Fault::estop);
+  EXPECT_NEAR(m.faults[0].t_s, 0.2, 1e-9);
+  EXPECT_NEAR(m.withdrawal_s.mean, 0.5, 1e-9);
+}
+
+TEST(Measures, eight_hours_of_cells_take_no_more_memory_than_one) {
+  const Scene scene = scene_of("icsi");
+  Measures m(scene);
+  rt::TelemetrySample s;
+  for (std::uint32_t cell = 0; cell < 5000; ++cell) {
+    for (int p = 0; p < rt::kPhases; ++p) {
+      s.tick++;
+      s.t_s += 1e-3;
+      s.cell = cell;
+      s.phase = static_cast<rt::Phase>(p);
+      s.fault = p == 3 ? rt::Fault::estop : rt::Fault::none;
+      m.tick(s, nullptr);
+    }
+  }
+  m.finish();
+  EXPECT_EQ(m.phase_count, 35'000U);
+  EXPECT_EQ(m.cell_count, 5000U);
+  EXPECT_EQ(m.cells_done, 5000U);
+  EXPECT_EQ(m.fault_count, 5000U);
+  EXPECT_LE(m.phases.size(), Measures::kKept);
+  EXPECT_LE(m.cells.size(), Measures::kKept);
+  EXPECT_LE(m.faults.size(), Measures::kKept);
+}
+
+}  // namespace
+}  // namespace punctum::tools

@@ -1,0 +1,136 @@
+// What several programs share: CSV rows, segments handed to a child, signals that ask to stop, the version
+// line.
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <regex>
+#include <string>
+#include <vector>
+
+#include "tools/shared/csv.hpp"
+#include "tools/shared/station_segments.hpp"
+#include "tools/shared/stop_signal.hpp"
+#include "tools/shared/version.hpp"
+
+namespace punctum::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using Cells = std::vector<std::string_view>;
+
+TEST(CsvTest, a_line_has_one_cell_more_than_commas) {
+  EXPECT_EQ(split_csv(""), Cells({""}));
+  EXPECT_EQ(split_csv("a"), Cells({"a"}));
+  EXPECT_EQ(split_csv("a,b"), Cells({"a", "b"}));
+  EXPECT_EQ(split_csv(",a,,"), Cells({"", "a", "", ""}));
+}
+
+TEST(CsvTest, a_reader_finds_cells_by_the_name_of_their_column) {
+  const fs::path file = fs::temp_directory_path() / ("punctum-csv-" + std::to_string(::getpid()));
+  std::ofstream(file) << "t_s,phase,x_m\n0.001,free,-1.5e-6\n0.002,contact,\n0.003\n";
+  CsvReader table(file.string());
+  EXPECT_TRUE(table.has("x_m"));
+  EXPECT_FALSE(table.has("y_m"));
+  ASSERT_TRUE(table.next());
+  EXPECT_EQ(table.text("phase"), "free");
+  EXPECT_EQ(table.number("x_m"), -1.5e-6);
+  EXPECT_EQ(table.number("phase"), std::nullopt);
+  EXPECT_EQ(table.number("y_m"), std::nullopt);
+  ASSERT_TRUE(table.next());
+  EXPECT_EQ(table.number("t_s"), 0.002);
+  EXPECT_EQ(table.number("x_m"), std::nullopt) << "an empty cell is no zero";
+  ASSERT_TRUE(table.next());
+  EXPECT_EQ(table.text("phase"), "") << "the row is shorter than the header";
+  EXPECT_FALSE(table.next());
+  fs::remove(file);
+}
+
+TEST(CsvTest, a_file_that_is_not_there_has_no_rows) {
+  CsvReader table("/nowhere/obs.csv");
+  EXPECT_FALSE(table.has("t_s"));
+  EXPECT_FALSE(table.next());
+}
+
+std::atomic<int> woken{0};
+
+TEST(StopSignalTest, signals_are_counted_and_wake_whoever_waits) {
+  stop_signal::watch({SIGUSR1, SIGUSR2}, [](int count) noexcept { woken.store(count); });
+  EXPECT_EQ(stop_signal::count(), 0);
+  stop_signal::request();
+  EXPECT_EQ(stop_signal::count(), 1);
+  stop_signal::request();
+  EXPECT_EQ(stop_signal::count(), 1) << "a request is not made twice";
+  EXPECT_EQ(woken.load(), 0);
+  ASSERT_EQ(::raise(SIGUSR1), 0);
+  EXPECT_EQ(stop_signal::count(), 2);
+  EXPECT_EQ(woken.load(), 2);
+  ASSERT_EQ(::raise(SIGUSR2), 0);
+  EXPECT_EQ(woken.load(), 3);
+}
+
+TEST(StopSignalTest, the_death_of_the_parent_arrives_as_a_signal) {
+  int ready[2];
+  int told[2];
+  ASSERT_EQ(::pipe(ready) + ::pipe(told), 0);
+  const pid_t parent = ::fork();
+  if (parent == 0) {
+    if (::fork() == 0) {
+      static int report = -1;
+      report = told[1];
+      stop_signal::watch({SIGTERM}, [](int) noexcept { (void)!::write(report, "s", 1); });
+      const auto maker = static_cast<std::uint64_t>(::getppid());
+      const bool alive_maker = stop_signal::watch_parent(maker);
+      const bool dead_maker = stop_signal::watch_parent(1U << 30);  // no process has this number
+      const char alive = alive_maker && !dead_maker ? 'y' : 'n';
+      (void)!::write(ready[1], &alive, 1);
+      ::alarm(10);
+      ::pause();
+      ::_exit(0);
+    }
+    for (;;) {
+      ::pause();
+    }
+  }
+  char c = 'n';
+  ASSERT_EQ(::read(ready[0], &c, 1), 1);
+  EXPECT_EQ(c, 'y');
+  ::kill(parent, SIGKILL);
+  ::waitpid(parent, nullptr, 0);
+  ::close(told[1]);
+  ASSERT_EQ(::read(told[0], &c, 1), 1) << "no signal came";
+  EXPECT_EQ(c, 's');
+  for (const int fd : {ready[0], ready[1], told[0]}) {
+    ::close(fd);
+  }
+}
+
+TEST(HandedSegments, are_the_same_after_their_way_through_an_argument) {
+  HandedSegments handed;
+  handed.add("core", 5);
+  handed.add("commands.parent", 17);
+  const auto parsed = HandedSegments::parse(handed.text());
+  ASSERT_TRUE(parsed) << parsed.error();
+  EXPECT_EQ(parsed->descriptor("core"), 5);
+  EXPECT_EQ(parsed->descriptor("commands.parent"), 17);
+  EXPECT_EQ(parsed->descriptor("bench"), -1);
+  EXPECT_EQ(parsed->descriptors(), (std::vector<int>{5, 17}));
+  for (const char* bad :
+       {"core", "core=", "=5", "core=x", "core=-1", "core=5x", ",core=5", "core=99999999999"}) {
+    EXPECT_FALSE(HandedSegments::parse(bad)) << bad;
+  }
+}
+
+TEST(VersionTest, names_the_program_the_version_and_the_commit) {
+  const std::string line = version_line("punctum-core");
+  EXPECT_TRUE(std::regex_match(
+      line, std::regex("punctum-core [0-9]+\\.[0-9]+ \\((unknown|[0-9a-f]{12,40}(\\+changes)?)\\)")))
+      << line;
+}
+
+}  // namespace
+}  // namespace punctum::tools

@@ -1,0 +1,182 @@
+// Dilation and labelling on masks drawn by hand, impurities, and the recoil of the membrane on scripted
+// motion.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "vision/events/contact.hpp"
+#include "vision/events/puncture.hpp"
+#include "vision/image/circle.hpp"
+#include "vision/image/impurities.hpp"
+
+namespace {
+
+using namespace punctum::vision;
+
+struct Masks {
+  cv::Mat binary{100, 200, CV_8U, cv::Scalar(0)}, needle{100, 200, CV_8U, cv::Scalar(0)},
+      cell{100, 200, CV_8U, cv::Scalar(0)};
+};
+
+// A cell's right-hand edge at x = 80 and a needle of two walls that ends at `tip`.
+Masks needle_and_cell(int tip) {
+  Masks m;
+  m.binary(cv::Rect(80, 20, 2, 60)).setTo(255);
+  m.cell(cv::Rect(80, 20, 2, 60)).setTo(255);
+  m.binary(cv::Rect(tip, 45, 200 - tip, 2)).setTo(255);
+  m.binary(cv::Rect(tip, 49, 200 - tip, 2)).setTo(255);
+  m.needle(cv::Rect(tip, 45, 200 - tip, 6)).setTo(255);
+  return m;
+}
+
+TEST(Contact, begins_when_the_classes_of_needle_and_cell_merge) {
+  for (int tip = 100; tip > 76; --tip) {
+    const Masks m = needle_and_cell(tip);
+    const Classes c = merge_classes(m.binary, m.needle, m.cell, 4);
+    EXPECT_GT(c.needle, 0);
+    EXPECT_GT(c.cell, 0);
+    EXPECT_EQ(c.merged, tip <= 82) << tip;  // vertical dilation does not reach sideways; diagonals touch
+  }
+}
+
+TEST(Contact, vertical_dilation_joins_the_needles_two_walls) {
+  const Masks m = needle_and_cell(120);
+  cv::Mat one = m.needle.clone();
+  one(cv::Rect(0, 47, 200, 10)).setTo(0);  // only the upper wall is marked as needle
+  cv::Mat lower = m.needle.clone();
+  lower(cv::Rect(0, 0, 200, 49)).setTo(0);
+  EXPECT_FALSE(merge_classes(m.binary, one, lower, 0).merged);
+  EXPECT_TRUE(merge_classes(m.binary, one, lower, 4).merged);
+}
+
+TEST(Contact, is_not_found_in_empty_pictures) {
+  EXPECT_FALSE(merge_classes(cv::Mat(), cv::Mat(), cv::Mat(), 4).merged);
+  const cv::Mat none(10, 10, CV_8U, cv::Scalar(0));
+  const Classes c = merge_classes(none, none, none, 4);
+  EXPECT_EQ(c.needle, 0);
+  EXPECT_FALSE(c.merged);
+}
+
+TEST(Impurities, are_small_components_away_from_the_membrane) {
+  cv::Mat binary(120, 120, CV_8U, cv::Scalar(0)), mask;
+  cv::circle(binary, {60, 60}, 30, cv::Scalar(255), 2);
+  binary(cv::Rect(5, 5, 6, 6)).setTo(255);    // impurity
+  binary(cv::Rect(88, 58, 4, 4)).setTo(255);  // touches the membrane
+  binary.at<std::uint8_t>(100, 10) = 255;     // noise
+  const Contour membrane = circle_contour({{60, 60}, 30, 0}, 128);
+  EXPECT_EQ(find_impurities(binary, {membrane}, 20, 6, 4, mask), 1);
+  EXPECT_EQ(cv::countNonZero(mask), 36);
+  EXPECT_EQ(find_impurities(cv::Mat(), {}, 20, 6, 4, mask), 0);
+}
+
+// 40 ms frames; depth of tip and membrane past the undeformed membrane, px.
+struct Script {
+  Puncture puncture{1.5};
+  std::int64_t t = 0;
+  bool step(double tip, double membrane, bool contact = true) {
+    PunctureInput in;
+    in.t_ns = t;
+    t += 40'000'000;
+    in.contact = contact;
+    in.points = contact;
+    in.tip_px = tip;
+    in.gap_px = -tip;
+    in.membrane_px = membrane;
+    in.depth_px = membrane;
+    in.radius_px = 4.6;
+    return puncture.update(in);
+  }
+  // Ten free frames, then the needle pushes the membrane `depth` px deep at 0.5 px a frame.
+  void push(double depth) {
+    for (int i = 0; i < 10; ++i) {
+      step(-5, 0, false);
+    }
+    for (double d = 0; d <= depth; d += 0.5) {
+      EXPECT_FALSE(step(d, 0.95 * d)) << d;
+    }
+  }
+};
+
+TEST(Puncture, is_the_recoil_of_the_membrane_while_the_needle_goes_on) {
+  Script s;
+  s.push(20);
+  EXPECT_GT(s.puncture.membrane_velocity_px_s(), 0);
+  bool seen = false;
+  int frames = 0;
+  for (double d = 19; d > 0.5; d *= std::exp(-1.0), ++frames) {  // recoil, time constant one frame
+    seen = s.step(20.5 + 0.5 * frames, d * std::exp(-1.0));
+    if (frames == 0) {
+      EXPECT_LT(s.puncture.membrane_velocity_px_s(), 0);
+    }
+    if (seen) {
+      break;
+    }
+  }
+  EXPECT_TRUE(seen);
+  EXPECT_LE(frames, 1);  // by the second frame
+}
+
+TEST(Puncture, is_not_a_withdrawal_that_the_membrane_follows) {
+  Script s;
+  s.push(20);
+  for (double d = 20; d > 0; d -= 1) {
+    EXPECT_FALSE(s.step(d, 0.95 * d)) << d;
+  }
+}
+
+TEST(Puncture, is_not_one_mistaken_contact_point) {
+  Script s;
+  s.push(20);
+  EXPECT_FALSE(s.step(20, 8));
+  EXPECT_FALSE(s.step(20, 19));
+  EXPECT_FALSE(s.step(20, 40));  // far ahead of the needle
+  EXPECT_FALSE(s.step(20, 19));
+  EXPECT_FALSE(s.step(20, 19));
+}
+
+TEST(Puncture, lasts_until_the_needle_is_outside_and_then_the_next_one_is_detected) {
+  Script s;
+  s.push(20);
+  s.step(20, 3);
+  ASSERT_TRUE(s.step(20, 2));
+  for (double d = 20; d > -9; d -= 1) {
+    EXPECT_TRUE(s.step(d, std::min(d, 1.0), d > 0)) << d;
+  }
+  EXPECT_FALSE(s.step(-12, 0, false));
+  s.push(10);
+}
+
+TEST(Puncture, is_also_a_tip_deep_inside_an_undented_membrane) {
+  Script s;
+  EXPECT_TRUE(s.step(40, 2));  // the first frame shows it
+  Script late;
+  for (int i = 0; i < 20; ++i) {
+    late.step(-5, 0, false);
+  }
+  late.step(0, 0);
+  EXPECT_FALSE(late.step(40, 2));
+  EXPECT_FALSE(late.step(40, 2));
+  EXPECT_TRUE(late.step(40, 2));
+}
+
+TEST(InnerPuncture, is_a_contour_far_behind_the_tip_in_two_frames_of_a_punctured_cell) {
+  InnerPuncture inner;
+  const double radius = 4.6;
+  const double far = InnerPuncture::least_behind_px(radius) + 1;
+  EXPECT_FALSE(inner.update(false, far, radius));  // the outer membrane holds
+  EXPECT_FALSE(inner.update(false, far, radius));
+  for (int k = 0; k < 10; ++k) {  // it lies on the tip, or is not followed
+    EXPECT_FALSE(inner.update(true, k % 2 == 0 ? 5.0 : -6.0, radius));
+    EXPECT_FALSE(inner.update(true, std::nullopt, radius));
+  }
+  EXPECT_FALSE(inner.update(true, far, radius));  // one frame may be mistaken
+  EXPECT_FALSE(inner.update(true, 2.0, radius));
+  EXPECT_FALSE(inner.update(true, far, radius));
+  EXPECT_TRUE(inner.update(true, far, radius));
+  EXPECT_TRUE(inner.update(true, std::nullopt, radius));  // stays
+  EXPECT_FALSE(inner.update(false, far, radius));         // the needle is clear of the cell
+  EXPECT_FALSE(inner.update(true, far, radius));
+}
+
+}  // namespace

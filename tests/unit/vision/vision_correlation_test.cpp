@@ -1,0 +1,109 @@
+// Eq. 1 against its definition, summed by hand.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "vision/image/correlation.hpp"
+#include "vision/pipettes/holding_pipette.hpp"
+
+namespace {
+
+using namespace punctum::vision;
+
+cv::Mat noise_picture(int w, int h, unsigned seed) {
+  std::mt19937 random(seed);
+  cv::Mat m(h, w, CV_8U);
+  for (int y = 0; y < h; ++y) {
+    for (int x = 0; x < w; ++x) {
+      m.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(random() % 256);
+    }
+  }
+  return m;
+}
+
+TEST(NormalisedCorrelation, equals_equation_one_at_every_place) {
+  const cv::Mat window = noise_picture(23, 19, 1), pattern = noise_picture(7, 5, 2);
+  const cv::Mat map = correlation_map(window, pattern);
+  ASSERT_EQ(map.cols, 17);
+  ASSERT_EQ(map.rows, 15);
+  for (int y = 0; y < map.rows; ++y) {
+    for (int x = 0; x < map.cols; ++x) {
+      double mi = 0, mm = 0, ii = 0;
+      for (int v = 0; v < pattern.rows; ++v) {
+        for (int u = 0; u < pattern.cols; ++u) {
+          const double m = pattern.at<std::uint8_t>(v, u), i = window.at<std::uint8_t>(y + v, x + u);
+          mi += m * i;
+          mm += m * m;
+          ii += i * i;
+        }
+      }
+      EXPECT_NEAR(static_cast<double>(map.at<float>(y, x)), mi / std::sqrt(mm * ii), 1e-5);
+    }
+  }
+}
+
+TEST(NormalisedCorrelation, does_not_depend_on_the_global_luminosity) {
+  const cv::Mat pattern = noise_picture(8, 8, 3);
+  cv::Mat window = noise_picture(30, 30, 4) / 2;
+  cv::Mat half;
+  pattern.convertTo(half, CV_8U, 0.5);
+  half.copyTo(window(cv::Rect(11, 7, 8, 8)));
+  const auto p = peak(correlation_map(window, pattern));
+  ASSERT_TRUE(p);
+  EXPECT_NEAR(p->at.x, 11, 0.3);
+  EXPECT_NEAR(p->at.y, 7, 0.3);
+  EXPECT_GT(p->score, 0.999);
+}
+
+TEST(NormalisedCorrelation, of_a_template_that_does_not_fit_is_empty) {
+  EXPECT_TRUE(correlation_map(noise_picture(5, 5, 1), noise_picture(6, 3, 2)).empty());
+  EXPECT_TRUE(correlation_map(cv::Mat(), noise_picture(3, 3, 2)).empty());
+  EXPECT_FALSE(peak(cv::Mat()));
+}
+
+TEST(Peak, is_sub_pixel_on_a_parabola) {
+  cv::Mat map(9, 9, CV_32F);
+  for (int y = 0; y < 9; ++y) {
+    for (int x = 0; x < 9; ++x) {
+      map.at<float>(y, x) = static_cast<float>(1 - 0.01 * std::pow(x - 4.3, 2) - 0.02 * std::pow(y - 3.8, 2));
+    }
+  }
+  const auto p = peak(map);
+  ASSERT_TRUE(p);
+  EXPECT_NEAR(p->at.x, 4.3, 1e-4);
+  EXPECT_NEAR(p->at.y, 3.8, 1e-4);
+}
+
+TEST(HoldingPipette, is_followed_in_its_window_and_its_loss_is_reported) {
+  // A scene of blocks, moved by whole pixels: the answer is exact.
+  cv::Mat scene(120, 160, CV_8U, cv::Scalar(140));
+  scene(cv::Rect(0, 40, 60, 8)).setTo(30);
+  scene(cv::Rect(0, 72, 60, 8)).setTo(30);
+  const auto moved = [&](int dx, int dy) {
+    cv::Mat m(120, 160, CV_8U, cv::Scalar(140));
+    const cv::Rect from(std::max(0, -dx), std::max(0, -dy), 160 - std::abs(dx), 120 - std::abs(dy));
+    scene(from).copyTo(m(from + cv::Point(dx, dy)));
+    return m;
+  };
+  HolderVision config;
+  HoldingPipette holder(config);
+  EXPECT_EQ(holder.find(scene).reason, "no template");
+  holder.use_template(scene(cv::Rect(40, 34, 30, 52)));
+  HolderPose fix = holder.find(scene);
+  ASSERT_TRUE(fix.ok);
+  const Point start = fix.mouth;
+  for (int k = 1; k < 12; ++k) {  // in total further than one window
+    fix = holder.find(moved(3 * k, -k));
+    ASSERT_TRUE(fix.ok) << k;
+    EXPECT_NEAR(fix.mouth.x - start.x, 3 * k, 0.05);
+    EXPECT_NEAR(fix.mouth.y - start.y, -k, 0.05);
+    EXPECT_GT(fix.score, 0.999);
+  }
+  fix = holder.find(cv::Mat(120, 160, CV_8U, cv::Scalar(140)));  // bright and empty: eq. 1 alone is near 1
+  EXPECT_GT(fix.score, 0.8);
+  EXPECT_FALSE(fix.ok);
+  EXPECT_FALSE(fix.reason.empty());
+}
+
+}  // namespace

@@ -1,0 +1,195 @@
+// punctum-vision track: its input files, its output files, and its messages about bad ones.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "tools/vision/track.hpp"
+
+namespace {
+
+namespace fs = std::filesystem;
+using punctum::tools::track;
+using punctum::tools::TrackOptions;
+
+class Track : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() /
+              ("punctum-track-" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+    fs::remove_all(folder_);
+    fs::create_directories(folder_ / "frames");
+    options_.frames = (folder_ / "frames").string();
+    options_.scene = "outer-only";
+    options_.out = (folder_ / "obs.csv").string();
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  // A dark disc of radius 70 px; file f<number>.png.
+  void frame(int number, double x = 150, double y = 120) const {
+    cv::Mat m(240, 320, CV_8U, cv::Scalar(150));
+    cv::circle(m, cv::Point(static_cast<int>(x * 16), static_cast<int>(y * 16)), 70 * 16, cv::Scalar(105),
+               cv::FILLED, cv::LINE_AA, 4);
+    cv::GaussianBlur(m, m, cv::Size(0, 0), 1.2);
+    cv::imwrite(name(number), m);
+  }
+  [[nodiscard]] std::string name(int number) const {
+    return (folder_ / "frames" / ("f" + std::to_string(number) + ".png")).string();
+  }
+  [[nodiscard]] static std::vector<std::vector<std::string>> table(const std::string& path) {
+    std::ifstream in(path);
+    std::vector<std::vector<std::string>> rows;
+    for (std::string line; std::getline(in, line);) {
+      std::vector<std::string> cells(1);
+      for (const char c : line) {
+        if (c == ',') {
+          cells.emplace_back();
+        } else {
+          cells.back() += c;
+        }
+      }
+      rows.push_back(std::move(cells));
+    }
+    return rows;
+  }
+  fs::path folder_;
+  TrackOptions options_;
+};
+
+TEST_F(Track, writes_one_row_per_frame_in_natural_order_and_contours_of_at_least128_nodes) {
+  for (const int k : {1, 2, 3, 10, 11}) {
+    frame(k, 150 + 0.3 * k);
+  }
+  options_.contours = (folder_ / "contours.csv").string();
+  options_.overlay = (folder_ / "overlay").string();
+  options_.fps = 10;
+  ASSERT_EQ(track(options_), 0);
+  const auto rows = table(options_.out);
+  ASSERT_EQ(rows.size(), 6u);
+  const std::string head =
+      "frame,t_s,phase,contact,punctured,holder_x_px,holder_y_px,holder_score,tip_x_px,tip_y_px,outer_ok,"
+      "inner_ok,wd_um,"
+      "a_um,R_um,force_N,total_us,verdict";
+  std::string first;
+  for (std::size_t i = 0; i < 18; ++i) {
+    first += (i > 0 ? "," : "") + rows[0][i];
+  }
+  EXPECT_EQ(first, head);
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    ASSERT_EQ(rows[i].size(), rows[0].size());
+    EXPECT_EQ(rows[i][0], std::to_string(i - 1));
+    EXPECT_NEAR(std::stod(rows[i][1]), 0.1 * static_cast<double>(i - 1), 1e-9);
+    EXPECT_EQ(rows[i][10], "1") << rows[i][17];
+    EXPECT_EQ(rows[i][8], "");                               // no needle: unknown, not 0
+    EXPECT_NEAR(std::stod(rows[i][14]), 70.5 * 0.825, 0.3);  // OpenCV draws half a pixel wide
+  }
+  const auto nodes = table(options_.contours);
+  EXPECT_EQ(nodes[0], (std::vector<std::string>{"frame", "membrane", "node", "x_px", "y_px"}));
+  int of_last = 0;
+  for (const auto& r : nodes) {
+    if (r[0] == "4") {
+      ++of_last;
+      EXPECT_EQ(r[1], "outer");
+      EXPECT_NEAR(std::hypot(std::stod(r[3]) - 153.3, std::stod(r[4]) - 120), 70.5, 0.7);
+    }
+  }
+  EXPECT_GE(of_last, 128);
+  EXPECT_EQ(std::distance(fs::directory_iterator(options_.overlay), fs::directory_iterator()), 5);
+}
+
+TEST_F(Track, gives_a_row_with_a_verdict_for_an_unreadable_frame_or_one_of_another_size) {
+  frame(1);
+  cv::imwrite(name(2), cv::Mat(100, 100, CV_8U, cv::Scalar(3)));
+  std::ofstream(name(3)) << "this is no picture";
+  std::ofstream(name(4)).close();
+  frame(5);
+  ASSERT_EQ(track(options_), 0);
+  const auto rows = table(options_.out);
+  ASSERT_EQ(rows.size(), 6u);
+  for (const std::size_t bad : {2u, 3u, 4u}) {
+    EXPECT_EQ(rows[bad][10], "0");
+    EXPECT_FALSE(rows[bad][17].empty());
+    EXPECT_EQ(rows[bad].size(), rows[0].size());
+  }
+  EXPECT_EQ(rows[5][10], "1");
+}
+
+TEST_F(Track, exits_with_two_for_no_frame_a_bad_first_frame_or_a_bad_scene) {
+  EXPECT_EQ(track(options_), 2);  // an empty folder
+  std::ofstream(name(1)) << "this is no picture";
+  frame(2);
+  EXPECT_EQ(track(options_), 2);
+  fs::remove(name(1));
+  EXPECT_EQ(track(options_), 0);
+  options_.scene = "no-such-scene";
+  EXPECT_EQ(track(options_), 2);
+  options_.scene = "free";  // nothing to look for
+  EXPECT_EQ(track(options_), 2);
+  options_.scene = "outer-only";
+  options_.out = (folder_ / "no" / "such" / "folder" / "obs.csv").string();
+  EXPECT_EQ(track(options_), 2);
+}
+
+TEST_F(Track, takes_region_and_seed_circle_in_pixels_of_the_whole_picture) {
+  frame(1);
+  options_.roi = {60, 30, 200, 190};
+  options_.seed_circle = {148.0, 122.0, 68.0};
+  options_.contours = (folder_ / "contours.csv").string();
+  ASSERT_EQ(track(options_), 0);
+  double x = 0, y = 0;
+  int n = 0;
+  for (const auto& r : table(options_.contours)) {
+    if (r[1] == "outer") {
+      x += std::stod(r[3]);
+      y += std::stod(r[4]);
+      ++n;
+    }
+  }
+  ASSERT_GE(n, 128);
+  EXPECT_NEAR(x / n, 150, 0.5);
+  EXPECT_NEAR(y / n, 120, 0.5);
+  options_.roi = {200, 100, 200, 200};
+  EXPECT_EQ(track(options_), 2);
+  options_.roi = {0, 0, 5, 5};
+  EXPECT_EQ(track(options_), 2);
+  options_.roi.reset();
+  options_.seed_circle = {148.0, 122.0, -3.0};
+  EXPECT_EQ(track(options_), 2);
+}
+
+TEST_F(Track, exits_with_two_for_a_missing_or_too_large_template) {
+  frame(1);
+  options_.scene = "icsi";
+  options_.holder_template = (folder_ / "none.png").string();
+  EXPECT_EQ(track(options_), 2);
+  options_.holder_template = (folder_ / "large.png").string();
+  cv::imwrite(options_.holder_template, cv::Mat(400, 400, CV_8U, cv::Scalar(3)));
+  EXPECT_EQ(track(options_), 2);
+}
+
+TEST_F(Track, reports_a_table_that_cannot_be_written) {
+  for (int i = 0; i < 3; ++i) {
+    frame(i);
+  }
+  options_.out = "/dev/full";
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(track(options_), 1);
+  EXPECT_NE(testing::internal::GetCapturedStderr().find("/dev/full: not complete"), std::string::npos);
+  options_.out = (folder_ / "obs.csv").string();
+  options_.contours = "/dev/full";
+  EXPECT_EQ(track(options_), 1);
+}
+
+TEST_F(Track, refuses_a_seed_circle_outside_the_picture) {
+  frame(0);
+  options_.seed_circle = {-1000.0, 120.0, 70.0};
+  EXPECT_EQ(track(options_), 2);
+}
+
+}  // namespace

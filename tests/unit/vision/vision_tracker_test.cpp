@@ -1,0 +1,378 @@
+// The whole tracker on pictures that are drawn here, by another renderer than the simulated microscope, and
+// on pictures that show nothing.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <opencv2/imgproc.hpp>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "vision/overlay.hpp"
+#include "vision/tracker.hpp"
+
+namespace {
+
+using namespace punctum;
+using namespace punctum::vision;
+
+constexpr int kW = 640, kH = 420;
+const Point kCentre(280.3, 206.8);
+constexpr double kR = 74, kInner = 63, kZona = 6, kNeedle = 5;
+
+// Depth of the outer membrane past the undeformed one at polar angle t, for a dimple of depth w at angle 0.
+double dent(double t, double w) {
+  const double u = std::remainder(t, 2 * CV_PI) / 0.42;
+  return w * std::exp(-0.5 * u * u);
+}
+
+struct Drawing {
+  double tip = 500;  // x of the needle's end face; its axis is y = kCentre.y
+  double dent = 0;   // px
+  double noise = 2;
+  unsigned seed = 1;
+  bool needle = true;
+};
+
+cv::Mat draw(const Drawing& d) {
+  cv::Mat m(kH, kW, CV_32F);
+  for (int y = 0; y < kH; ++y) {
+    for (int x = 0; x < kW; ++x) {
+      float sum = 0;
+      for (int k = 0; k < 9; ++k) {
+        const Point p(x + (k % 3 - 1) / 3.0, y + (k / 3 - 1) / 3.0);
+        const Point q = p - kCentre;
+        const double r = cv::norm(q), t = std::atan2(q.y, q.x), in = dent(t, d.dent);
+        double g = 150;
+        if (r < kR - in) {
+          g -= 32;  // zona
+        }
+        if (r < kR - kZona - in) {
+          g += 26;  // perivitelline space
+        }
+        if (r < kInner - in * 0.9) {
+          g -= 34;  // ooplasm
+        }
+        const double s = p.x - d.tip, u = std::abs(p.y - kCentre.y);
+        if (d.needle && s > 0) {
+          const double w = kNeedle + 0.03 * s;
+          if (u < w) {
+            g += u > 0.6 * w ? -48 : 8;
+          }
+        }
+        if (p.x < kCentre.x - kR - 1 && std::abs(p.y - kCentre.y) < 52) {  // holding pipette
+          const double wall = 52 - std::abs(p.y - kCentre.y), face = kCentre.x - kR - 1 - p.x;
+          g -= wall < 6 || face < 3 ? 70 : 12;
+        }
+        sum += static_cast<float>(g) / 9;
+      }
+      m.at<float>(y, x) = sum;
+    }
+  }
+  cv::GaussianBlur(m, m, cv::Size(0, 0), 1.2);
+  std::mt19937 random(d.seed);
+  std::normal_distribution<float> n(0, static_cast<float>(d.noise));
+  cv::Mat out(kH, kW, CV_8U);
+  for (int y = 0; y < kH; ++y) {
+    for (int x = 0; x < kW; ++x) {
+      out.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(m.at<float>(y, x) + n(random));
+    }
+  }
+  return out;
+}
+
+hal::Frame frame_of(const cv::Mat& m, std::uint64_t sequence = 0) {
+  hal::Frame f;
+  f.pixels = m.data;
+  f.width = m.cols;
+  f.height = m.rows;
+  f.stride = static_cast<int>(m.step);
+  f.sequence = sequence;
+  f.exposure_ns = static_cast<std::int64_t>(sequence) * 40'000'000;
+  return f;
+}
+
+double rms_error(const Contour& c, double base, double depth, double share) {
+  double ss = 0;
+  for (const Point& p : c) {
+    const Point q = p - kCentre;
+    const double e = cv::norm(q) - (base - share * dent(std::atan2(q.y, q.x), depth));
+    ss += e * e / static_cast<double>(c.size());
+  }
+  return std::sqrt(ss);
+}
+
+TEST(Tracker, follows_a_whole_injection_within_its_errors) {
+  const VisionConfig config;
+  Tracker tracker(config, kW, kH);
+  const double surface = kCentre.x + kR;
+  std::uint64_t n = 0;
+  std::vector<rt::Phase> phases;
+  const auto step = [&](double tip, double depth) -> const Result& {
+    const cv::Mat m = draw({tip, depth, 2, static_cast<unsigned>(n) + 1});
+    const Result& r = tracker.process(frame_of(m, n++));
+    if (phases.empty() || phases.back() != r.phase) {
+      phases.push_back(r.phase);
+    }
+    return r;
+  };
+  for (double gap = 40; gap > 3; gap -= 2.2) {
+    const Result& r = step(surface + gap, 0);
+    ASSERT_EQ(r.verdict, "ok") << gap;
+    EXPECT_NEAR(r.needle.tip.x, surface + gap, 0.8);
+    EXPECT_NEAR(r.needle.tip.y, kCentre.y, 0.3);
+    EXPECT_NEAR(*r.gap_px, gap, 0.9);
+    EXPECT_FALSE(r.contact) << gap;
+    EXPECT_LT(rms_error(r.outer.contour, kR, 0, 0), 0.5);  // with the arc hidden by the holding pipette
+    EXPECT_LT(rms_error(r.inner.contour, kInner, 0, 0), 0.6);
+    EXPECT_GE(r.outer.contour.size(), 128u);
+    EXPECT_NEAR(r.undeformed->r, kR, 0.3);
+  }
+  for (double d = 0.5; d < 16; d += 0.6) {
+    const Result& r = step(surface - d, d);
+    ASSERT_TRUE(r.outer.ok) << d << r.verdict;
+    EXPECT_FALSE(r.punctured) << d;
+    if (d > 1.5) {
+      EXPECT_TRUE(r.contact) << d;
+      EXPECT_NEAR(*r.wd_px, d, 1.4) << d;
+      EXPECT_LT(rms_error(r.outer.contour, kR, d, 1), 0.8) << d;
+    }
+  }
+  double left = 16, tip = surface - 16;
+  int until_seen = -1;
+  for (int i = 0; i < 12; ++i) {
+    left *= std::exp(-1.0);
+    tip -= 1.0;
+    const Result& r = step(tip, left);
+    if (r.punctured && until_seen < 0) {
+      until_seen = i;
+    }
+    EXPECT_NEAR(r.needle.tip.x, tip, 2.0);
+  }
+  EXPECT_GE(until_seen, 0);
+  EXPECT_LE(until_seen, 2);
+  for (; tip < surface + 25; tip += 2.5) {
+    const Result& r = step(tip, 0);
+    ASSERT_TRUE(r.outer.ok) << tip << r.verdict;
+    EXPECT_LT(rms_error(r.outer.contour, kR, 0, 0), 0.6) << tip;
+  }
+  using rt::Phase;
+  EXPECT_EQ(phases, (std::vector<Phase>{Phase::free, Phase::contact, Phase::indentation, Phase::puncture,
+                                        Phase::withdrawal, Phase::clear}));
+}
+
+// The time of a stage that did not run is 0.
+TEST(Tracker, does_not_look_for_what_a_scene_does_not_have) {
+  const double surface = kCentre.x + kR;
+  VisionConfig everything, outer_only, no_holder;
+  outer_only.inner = false;
+  no_holder.holder.reset();
+  for (const VisionConfig& config : {everything, outer_only, no_holder}) {
+    Tracker tracker(config, kW, kH);
+    for (std::uint64_t n = 0; n < 4; ++n) {
+      const Result& r = tracker.process(frame_of(draw({surface - 4, 4, 2, 1}), n));
+      ASSERT_TRUE(r.outer.ok && r.needle.ok) << r.verdict;
+      EXPECT_EQ(r.us.holder > 0, config.holder.has_value());
+      EXPECT_EQ(r.us.inner > 0, config.inner);
+      EXPECT_EQ(!r.inner.contour.empty(), config.inner);
+      EXPECT_EQ(r.us.start > 0, n == 0);
+      EXPECT_GT(r.us.outer, 0);
+      EXPECT_GT(r.us.contact, 0);
+    }
+  }
+}
+
+TEST(Tracker, does_not_run_the_contact_stages_far_from_the_cell) {
+  const double surface = kCentre.x + kR;
+  Tracker tracker(VisionConfig{}, kW, kH);
+  std::uint64_t n = 0;
+  for (const double gap : {26.0, 21.0, 16.0, 9.0, 4.0, 9.0, 16.0}) {
+    const Result& r = tracker.process(frame_of(draw({surface + gap, 0, 2, 1}), n++));
+    ASSERT_TRUE(r.outer.ok && r.gap_px) << r.verdict;
+    EXPECT_EQ(r.us.contact > 0, gap < 10) << gap;
+    EXPECT_EQ(r.points.point[0] || r.points.point[1], gap < 10) << gap;
+    EXPECT_FALSE(r.contact) << gap;
+  }
+}
+
+TEST(Tracker, does_not_report_a_puncture_when_the_needle_only_withdraws) {
+  Tracker tracker({}, kW, kH);
+  const double surface = kCentre.x + kR;
+  std::uint64_t n = 0;
+  const auto step = [&](double d) {
+    const cv::Mat m = draw({surface - d, std::max(0.0, d), 2, static_cast<unsigned>(n) + 1});
+    EXPECT_FALSE(tracker.process(frame_of(m, n++)).punctured) << d;
+  };
+  for (double d = -30; d < 12; d += d < -3 ? 3 : 1) {
+    step(d);
+  }
+  for (double d = 12; d > -20; d -= 1.5) {
+    step(d);
+  }
+}
+
+TEST(Tracker, follows_the_snake_alone_as_the_paper_does) {
+  VisionConfig config;
+  config.refine = false;
+  config.snake.nodes = 32;
+  Tracker tracker(config, kW, kH);
+  for (std::uint64_t n = 0; n < 4; ++n) {
+    const cv::Mat m = draw({480, 0, 2, static_cast<unsigned>(n) + 1});
+    const Result& r = tracker.process(frame_of(m, n));
+    ASSERT_TRUE(r.outer.ok);
+    EXPECT_EQ(r.outer.nodes.size(), 32u);
+    EXPECT_GE(r.outer.contour.size(), 128u);
+    EXPECT_LT(rms_error(r.outer.contour, kR, 0, 0), 8);  // it may rest on the zona's inner face
+  }
+}
+
+TEST(Tracker, gives_the_same_bits_for_the_same_frames) {
+  std::vector<double> seen[2];
+  for (auto& s : seen) {
+    Tracker tracker({}, kW, kH);
+    for (std::uint64_t n = 0; n < 3; ++n) {
+      const Result& r = tracker.process(frame_of(draw({470 - 3.0 * static_cast<double>(n), 0, 3, 5}), n));
+      for (const Point& p : r.outer.contour) {
+        s.push_back(p.x);
+        s.push_back(p.y);
+      }
+      s.push_back(r.needle.tip.x);
+    }
+  }
+  ASSERT_EQ(seen[0].size(), seen[1].size());
+  EXPECT_EQ(std::memcmp(seen[0].data(), seen[1].data(), seen[0].size() * sizeof(double)), 0);
+}
+
+TEST(Tracker, refuses_a_frame_of_another_size_and_continues_with_the_next_one) {
+  Tracker tracker({}, kW, kH);
+  const cv::Mat good = draw({470, 0, 2, 1});
+  ASSERT_TRUE(tracker.process(frame_of(good)).outer.ok);
+  const cv::Mat other(100, 80, CV_8U, cv::Scalar(120));
+  const Result& bad = tracker.process(frame_of(other));
+  EXPECT_FALSE(bad.usable);
+  EXPECT_EQ(bad.verdict, "size 80x100 instead of 640x420");
+  EXPECT_EQ(tracker.process({}).verdict, "no picture");
+  EXPECT_EQ(tracker.process(frame_of(good)).verdict, "ok");
+}
+
+TEST(Tracker, reports_that_the_cell_vanished_and_finds_it_again) {
+  Tracker tracker({}, kW, kH);
+  const cv::Mat good = draw({470, 0, 2, 1});
+  ASSERT_EQ(tracker.process(frame_of(good)).verdict, "ok");
+  std::mt19937 random(1);
+  std::normal_distribution<float> noise(150, 3);
+  cv::Mat empty(kH, kW, CV_8U);
+  for (int i = 0; i < 6; ++i) {
+    for (int y = 0; y < kH; ++y) {
+      for (int x = 0; x < kW; ++x) {
+        empty.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(noise(random));
+      }
+    }
+    const Result& r = tracker.process(frame_of(empty));
+    EXPECT_FALSE(r.outer.ok);
+    EXPECT_FALSE(r.inner.ok);
+    EXPECT_FALSE(r.needle.ok);
+    EXPECT_NE(r.verdict, "ok");
+  }
+  bool again = false;
+  for (int i = 0; i < 12 && !again; ++i) {
+    again = tracker.process(frame_of(good)).outer.ok;
+  }
+  EXPECT_TRUE(again);
+}
+
+TEST(Tracker, gives_a_reason_and_no_membrane_for_pictures_that_show_nothing) {
+  for (const cv::Size size : {cv::Size(1, 1), cv::Size(3, 3), cv::Size(31, 200), cv::Size(32, 32),
+                              cv::Size(64, 48), cv::Size(200, 33), cv::Size(320, 240)}) {
+    for (const int kind : {0, 1, 2, 3, 4}) {
+      cv::Mat m(size, CV_8U, cv::Scalar(kind == 0 ? 0 : kind == 1 ? 255 : 127));
+      if (kind >= 3) {
+        cv::RNG random(static_cast<std::uint64_t>(kind));
+        random.fill(m, kind == 3 ? cv::RNG::UNIFORM : cv::RNG::NORMAL, 120, kind == 3 ? 256 : 4);
+      }
+      VisionConfig config;
+      Tracker tracker(config, size.width, size.height);
+      for (std::uint64_t n = 0; n < 3; ++n) {
+        const Result& r = tracker.process(frame_of(m, n));
+        EXPECT_FALSE(r.outer.ok) << size << kind << r.verdict;
+        EXPECT_FALSE(r.inner.ok) << size << kind << r.verdict;
+        EXPECT_NE(r.verdict, "ok") << size << kind;
+        EXPECT_FALSE(r.verdict.empty());
+        EXPECT_FALSE(draw_overlay(m, r, config).empty());
+      }
+    }
+  }
+}
+
+TEST(Tracker, survives_absurd_configurations) {
+  const cv::Mat m = draw({470, 0, 2, 1});
+  for (const int kind : {0, 1, 2, 3, 4, 5}) {
+    VisionConfig config;
+    switch (kind) {
+      case 0:
+        config.pixel_m = 1;
+        break;
+      case 1:
+        config.pixel_m = 1e-12;
+        break;
+      case 2:
+        config.snake.nodes = 0;
+        break;
+      case 3:
+        config.R_min_m = config.R_max_m;
+        break;
+      case 4:
+        config.contour_points = -7;
+        break;
+      default:
+        config.dilation_px = 4000;
+        break;
+    }
+    Tracker tracker(config, kW, kH);
+    EXPECT_FALSE(tracker.process(frame_of(m)).verdict.empty());
+    EXPECT_FALSE(tracker.process(frame_of(m)).verdict.empty());
+  }
+}
+
+TEST(Tracker, accepts_rows_with_padding_between_them) {
+  cv::Mat wide(kH, kW + 37, CV_8U, cv::Scalar(9));
+  const cv::Mat m = draw({470, 0, 2, 1});
+  m.copyTo(wide(cv::Rect(0, 0, kW, kH)));
+  Tracker a({}, kW, kH), b({}, kW, kH);
+  const Result& x = a.process(frame_of(m));
+  const Result& y = b.process(frame_of(wide(cv::Rect(0, 0, kW, kH))));
+  ASSERT_EQ(x.outer.contour.size(), y.outer.contour.size());
+  EXPECT_EQ(x.outer.contour, y.outer.contour);
+}
+
+TEST(ToObservation, is_in_metres_from_the_middle_of_the_picture) {
+  VisionConfig config;
+  config.pixel_m = 1e-6;
+  Result r;
+  r.frame = 7;
+  r.exposure_ns = 123;
+  r.needle.ok = true;
+  r.needle.tip = {320.5, 200};
+  r.needle.axis = {-1, 0};
+  r.outer.ok = true;
+  r.undeformed = Circle{{219.5, 199.5}, 60, 0};
+  r.gap_px = -12.5;
+  r.wd_px = 12.5;
+  r.contact = true;
+  r.membrane_velocity_px_s = -30;
+  const rt::Observation o = to_observation(r, config, 640, 400);
+  EXPECT_EQ(o.frame, 7u);
+  EXPECT_EQ(o.exposure_ns, 123);
+  EXPECT_NEAR(o.tip_m[0], 1e-6, 1e-15);
+  EXPECT_NEAR(o.tip_m[1], 0.5e-6, 1e-15);
+  EXPECT_NEAR(o.centre_m[0], -100e-6, 1e-15);
+  EXPECT_NEAR(o.gap_m, -12.5e-6, 1e-15);
+  EXPECT_NEAR(o.membrane_velocity_m_s, -30e-6, 1e-15);
+  EXPECT_TRUE(o.has(rt::Observation::contact));
+  EXPECT_TRUE(o.has(rt::Observation::tip_ok));
+  EXPECT_FALSE(o.has(rt::Observation::punctured));
+  EXPECT_FALSE(o.has(rt::Observation::inner_ok));
+}
+
+}  // namespace

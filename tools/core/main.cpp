@@ -1,0 +1,373 @@
+// punctum-core: the control core and its devices. Sets everything up, then runs the tick on this very thread.
+// No OpenCV, no child processes; nothing allocates once the loop runs.
+#include <fmt/format.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "hal/ipc/segment.hpp"
+#include "hal/realtime.hpp"
+#include "hal/sim/bench.hpp"
+#include "hal/sim/virtual_clock.hpp"
+#include "rt/control/servo.hpp"
+#include "rt/executive/executive.hpp"
+#include "rt/executive/monotonic_clock.hpp"
+#include "rt/platform/allocation_trap.hpp"
+#include "rt/platform/real_time_rights.hpp"
+#include "rt/station/station.hpp"
+#include "tools/core/assembly.hpp"
+#include "tools/core/shut_down.hpp"
+#include "tools/scene/scene.hpp"
+#include "tools/shared/exit_codes.hpp"
+#include "tools/shared/station_segments.hpp"
+#include "tools/shared/stop_signal.hpp"
+#include "tools/shared/version.hpp"
+
+namespace {
+
+using namespace punctum;
+namespace stop_signal = tools::stop_signal;
+
+constexpr double kTimeToWithdraw_s = 10;         // after the time limit, to draw a needle out of the cell
+constexpr double kTimeToRest_s = 2;              // after that, for the forces to fade and the stage to rest
+constexpr std::int64_t kSetUp_ns = 200'000'000;  // from the start of the devices to the first tick
+constexpr int kSignalsToInsist = 3;  // this many end the loop at once; the first is a commanded stop
+
+std::atomic<bool> end_loop{false};
+std::atomic<sim::VirtualClock*> waiting_clock{nullptr};
+static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<sim::VirtualClock*>::is_always_lock_free);
+
+void on_stop_signal(int count) NONBLOCKING {
+  if (count >= kSignalsToInsist) {
+    end_loop.store(true);
+  }
+  if (sim::VirtualClock* clock = waiting_clock.load()) {
+    clock->stop_waiting();
+  }
+}
+
+// The simulated plant, if there is one, the servo, and what ends the run: the slots of the executive.
+class Core {
+ public:
+  Core() = default;
+  Core(const Core&) = delete;
+  Core& operator=(const Core&) = delete;
+
+  void set_up(const tools::Scene& scene, tools::Assembly& assembly, rt::Station& station, bool degraded) {
+    world_ = assembly.world();
+    limit_ns_ = scene.seconds > 0 ? std::llround(scene.seconds * 1e9) : 0;
+    servo_.emplace(scene.servo, assembly.devices(), station, degraded);
+  }
+
+  rt::After step_plant(const rt::Tick& tick) NONBLOCKING {
+    world_->step(tick.wake_ns);
+    return rt::After::go_on;
+  }
+
+  rt::After tick_servo(const rt::Tick& tick) NONBLOCKING {
+    if (stop_signal::count() > 0) {
+      servo_->request_stop();
+    }
+    if (first_) {
+      first_release_ns_ = tick.release_ns;
+      first_ = false;
+    }
+    const std::int64_t t_ns = tick.release_ns - first_release_ns_;
+    if (limit_ns_ > 0 && t_ns >= limit_ns_) {
+      limit_reached_ = true;
+      servo_->request_end();
+      const double past_s = 1e-9 * static_cast<double>(t_ns - limit_ns_);
+      if (past_s >= kTimeToWithdraw_s) {
+        servo_->request_end_here();
+      }
+      if (past_s >= kTimeToWithdraw_s + kTimeToRest_s) {
+        return rt::After::end;
+      }
+    }
+    rt::TickInfo now;
+    now.tick = tick.index;
+    now.release_ns = tick.release_ns;
+    now.start_ns = tick.wake_ns;
+    now.period_s = static_cast<double>(tick.period_ns) * 1e-9;
+    now.missed_in_window = tick.missed_in_window;
+    servo_->tick(now);
+    const bool stopped_at_limit = limit_reached_ && servo_->stop_stage() == rt::StopStage::stopped;
+    return servo_->finished() || stopped_at_limit ? rt::After::end : rt::After::go_on;
+  }
+
+  [[nodiscard]] const rt::Servo& servo() const NONBLOCKING { return *servo_; }
+  [[nodiscard]] bool limit_reached() const NONBLOCKING { return limit_reached_; }
+
+ private:
+  sim::World* world_ = nullptr;
+  std::optional<rt::Servo> servo_;
+  std::int64_t limit_ns_ = 0, first_release_ns_ = 0;
+  bool first_ = true, limit_reached_ = false;
+};
+
+// Static: the servo is large, and its pages are there from the start.
+Core core;
+
+int bad(const std::string& text) {
+  fmt::print(stderr, "{}\n", text);
+  return tools::exit_bad_input;
+}
+
+struct Arguments {
+  std::string scene, clock;
+  tools::HandedSegments segments;
+};
+
+tl::expected<Arguments, std::string> read_arguments(int argc, char** argv) {
+  Arguments a;
+  std::string segments;
+  for (int i = 1; i < argc; i += 2) {
+    const std::string_view key = argv[i];
+    std::string* into = key == "--scene"      ? &a.scene
+                        : key == "--segments" ? &segments
+                        : key == "--clock"    ? &a.clock
+                                              : nullptr;
+    if (into == nullptr || i + 1 >= argc) {
+      return tl::unexpected(fmt::format(
+          "{}: not understood, allowed: --scene FILE --segments NAME=DESCRIPTOR,... [--clock real|virtual]",
+          key));
+    }
+    *into = argv[i + 1];
+  }
+  if (a.scene.empty() || segments.empty()) {
+    return tl::unexpected(
+        std::string("--scene and --segments are missing; `punctum run` starts this program"));
+  }
+  auto handed = tools::HandedSegments::parse(segments);
+  if (!handed) {
+    return tl::unexpected(handed.error());
+  }
+  a.segments = std::move(*handed);
+  if (!a.clock.empty() && a.clock != "real" && a.clock != "virtual") {
+    return tl::unexpected(fmt::format("--clock: {}: unknown, allowed: real or virtual", a.clock));
+  }
+  return a;
+}
+
+rt::RunEnd run_end(const tools::Scene& scene, rt::Executive::Ended ended) {
+  const rt::Fault fault = core.servo().fault();
+  if (ended == rt::Executive::Ended::invalid) {
+    return rt::RunEnd::invalid_setup;
+  }
+  if (fault != rt::Fault::none) {
+    return fault == rt::Fault::command_stop ? rt::RunEnd::stopped : rt::RunEnd::fault;
+  }
+  if (core.servo().outcome() == rt::RunEnd::done) {
+    return rt::RunEnd::done;
+  }
+  if (core.limit_reached()) {
+    return scene.has_task() ? rt::RunEnd::time_limit : rt::RunEnd::done;
+  }
+  return rt::RunEnd::stopped;
+}
+
+// The segments of the station as the core maps them.
+struct StationSegments {
+  hal::Shared<rt::CoreSegment> core;
+  std::optional<hal::Shared<const rt::ObservationSegment>> observation;  // none: the scene has no vision
+  std::vector<hal::Shared<rt::CommandSegment>> commands;                 // in the order of kCommandWriters
+};
+
+tl::expected<StationSegments, std::string> attach_station(const tools::HandedSegments& handed, bool vision) {
+  auto claimed =
+      hal::Shared<rt::CoreSegment>::claim(tools::kCoreSegment, handed.descriptor(tools::kCoreSegment));
+  if (!claimed) {
+    return tl::unexpected(claimed.error());
+  }
+  StationSegments segments{std::move(*claimed), std::nullopt, {}};
+  for (const rt::CommandWriter* writer : rt::kCommandWriters) {
+    const std::string commands = tools::command_segment(*writer);
+    auto attached = hal::Shared<rt::CommandSegment>::attach(commands, handed.descriptor(commands));
+    if (!attached) {
+      return tl::unexpected(attached.error());
+    }
+    segments.commands.push_back(std::move(*attached));
+  }
+  if (vision) {
+    auto observation = hal::Shared<const rt::ObservationSegment>::attach(
+        tools::kObservationSegment, handed.descriptor(tools::kObservationSegment));
+    if (!observation) {
+      return tl::unexpected(observation.error());
+    }
+    segments.observation = std::move(*observation);
+  }
+  return segments;
+}
+
+int run(int argc, char** argv) {
+  if (argc == 2 && std::string_view(argv[1]) == "--version") {
+    fmt::print("{}\n", tools::version_line("punctum-core"));
+    return tools::exit_done;
+  }
+  stop_signal::watch({SIGTERM, SIGINT, SIGHUP, SIGQUIT}, on_stop_signal);
+  const auto arguments = read_arguments(argc, argv);
+  if (!arguments) {
+    return bad(arguments.error());
+  }
+  auto scene = tools::load_scene(arguments->scene);
+  if (!scene) {
+    return bad(scene.error());
+  }
+  if (!arguments->clock.empty()) {
+    scene->clock = arguments->clock == "real" ? tools::ClockKind::real : tools::ClockKind::virtual_time;
+  }
+  const bool real = scene->clock == tools::ClockKind::real;
+  const bool simulated = tools::any_simulated(scene->devices);
+  if (!real && (!simulated || tools::any_real(scene->devices))) {
+    return bad("--clock virtual: the scene has real devices, which do not wait for it, allowed: real");
+  }
+
+  auto segments = attach_station(arguments->segments, scene->vision.has_value());
+  if (!segments) {
+    return bad(segments.error());
+  }
+  if (!stop_signal::watch_parent(segments->core->header.owner_pid)) {
+    return bad("the program that started it has died");
+  }
+  std::optional<hal::Shared<sim::Bench>> bench;
+  std::optional<hal::Shared<sim::CameraAnswers>> camera;
+  if (simulated) {
+    auto attached = hal::Shared<sim::Bench>::attach(tools::kBenchSegment,
+                                                    arguments->segments.descriptor(tools::kBenchSegment));
+    if (!attached) {
+      return bad(attached.error());
+    }
+    bench.emplace(std::move(*attached));
+    auto answers = hal::Shared<sim::CameraAnswers>::attach(
+        tools::kCameraSegment, arguments->segments.descriptor(tools::kCameraSegment));
+    if (!answers) {
+      return bad(answers.error());
+    }
+    camera.emplace(std::move(*answers));
+  }
+  if (stop_signal::count() > 0) {
+    return tools::exit_not_done;  // stopped before anything has moved
+  }
+  rt::CoreStatus& status = segments->core->status;
+  status.pid.store(static_cast<std::uint64_t>(getpid()));
+
+  const auto period_ns = static_cast<std::int64_t>(std::llround(1e9 / scene->servo.rate_Hz));
+  rt::MonotonicClock monotonic;
+  std::optional<sim::VirtualClock> virtual_clock;
+  if (simulated && real) {
+    (*bench)->now_ns.store(monotonic.now_ns());
+  } else if (simulated) {
+    virtual_clock.emplace(**bench, **camera);
+    waiting_clock = &*virtual_clock;
+    if (stop_signal::count() > 0) {
+      virtual_clock->stop_waiting();
+    }
+  }
+  hal::Clock& clock = real ? static_cast<hal::Clock&>(monotonic) : *virtual_clock;
+
+  const auto assembly = tools::Assembly::open({*scene, clock, simulated ? bench->get() : nullptr});
+  if (!assembly) {
+    return bad(assembly.error());
+  }
+
+  std::optional<rt::RealTimeRights> rights;
+  bool degraded = false;
+  if (real) {
+    rt::RightsWanted wanted;
+    wanted.priority = scene->core_priority;
+    wanted.cpu = scene->core_cpu;
+    rights.emplace(rt::RealTimeRights::acquire(wanted));
+    rights->publish(status);
+    degraded = rights->degraded();
+    rt::prefault_writable(segments->core.get(), sizeof(rt::CoreSegment));
+    for (const auto& commands : segments->commands) {
+      rt::prefault_writable(commands.get(), sizeof(rt::CommandSegment));
+    }
+    if (segments->observation) {
+      rt::prefault(segments->observation->get(), sizeof(rt::ObservationSegment));
+    }
+    if (simulated) {
+      rt::prefault_writable(bench->get(), sizeof(sim::Bench));
+    }
+  } else {
+    if (scene->vision) {
+      (void)virtual_clock->await_camera();
+    }
+    (void)virtual_clock->await_recorder();
+  }
+  const std::int64_t start_ns = clock.now_ns() + (real ? kSetUp_ns : period_ns);
+  // From here on every way out of this function, an exception too, goes through it.
+  tools::ShutDown shut_down((*assembly)->devices(), clock, period_ns,
+                            std::llround(scene->servo.estop.power_off_after_s * 1e9));
+  if (const auto started = (*assembly)->start(start_ns); !started) {
+    return bad(started.error());
+  }
+  shut_down.started((*assembly)->world());
+  static const rt::Devices devices = (*assembly)->devices();
+  tools::shut_down_when_spinning(devices);
+  if (!rt::drop_capabilities()) {
+    return bad("its capabilities cannot be given up");
+  }
+  std::vector<rt::CommandInput> commands;
+  for (std::size_t i = 0; i < rt::kCommandWriterCount; ++i) {
+    commands.push_back({&segments->commands[i]->queue, rt::kCommandWriters[i]->role});
+  }
+  rt::Station station{*segments->core, segments->observation ? &(*segments->observation)->slot : nullptr,
+                      commands};
+  core.set_up(*scene, **assembly, station, degraded);
+
+  std::vector<rt::Slot> slots;
+  if ((*assembly)->world() != nullptr) {
+    slots.push_back(rt::slot<&Core::step_plant>("plant", core));
+  }
+  slots.push_back(rt::slot<&Core::tick_servo>("servo", core));
+  rt::ExecutiveConfig config;
+  config.period_ns = period_ns;
+  config.start_ns = start_ns;
+  config.overrun_window_ticks =
+      static_cast<std::uint32_t>(std::clamp(scene->servo.overrun_window_s * scene->servo.rate_Hz, 1.0,
+                                            static_cast<double>(rt::MissedWindow::kMaxTicks)));
+  rt::Executive executive(clock, monotonic, config, slots, status);
+
+  const rt::ThreadCounters before = rt::read_thread_counters();
+  rt::allocation_trap::arm(rt::allocation_trap::On::allocation_count);
+  const bool watched = rt::allocation_trap::armed();
+  const auto ended = executive.run(end_loop);
+  const std::uint64_t allocations = rt::allocation_trap::disarm();
+  rt::publish_counters(before, rt::read_thread_counters(), allocations, watched, status);
+  if (virtual_clock) {
+    virtual_clock->stop_waiting();  // the shut-down waits for nobody
+  }
+  shut_down.run();
+  rt::leave_real_time();
+  waiting_clock = nullptr;
+  const rt::RunEnd end = run_end(*scene, ended);
+  rt::Event last;
+  last.tick = status.tick_index.load();
+  last.t_s = core.servo().sample().t_s;
+  last.kind = rt::Event::ended;
+  last.what = static_cast<std::uint64_t>(end);
+  segments->core->events.push(last);
+  status.run_end.store(static_cast<std::uint64_t>(end), std::memory_order_release);
+  return tools::exit_code(end);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return run(argc, argv);
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "punctum-core: {}\n", e.what());
+    return tools::exit_bad_input;
+  }
+}

@@ -1,0 +1,255 @@
+#include "tools/punctum/measures.hpp"
+
+#include <algorithm>
+#include <numbers>
+
+namespace punctum::tools {
+namespace {
+
+constexpr double kTremorLow_Hz = 8, kTremorHigh_Hz = 12;
+constexpr double kSettle_s = 1;  // of the band-pass, after the start and after the clutch
+
+double norm(const double (&v)[3]) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
+
+}  // namespace
+
+TremorBand::TremorBand(double rate_Hz) {
+  const double f0 = std::sqrt(kTremorLow_Hz * kTremorHigh_Hz);
+  const double w = 2 * std::numbers::pi * f0 / rate_Hz;
+  const double alpha = std::sin(w) * (kTremorHigh_Hz - kTremorLow_Hz) / (2 * f0);
+  b_ = alpha / (1 + alpha);
+  a1_ = -2 * std::cos(w) / (1 + alpha);
+  a2_ = (1 - alpha) / (1 + alpha);
+}
+
+double TremorBand::next(double x) noexcept {
+  if (first_) {
+    offset_ = x;  // begins at rest where the signal is
+    first_ = false;
+  }
+  double v = x - offset_;
+  for (auto& p : past_) {
+    const double y = b_ * (v - p[1]) - a1_ * p[2] - a2_ * p[3];
+    p = {v, p[0], y, p[2]};
+    v = y;
+  }
+  return v;
+}
+
+Measures::Measures(const Scene& scene)
+    : sim_(scene.sim.value_or(sim::SimConfig{})),
+      position_scale_(scene.servo.mapping.position_scale),
+      period_s_(1 / scene.servo.rate_Hz),
+      hand_band_(3, TremorBand(scene.servo.rate_Hz)),
+      tip_band_(3, TremorBand(scene.servo.rate_Hz)) {}
+
+std::optional<double> Measures::tremor_ratio() const {
+  if (tremor_ticks == 0 || tremor_hand2 <= 0) {
+    return std::nullopt;
+  }
+  return position_scale_ * std::sqrt(tremor_tip2 / tremor_hand2);
+}
+
+std::optional<double> Measures::force_error_rms_N() const {
+  if (force_ticks == 0) {
+    return std::nullopt;
+  }
+  return std::sqrt(force_error2 / static_cast<double>(force_ticks));
+}
+
+void Measures::close_phase(double end_s) {
+  open_.end_s = end_s;
+  ++phase_count;
+  if (phases.size() < kKept) {
+    phases.push_back(open_);
+  }
+}
+
+void Measures::close_cell() {
+  if (closed_cell_) {
+    return;
+  }
+  closed_cell_ = true;
+  ++cell_count;
+  const bool without = sim_.injector && now_.injected_s == 0.0;
+  cells_done += now_.done && !now_.lost && !without ? 1U : 0U;
+  cells_without_injection += now_.done && !now_.lost && without ? 1U : 0U;
+  cells_lost += now_.lost ? 1U : 0U;
+  const auto keep = [](const std::optional<double>& v, Spread& into) {
+    if (v) {
+      into.add(*v);
+    }
+  };
+  keep(now_.contact_delay_s, contact_delay_s);
+  keep(now_.puncture_delay_s, puncture_delay_s);
+  keep(now_.inner_delay_s, inner_delay_s);
+  keep(now_.lateral_error_m, lateral_error_m);
+  keep(now_.lateral_contact_m, lateral_contact_m);
+  keep(now_.beyond_puncture_m, beyond_puncture_m);
+  keep(now_.withdrawal_s, withdrawal_s);
+  if (cells.size() < kKept) {
+    cells.push_back(now_);
+  }
+}
+
+void Measures::change_phase(const rt::TelemetrySample& s) {
+  close_phase(s.t_s);
+  const rt::Phase from = open_.phase;
+  open_ = {s.cell, s.phase, s.t_s, s.t_s};
+  if (s.cell != now_.cell) {
+    close_cell();
+    now_ = {};
+    now_.cell = s.cell;
+    closed_cell_ = false;
+    was_contact_ = zona_seen_ = puncture_seen_ = false;
+    true_contact_s_ = phase_contact_s_ = phase_puncture_s_ = withdrawal_from_s_ = -1;
+  }
+  switch (s.phase) {
+    case rt::Phase::contact:
+      if (from == rt::Phase::free) {
+        phase_contact_s_ = s.t_s;
+      }
+      break;
+    case rt::Phase::puncture:
+      if (phase_puncture_s_ < 0) {
+        phase_puncture_s_ = s.t_s;
+      }
+      break;
+    case rt::Phase::withdrawal:
+      if (withdrawal_from_s_ < 0) {
+        withdrawal_from_s_ = s.t_s;
+      }
+      break;
+    case rt::Phase::clear:
+      if (withdrawal_from_s_ >= 0) {
+        now_.withdrawal_s = s.t_s - withdrawal_from_s_;
+      }
+      now_.done = true;
+      break;
+    case rt::Phase::free:
+    case rt::Phase::indentation:
+    case rt::Phase::injection:
+      break;
+  }
+}
+
+void Measures::tick(const rt::TelemetrySample& s, const sim::Snapshot* world) {
+  if (!any_) {
+    any_ = true;
+    open_ = {s.cell, s.phase, s.t_s, s.t_s};
+    now_.cell = s.cell;
+    closed_cell_ = !sim_.cell.has_value();
+  } else {
+    if (s.phase != open_.phase || s.cell != open_.cell) {
+      change_phase(s);
+    }
+    if (s.tick > last.tick + 1) {
+      gaps += s.tick - last.tick - 1;
+    }
+    if (s.fault != last.fault && s.fault != rt::Fault::none) {
+      ++fault_count;
+      if (faults.size() < kKept) {
+        faults.push_back({s.fault, s.t_s});
+      }
+    }
+    if ((s.alarms & ~last.alarms & rt::alarm_vision_stale) != 0) {
+      ++stale_spells;
+    }
+  }
+  if (ticks == 0 && s.fault != rt::Fault::none) {
+    ++fault_count;
+    faults.push_back({s.fault, s.t_s});
+  }
+  ++ticks;
+  for (std::size_t i = 0; i < alarm_ticks.size(); ++i) {
+    if ((s.alarms & (1U << i)) != 0) {
+      ++alarm_ticks[i];
+    }
+  }
+  observations = s.observations;
+  stale_ticks = s.stale_ticks;
+  const double hand_N = norm(s.force_N);
+  now_.peak_hand_N = std::max(now_.peak_hand_N, hand_N);
+  peak_hand_N = std::max(peak_hand_N, hand_N);
+
+  if (world != nullptr) {
+    // Tremor: hand and tip as they really move.
+    if ((s.buttons & hal::kButtonClutch) != 0) {
+      clutch_until_s_ = s.t_s + kSettle_s;
+    }
+    const bool counts = s.t_s > kSettle_s && s.t_s > clutch_until_s_;
+    const hal::Vec3 hand = world->hand.position_m, tip = world->stage.tip_m;
+    for (int i = 0; i < 3; ++i) {
+      const double h = hand_band_[static_cast<std::size_t>(i)].next(hand[i]);
+      const double t = tip_band_[static_cast<std::size_t>(i)].next(tip[i]);
+      if (counts) {
+        tremor_hand2 += h * h;
+        tremor_tip2 += t * t;
+      }
+    }
+    tremor_ticks += counts ? 1U : 0U;
+
+    // The plant puts a fresh cell in place a tick or more before the core knows.
+    if (world->has_cell != 0 && world->cell_index == s.cell) {
+      const sim::Truth truth = sim::truth_of(sim_, *world);
+      if (truth.contact && !was_contact_) {
+        true_contact_s_ = s.t_s;
+      }
+      was_contact_ = truth.contact;
+      if (truth.contact && !now_.lateral_contact_m) {
+        now_.lateral_contact_m = truth.lateral_m;
+      }
+      if (truth.zona_punctured && !zona_seen_) {
+        zona_seen_ = true;
+        now_.lateral_error_m = truth.lateral_m;
+        if (phase_contact_s_ >= 0 && true_contact_s_ >= 0) {
+          now_.contact_delay_s = phase_contact_s_ - true_contact_s_;
+        }
+      }
+      if (truth.zona_punctured && phase_puncture_s_ >= 0 && !now_.puncture_delay_s) {
+        now_.puncture_delay_s = phase_puncture_s_ - truth.zona_puncture_s;
+      }
+      const double depth = -truth.gap_m;
+      const double delivered_s = world->injector.delivered_s - delivered_s_;
+      now_.injected_s = now_.injected_s.value_or(0) + (truth.zona_punctured && depth > 0 ? delivered_s : 0);
+      if (truth.punctured) {
+        if (!puncture_seen_) {
+          puncture_seen_ = true;
+          puncture_depth_m_ = depth;
+        }
+        now_.beyond_puncture_m = std::max(now_.beyond_puncture_m.value_or(0), depth - puncture_depth_m_);
+        if (phase_puncture_s_ >= 0 && !now_.inner_delay_s) {
+          now_.inner_delay_s = phase_puncture_s_ - truth.puncture_s;
+        }
+      }
+      if (truth.contact) {
+        now_.max_depth_m = std::max(now_.max_depth_m, depth);
+        now_.peak_force_N = std::max(now_.peak_force_N, truth.axial_force_N);
+      }
+      now_.lost = now_.lost || truth.lost;
+      max_depth_m = std::max(max_depth_m, now_.max_depth_m);
+      peak_force_N = std::max(peak_force_N, now_.peak_force_N);
+      if ((s.phase == rt::Phase::contact || s.phase == rt::Phase::indentation) && truth.contact &&
+          !truth.zona_punctured) {
+        const double e = s.tip_force_N - truth.axial_force_N;
+        force_error2 += e * e;
+        force_error_sum += e;
+        true_force2 += truth.axial_force_N * truth.axial_force_N;
+        ++force_ticks;
+      }
+    }
+    delivered_s_ = world->injector.delivered_s;
+  }
+  last = s;
+  last_s = s.t_s;
+}
+
+void Measures::finish() {
+  if (!any_) {
+    return;
+  }
+  close_phase(last_s + period_s_);
+  close_cell();
+}
+
+}  // namespace punctum::tools

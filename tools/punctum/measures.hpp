@@ -1,0 +1,137 @@
+// Measures a run tick by tick: the telemetry of the core beside the truth of the simulated plant, where there
+// is one. Memory is bounded however long the run is.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "hal/sim/bench.hpp"
+#include "hal/sim/truth.hpp"
+#include "rt/station/telemetry.hpp"
+#include "tools/scene/scene.hpp"
+
+namespace punctum::tools {
+
+// Mean and spread of a number that comes once per cell.
+struct Spread {
+  std::uint64_t n = 0;
+  double mean = 0, m2 = 0, largest = 0;
+  void add(double v) noexcept {
+    ++n;
+    const double d = v - mean;
+    mean += d / static_cast<double>(n);
+    m2 += d * (v - mean);
+    if (n == 1 || v > largest) {
+      largest = v;
+    }
+  }
+  [[nodiscard]] double deviation() const noexcept {
+    return n > 1 ? std::sqrt(m2 / static_cast<double>(n - 1)) : 0;
+  }
+};
+
+// 8 .. 12 Hz, two second-order sections.
+class TremorBand {
+ public:
+  explicit TremorBand(double rate_Hz);
+  double next(double x) noexcept;
+
+ private:
+  double b_, a1_, a2_;
+  std::array<std::array<double, 4>, 2> past_{};  // per section x1 x2 y1 y2
+  bool first_ = true;
+  double offset_ = 0;
+};
+
+struct PhaseSpan {
+  std::uint32_t cell = 0;
+  rt::Phase phase{};
+  double start_s = 0, end_s = 0;
+};
+
+// Of one cell. An empty value: the run did not come to that.
+struct CellMeasures {
+  std::uint32_t cell = 0;
+  std::optional<double> contact_delay_s;   // phase contact after true contact; < 0 = too early
+  std::optional<double> puncture_delay_s;  // phase puncture after the outer membrane gave way
+  std::optional<double> inner_delay_s;     // ... after the innermost one did
+  std::optional<double>
+      lateral_error_m;  // needle axis beside the cell's centre when the outer membrane gave way
+  std::optional<double> lateral_contact_m;  // the same at first contact
+  std::optional<double> beyond_puncture_m;  // deepest tip beyond where it stood at the puncture
+  std::optional<double> withdrawal_s;
+  double peak_force_N = 0;  // true, along the needle
+  double max_depth_m = 0;   // true, past the undeformed outer membrane
+  double peak_hand_N = 0;
+  std::optional<double> injected_s;  // in truth: the injector's opening over time, tip in the cell
+  bool done = false;                 // the core came to `clear`
+  bool lost = false;                 // in truth: torn, pierced through or off the pipette
+};
+
+class Measures {
+ public:
+  explicit Measures(const Scene& scene);
+
+  // One tick; `world` is the plant at that tick, null if nobody simulates.
+  void tick(const rt::TelemetrySample& s, const sim::Snapshot* world);
+  void finish();  // after the last tick
+
+  static constexpr std::size_t kKept = 1000;  // phases and cells listed one by one; all are counted
+  std::vector<PhaseSpan> phases;
+  std::vector<CellMeasures> cells;
+  std::uint64_t phase_count = 0, cell_count = 0, cells_done = 0, cells_lost = 0;
+  std::uint64_t cells_without_injection =
+      0;  // clear and whole, but nothing came out of the injector that is there
+  Spread contact_delay_s, puncture_delay_s, inner_delay_s, lateral_error_m, lateral_contact_m,
+      beyond_puncture_m, withdrawal_s;
+  double peak_force_N = 0, max_depth_m = 0, peak_hand_N = 0;
+
+  // Estimated less true needle force, from contact until the outer membrane gives way.
+  double force_error2 = 0, force_error_sum = 0, true_force2 = 0;
+  std::uint64_t force_ticks = 0;
+
+  double tremor_hand2 = 0, tremor_tip2 = 0;
+  std::uint64_t tremor_ticks = 0;
+
+  std::uint64_t ticks = 0, gaps = 0;  // gaps: grid indices without a sample
+  std::uint64_t observations = 0, stale_ticks = 0, stale_spells = 0;
+  std::array<std::uint64_t, 16> alarm_ticks{};
+  struct Fault {
+    rt::Fault fault{};
+    double t_s = 0;
+  };
+  std::vector<Fault> faults;  // as they were latched
+  std::uint64_t fault_count = 0;
+  double last_s = 0;
+  rt::TelemetrySample last;
+
+  [[nodiscard]] std::optional<double> tremor_ratio() const;
+  [[nodiscard]] std::optional<double> force_error_rms_N() const;
+
+ private:
+  void change_phase(const rt::TelemetrySample& s);
+  void close_phase(double end_s);
+  void close_cell();
+
+  sim::SimConfig sim_;
+  double position_scale_;
+  double period_s_;
+  std::vector<TremorBand> hand_band_, tip_band_;
+
+  bool any_ = false;
+  PhaseSpan open_;
+  CellMeasures now_;
+  bool closed_cell_ = true;
+  bool was_contact_ = false;
+  double true_contact_s_ = -1, phase_contact_s_ = -1, phase_puncture_s_ = -1, withdrawal_from_s_ = -1;
+  double puncture_depth_m_ = 0;
+  double delivered_s_ = 0;
+  bool zona_seen_ = false, puncture_seen_ = false;
+  double clutch_until_s_ = 0;
+};
+
+}  // namespace punctum::tools

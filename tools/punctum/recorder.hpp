@@ -1,0 +1,84 @@
+// Writes samples.csv and feeds the measures: takes the telemetry and the events of the core and, when the
+// world is simulated, the snapshots of the bench, tick by tick. Under the virtual clock the same seed gives
+// the same bytes. However thin samples.csv is, fault.csv has every tick from two seconds before a fault to
+// half a second after it.
+#pragma once
+
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "hal/ipc/exchange.hpp"
+#include "hal/sim/bench.hpp"
+#include "rt/station/station.hpp"
+#include "tools/punctum/event_list.hpp"
+#include "tools/punctum/measures.hpp"
+
+namespace punctum::tools {
+
+class Recorder {
+ public:
+  // Every n-th tick becomes a row, and every tick on which phase, fault, e-stop or cell changes.
+  static tl::expected<Recorder, std::string> create(const std::string& folder, const Scene& scene,
+                                                    const rt::CoreSegment& core, sim::Bench* bench,
+                                                    std::uint64_t every);
+
+  // Takes what is there; returns the number of ticks taken. `to_the_end`: the writers are gone.
+  std::uint64_t drain(bool to_the_end = false);
+
+  // As after a fault, where the core died and latched none.
+  void keep_last_seconds();
+
+  [[nodiscard]] const Measures& measures() const noexcept { return measures_; }
+  [[nodiscard]] const EventList& events() const noexcept { return events_; }
+  [[nodiscard]] std::uint64_t rows() const noexcept { return rows_; }
+  // Samples that were overwritten before they were read.
+  [[nodiscard]] std::uint64_t lost() const noexcept { return telemetry_.lost(); }
+  [[nodiscard]] std::uint64_t every() const noexcept { return every_; }
+  [[nodiscard]] bool write_failed() const noexcept { return failed_; }
+  void finish();
+
+ private:
+  struct Close {
+    void operator()(std::FILE* f) const noexcept { std::fclose(f); }
+  };
+  struct Tick {
+    rt::TelemetrySample sample;
+    sim::Snapshot world;
+    bool has_world = false;
+  };
+  Recorder(std::FILE* file, const std::string& folder, const Scene& scene, const rt::CoreSegment& core,
+           sim::Bench* bench, std::uint64_t every);
+  [[nodiscard]] const sim::Snapshot* world_of(const rt::TelemetrySample& s);  // null: there is none
+  void record(const rt::TelemetrySample& s, const sim::Snapshot* world);
+  void record_fault(const rt::TelemetrySample& s, const sim::Snapshot* world);
+  void row(std::FILE* file, const rt::TelemetrySample& s, const sim::Snapshot* world);
+
+  using File = std::unique_ptr<std::FILE, Close>;
+  File file_;
+  std::string fault_path_;
+  File fault_file_;           // from the first fault on
+  std::vector<Tick> recent_;  // a ring of two seconds
+  std::uint64_t recent_end_ = 0, recent_count_ = 0;
+  std::uint64_t after_fault_ = 0;  // rows that are still to be written after it
+  int faults_kept_ = 0;
+  sim::SimConfig sim_;
+  Measures measures_;
+  hal::Follower<rt::TelemetryRing> telemetry_;
+  hal::Follower<rt::EventRing> event_ring_;
+  EventList events_;
+  std::unique_ptr<sim::SnapshotTaker> taker_;
+  std::uint64_t every_;
+  std::uint64_t rows_ = 0;
+  double half_period_s_;
+  std::uint64_t ticks_after_fault_;
+  bool failed_ = false;
+  bool world_pending_ = false;  // world_ is of a tick whose sample has not come yet
+  rt::TelemetrySample sample_, before_;
+  sim::Snapshot world_;
+};
+
+}  // namespace punctum::tools

@@ -1,0 +1,386 @@
+#include "tools/punctum/run_report.hpp"
+
+#include <fmt/format.h>
+#include <sys/utsname.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+
+#include "rt/forces/list.hpp"
+#include "tools/shared/csv.hpp"
+
+namespace punctum::tools {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json number(const std::optional<double>& v, double scale = 1) {
+  return v && std::isfinite(*v) ? Json(*v * scale) : Json(nullptr);
+}
+
+// Mean over the cells; null when no cell came to it.
+Json mean(const Spread& s, double scale) { return s.n > 0 ? Json(s.mean * scale) : Json(nullptr); }
+
+template <class H>
+Json times(const H& h) {
+  return {{"p50", h.percentile_us(0.5)},
+          {"p99", h.percentile_us(0.99)},
+          {"p99_9", h.percentile_us(0.999)},
+          {"max", h.max_us()}};
+}
+
+std::vector<const rt::Right*> rights(const rt::CoreStatus& core) {
+  std::vector<const rt::Right*> list;
+  const auto n = std::min<std::uint64_t>(core.rights_count.load(), rt::kMaxRights);
+  for (std::uint64_t i = 0; i < n; ++i) {
+    list.push_back(&core.rights[i]);
+  }
+  return list;
+}
+
+// What an event is about, in words; a number where this program knows no word.
+std::string subject(const rt::Event& e) {
+  const auto named = [&e](auto limit, auto text) {
+    return e.what < static_cast<std::uint64_t>(limit) ? std::string(text(e.what)) : std::to_string(e.what);
+  };
+  switch (e.kind) {
+    case rt::Event::fault:
+    case rt::Event::fault_cleared:
+      return named(rt::kFaults, [](auto n) { return rt::name(static_cast<rt::Fault>(n)); });
+    case rt::Event::alarm_on:
+    case rt::Event::alarm_off:
+      return named(std::size(rt::kAlarmNames), [](auto n) { return rt::kAlarmNames[n]; });
+    case rt::Event::phase:
+      return named(rt::kPhases, [](auto n) { return rt::name(static_cast<rt::Phase>(n)); });
+    case rt::Event::command:
+    case rt::Event::command_refused:
+      return named(rt::kCommandKinds, [](auto n) { return rt::name(static_cast<rt::Command::Kind>(n)); });
+    case rt::Event::ended:
+      return named(rt::kRunEnds, [](auto n) { return rt::name(static_cast<rt::RunEnd>(n)); });
+    default:
+      return std::to_string(e.what);
+  }
+}
+
+Json event_row(const rt::Event& e) {
+  const bool known = e.kind < static_cast<std::uint64_t>(rt::kEventKinds);
+  Json row = {{"t_s", e.t_s},
+              {"tick", e.tick},
+              {"event", known ? rt::name(static_cast<rt::Event::Kind>(e.kind)) : "unknown"},
+              {"what", subject(e)}};
+  if (e.kind == rt::Event::phase) {
+    row["cell"] = e.value;
+  }
+  if (e.kind == rt::Event::command || e.kind == rt::Event::command_refused) {
+    row["value"] = number(e.value);
+    if (e.what == rt::Command::effect_gain && e.target < rt::effect_count) {
+      row["target"] = rt::effect_name(e.target);
+    }
+    row["writer"] =
+        e.writer < rt::kCommandWriterCount ? Json(rt::kCommandWriters[e.writer]->name) : Json(e.writer);
+  }
+  return row;
+}
+
+// How long so many ticks last.
+double seconds_of(const Measures& m, std::uint64_t ticks) {
+  return m.ticks > 0 ? static_cast<double>(ticks) * m.last_s / static_cast<double>(m.ticks) : 0;
+}
+
+}  // namespace
+
+std::optional<ContourError> read_contour_error(const std::string& obs_csv) {
+  CsvReader table(obs_csv);
+  ContourError e;
+  double sum = 0, sum95 = 0;
+  while (table.next()) {
+    const auto rms_um = table.number("outer_rms_um");
+    if (!rms_um || *rms_um < 0) {
+      continue;
+    }
+    const double p95_um = table.number("outer_p95_um").value_or(0);
+    ++e.frames;
+    sum += *rms_um * *rms_um;
+    sum95 += p95_um > 0 ? p95_um * p95_um : 0;
+  }
+  if (e.frames == 0) {
+    return std::nullopt;
+  }
+  e.rms_um = std::sqrt(sum / static_cast<double>(e.frames));
+  e.p95_um = std::sqrt(sum95 / static_cast<double>(e.frames));
+  return e;
+}
+
+std::string missing_rights(const rt::CoreStatus& core) {
+  std::string missing, advice;
+  for (const auto* r : rights(core)) {
+    if (r->got != 0) {
+      continue;
+    }
+    if (r->required == 0) {
+      advice += fmt::format("{}{}", advice.empty() ? "" : ", ", r->name.text);
+      continue;
+    }
+    missing += fmt::format("\n  {:<18} {}", r->name.text, r->detail.text);
+    if (r->remedy.text[0] != '\0') {
+      missing += fmt::format("\n{:21}get it: {}", "", r->remedy.text);
+    }
+  }
+  if (missing.empty()) {
+    return missing;
+  }
+  std::string text =
+      "DEGRADED: these real-time rights are missing, so the timing of this run proves nothing" + missing;
+  if (!advice.empty()) {
+    text += "\n  also advisable: " + advice + " (punctum check tells how)";
+  }
+  return text;
+}
+
+tl::expected<void, std::string> write_report(const std::string& path, const Scene& scene,
+                                             const RunResult& result, const Measures& m,
+                                             const EventList& events, const rt::CoreStatus& core,
+                                             const std::optional<ContourError>& contour) {
+  Json j;
+  j["outcome"] = rt::name(result.end);
+  if (!result.detail.empty()) {
+    j["outcome_detail"] = result.detail;
+  }
+  j["scene"] = scene.name;
+  j["clock"] = scene.clock == ClockKind::real ? "real" : "virtual";
+  if (scene.sim) {
+    j["seed"] = scene.sim->seed;
+  }
+  j["rate_hz"] = scene.servo.rate_Hz;
+  j["seconds"] = m.last_s;
+  j["wall_s"] = result.wall_s;
+  j["phases"] = Json::array();
+  for (const auto& p : m.phases) {
+    j["phases"].push_back(
+        {{"name", rt::name(p.phase)}, {"start_s", p.start_s}, {"end_s", p.end_s}, {"cell", p.cell}});
+  }
+  if (m.phase_count > m.phases.size()) {
+    j["phases_not_listed"] = m.phase_count - m.phases.size();
+  }
+
+  j["ticks"] = core.ticks.load();
+  j["missed"] = core.missed.load();
+  j["worst_lateness_us"] = static_cast<double>(core.worst_lateness_ns.load()) * 1e-3;
+  j["wake_us"] = times(core.wake);
+  j["tick_us"] = times(core.tick);  // everything of one tick, the simulated plant included
+  j["slots_us"] = Json::object();
+  for (std::uint64_t i = 0; i < std::min<std::uint64_t>(core.slot_count.load(), rt::kMaxSlots); ++i) {
+    j["slots_us"][core.slots[i].name.text] = times(core.slots[i].execution);
+  }
+  // Counted by the core when it ends: unknown of one that was killed.
+  const auto counted = [&result](std::uint64_t n) {
+    return result.end == rt::RunEnd::core_died ? Json(nullptr) : Json(n);
+  };
+  j["page_faults"] = {{"minor", counted(core.minor_faults.load())},
+                      {"major", counted(core.major_faults.load())}};
+  j["switches"] = {{"voluntary", counted(core.voluntary_switches.load())},
+                   {"involuntary", counted(core.involuntary_switches.load())}};
+  j["allocations"] = core.allocations_watched.load() != 0 ? Json(core.allocations.load()) : Json(nullptr);
+  j["degraded"] = core.degraded.load() != 0;
+  j["rights"] = Json::array();
+  for (const auto* r : rights(core)) {
+    j["rights"].push_back({{"name", r->name.text},
+                           {"got", r->got != 0},
+                           {"required", r->required != 0},
+                           {"detail", r->detail.text},
+                           {"remedy", r->remedy.text}});
+  }
+
+  // Against the truth. One number per run: the mean over its cells; peaks are the largest.
+  j["contact_delay_ms"] = mean(m.contact_delay_s, 1e3);
+  j["puncture_delay_ms"] = mean(m.puncture_delay_s, 1e3);
+  j["puncture_inner_delay_ms"] = mean(m.inner_delay_s, 1e3);
+  j["force_error_rms_N"] = number(m.force_error_rms_N());
+  j["force_error_mean_N"] =
+      m.force_ticks > 0 ? Json(m.force_error_sum / static_cast<double>(m.force_ticks)) : Json(nullptr);
+  j["true_force_rms_N"] =
+      m.force_ticks > 0 ? Json(std::sqrt(m.true_force2 / static_cast<double>(m.force_ticks))) : Json(nullptr);
+  j["contour_error_um"] = contour ? Json{{"rms", contour->rms_um}, {"p95", contour->p95_um}} : Json(nullptr);
+  j["lateral_error_um"] = mean(m.lateral_error_m, 1e6);
+  j["lateral_error_contact_um"] = mean(m.lateral_contact_m, 1e6);
+  const bool cell = scene.sim && scene.sim->cell;
+  j["peak_force_N"] = cell ? Json(m.peak_force_N) : Json(nullptr);  // at the needle, true
+  j["peak_hand_force_N"] = m.peak_hand_N;
+  j["max_depth_um"] = cell ? Json(m.max_depth_m * 1e6) : Json(nullptr);
+  j["depth_beyond_puncture_um"] = mean(m.beyond_puncture_m, 1e6);
+  j["withdrawal_s"] = mean(m.withdrawal_s, 1);
+  j["tremor_ratio"] = number(m.tremor_ratio());
+  j["tremor_hand_um"] = m.tremor_ticks > 0
+                            ? Json(std::sqrt(m.tremor_hand2 / static_cast<double>(m.tremor_ticks)) * 1e6)
+                            : Json(nullptr);
+  j["tremor_tip_um"] = m.tremor_ticks > 0
+                           ? Json(std::sqrt(m.tremor_tip2 / static_cast<double>(m.tremor_ticks)) * 1e6)
+                           : Json(nullptr);
+  j["cells"] = {{"tried", m.cell_count},
+                {"done", m.cells_done},
+                {"lost", m.cells_lost},
+                {"without_injection", m.cells_without_injection}};
+  j["cell_list"] = Json::array();
+  for (const auto& c : m.cells) {
+    j["cell_list"].push_back({{"cell", c.cell},
+                              {"done", c.done},
+                              {"lost", c.lost},
+                              {"contact_delay_ms", number(c.contact_delay_s, 1e3)},
+                              {"puncture_delay_ms", number(c.puncture_delay_s, 1e3)},
+                              {"lateral_error_um", number(c.lateral_error_m, 1e6)},
+                              {"lateral_error_contact_um", number(c.lateral_contact_m, 1e6)},
+                              {"peak_force_N", c.peak_force_N},
+                              {"max_depth_um", c.max_depth_m * 1e6},
+                              {"depth_beyond_puncture_um", number(c.beyond_puncture_m, 1e6)},
+                              {"withdrawal_s", number(c.withdrawal_s)},
+                              {"injected_s", number(c.injected_s)}});
+  }
+
+  j["observations"] = m.observations;
+  j["stale_observations"] = m.stale_spells;  // times an observation became too old
+  j["stale_s"] = seconds_of(m, m.stale_ticks);
+  j["vision_restarts"] = Json::array();
+  for (const auto& r : result.vision_restarts) {
+    j["vision_restarts"].push_back({{"t_s", r.t_s}, {"why", r.why}});
+  }
+  j["alarms_s"] = Json::object();
+  for (std::size_t i = 0; i < std::size(rt::kAlarmNames); ++i) {
+    if (m.alarm_ticks[i] > 0) {
+      j["alarms_s"][rt::kAlarmNames[i]] = seconds_of(m, m.alarm_ticks[i]);
+    }
+  }
+  j["faults"] = Json::array();
+  for (const auto& f : m.faults) {
+    j["faults"].push_back({{"name", rt::name(f.fault)}, {"t_s", f.t_s}});
+  }
+  j["commands_refused"] = core.commands_refused.load();
+  j["events"] = Json::array();
+  for (const rt::Event& e : events.list) {
+    j["events"].push_back(event_row(e));
+  }
+  j["events_not_listed"] = events.not_listed + events.lost;
+  j["injected_energy_J"] = m.last.injected_energy_J;
+  if (result.unattended) {
+    const auto& u = *result.unattended;
+    const auto when = [](double s) { return s < 0 ? Json(nullptr) : Json(s); };
+    j["unattended"] = {{"safe", u.safe},
+                       {"relay_opened_s", when(u.relay_opened_s)},
+                       {"stage_at_rest_s", when(u.stage_at_rest_s)},
+                       {"stage_moved_um", u.stage_moved_m * 1e6},
+                       {"gate_shut_s", when(u.gate_shut_s)},
+                       {"hand_force_off_s", when(u.hand_force_off_s)},
+                       {"vacuum_kept", u.vacuum_kept},
+                       {"cell_held", u.cell_held}};
+  }
+  j["samples"] = {
+      {"rows", result.rows}, {"every", result.rows_every}, {"lost", result.samples_lost}, {"gaps", m.gaps}};
+  utsname system{};
+  uname(&system);
+  j["machine"] = {{"kernel", std::string(system.release) + " " + system.version},
+                  {"architecture", system.machine}};
+  std::ofstream out(path);
+  out << j.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
+  if (!out.flush()) {
+    return tl::unexpected(path + ": cannot be written");
+  }
+  return {};
+}
+
+std::string summary(const Scene& scene, const RunResult& result, const Measures& m,
+                    const rt::CoreStatus& core, const std::optional<ContourError>& contour) {
+  std::string s;
+  const auto line = [&s](const char* what, const std::string& text) {
+    s += fmt::format("{:<16}{}\n", what, text);
+  };
+  line("outcome", fmt::format("{}{} after {:.1f} s{}", rt::name(result.end),
+                              result.detail.empty() ? "" : " (" + result.detail + ")", m.last_s,
+                              scene.clock == ClockKind::virtual_time
+                                  ? fmt::format(" of virtual time, {:.1f} s real", result.wall_s)
+                                  : ""));
+  if (scene.servo.phases) {
+    std::string text;
+    const std::size_t shown = std::min<std::size_t>(m.phases.size(), 14);
+    for (std::size_t i = 0; i < shown; ++i) {
+      text +=
+          fmt::format("{}{} {:.1f}", i > 0 ? " > " : "", rt::name(m.phases[i].phase), m.phases[i].start_s);
+    }
+    if (m.phase_count > shown) {
+      text += fmt::format(" > ... {} in all", m.phase_count);
+    }
+    line("phases", text + " s");
+  }
+  if (scene.sim && scene.sim->cell) {
+    line("cells",
+         fmt::format(
+             "{} done, {} lost, {}{} tried", m.cells_done, m.cells_lost,
+             m.cells_without_injection > 0 ? fmt::format("{} got nothing, ", m.cells_without_injection) : "",
+             m.cell_count));
+    const auto value = [](const Spread& v, double scale, const char* unit) {
+      if (v.n == 0) {
+        return std::string("-");
+      }
+      return v.n == 1 ? fmt::format("{:.3g} {}", v.mean * scale, unit)
+                      : fmt::format("{:.3g} +- {:.2g} {}", v.mean * scale, v.deviation() * scale, unit);
+    };
+    line("entry", fmt::format("lateral error {}, contact seen after {}, puncture after {}",
+                              value(m.lateral_error_m, 1e6, "um"), value(m.contact_delay_s, 1e3, "ms"),
+                              value(m.puncture_delay_s, 1e3, "ms")));
+    line("needle", fmt::format("peak force {:.1f} uN, depth {:.1f} um, beyond the puncture {}, withdrawal {}",
+                               m.peak_force_N * 1e6, m.max_depth_m * 1e6,
+                               value(m.beyond_puncture_m, 1e6, "um"), value(m.withdrawal_s, 1, "s")));
+    if (const auto e = m.force_error_rms_N()) {
+      line("force estimate",
+           fmt::format("error {:.2f} uN rms of {:.2f} uN rms true force", *e * 1e6,
+                       std::sqrt(m.true_force2 / static_cast<double>(m.force_ticks)) * 1e6));
+    }
+  }
+  if (const auto r = m.tremor_ratio()) {
+    line("tremor", fmt::format("tip / hand {:.3f} in 8-12 Hz", *r));
+  }
+  if (scene.vision) {
+    line("vision", fmt::format("{} observations, {} times stale ({:.2f} s), {} restarts{}", m.observations,
+                               m.stale_spells, seconds_of(m, m.stale_ticks), result.vision_restarts.size(),
+                               contour ? fmt::format(", outer contour {:.2f} um rms", contour->rms_um) : ""));
+  }
+  line("ticks",
+       fmt::format("{} at {} Hz, missed {}{}", core.ticks.load(), scene.servo.rate_Hz, core.missed.load(),
+                   core.allocations_watched.load() != 0
+                       ? fmt::format(", allocations {}", core.allocations.load())
+                       : std::string()));
+  if (scene.clock == ClockKind::real) {
+    line("timing",
+         fmt::format(
+             "wake-up p50 {:.0f} p99.9 {:.0f} max {:.0f} us; tick p50 {:.0f} p99.9 {:.0f} max {:.0f} us; "
+             "page faults {}",
+             core.wake.percentile_us(0.5), core.wake.percentile_us(0.999), core.wake.max_us(),
+             core.tick.percentile_us(0.5), core.tick.percentile_us(0.999), core.tick.max_us(),
+             result.end == rt::RunEnd::core_died
+                 ? "not known"
+                 : fmt::format("{} + {}", core.minor_faults.load(), core.major_faults.load())));
+  }
+  std::string alarms;
+  for (std::size_t i = 0; i < std::size(rt::kAlarmNames); ++i) {
+    if (seconds_of(m, m.alarm_ticks[i]) >= 0.005 && (1U << i) != rt::alarm_degraded) {
+      alarms += fmt::format("{}{} {:.2f} s", alarms.empty() ? "" : ", ", rt::kAlarmNames[i],
+                            seconds_of(m, m.alarm_ticks[i]));
+    }
+  }
+  if (!alarms.empty()) {
+    line("alarms", alarms);
+  }
+  for (std::size_t i = 0; i < std::min<std::size_t>(m.faults.size(), 5); ++i) {
+    line("fault", fmt::format("{} at {:.3f} s", rt::name(m.faults[i].fault), m.faults[i].t_s));
+  }
+  if (result.samples_lost > 0) {
+    line("recording", fmt::format("{} samples were overrun before they were read", result.samples_lost));
+  }
+  if (result.rows_every > 1) {
+    line("samples.csv", fmt::format("one row for {} ticks, and every change of phase", result.rows_every));
+  }
+  return s;
+}
+
+}  // namespace punctum::tools

@@ -1,0 +1,23 @@
+// Runs a scene: starts core and vision, watches and restarts them, records their telemetry and writes the
+// report. The parent itself is an ordinary process: it may be slow, swap or die without moving the needle.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "tools/scene/scene.hpp"
+
+namespace punctum::tools {
+
+struct RunSettings {
+  std::string report;               // folder; empty: reports/SCENE-DATE here
+  std::uint64_t samples_every = 0;  // 0: every tick, of long runs every n-th
+  bool frames = true;               // annotated frames
+  bool figure = true;
+  bool quiet = false;  // the summary only
+};
+
+// Returns an ExitCode.
+[[nodiscard]] int run_scene(const Scene& scene, const RunSettings& settings);
+
+}  // namespace punctum::tools

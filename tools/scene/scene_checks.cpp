@@ -1,0 +1,590 @@
+// What must fit together between the tables of a scene.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+#include <type_traits>
+
+#include "hal/sim/failures.hpp"
+#include "rt/control/renderable.hpp"
+#include "tools/scene/scene_keys.hpp"
+
+namespace punctum::tools {
+namespace {
+
+using Found = std::optional<Problem>;
+
+constexpr double um(double m) { return m * 1e6; }
+
+// Four digits, rounded down: what is said to be allowed is allowed.
+double rounded_down(double v) {
+  if (!(v > 0) || !std::isfinite(v)) {
+    return v;
+  }
+  const double unit = std::pow(10, std::floor(std::log10(v)) - 3);
+  return std::floor(v / unit) * unit;
+}
+
+// ---- things that need other things ----
+
+Found check_needs(const Scene& s) {
+  const auto& servo = s.servo;
+  const auto needs = [](bool there, const char* what, bool has, const char* needed,
+                        const char* why) -> Found {
+    if (!there || has) {
+      return std::nullopt;
+    }
+    return Problem{
+        what, fmt::format("needs [{}] ({}), allowed: add [{}] or leave [{}] out", needed, why, needed, what)};
+  };
+  const bool camera = !s.devices.camera.empty();
+  const bool drawn = s.simulated_camera();
+  const bool cell = s.sim && s.sim->cell;
+  const bool holder = s.sim && s.sim->holder;
+  for (const auto& p : {
+           needs(s.vision.has_value(), "vision", camera, "camera", "vision looks at pictures"),
+           needs(camera, "camera", s.vision.has_value(), "vision", "nobody looks at the pictures"),
+           needs(servo.phases.has_value(), "phases", s.vision.has_value(), "vision",
+                 "vision sees contact and puncture"),
+           needs(servo.local_model.has_value(), "local_model", s.vision.has_value(), "vision",
+                 "vision corrects the local model"),
+           needs(servo.membrane.has_value(), "membrane", servo.local_model.has_value(), "local_model",
+                 "it says where the membrane is"),
+           needs(servo.cone.has_value(), "cone", servo.local_model.has_value(), "local_model",
+                 "it says where the entry point is"),
+           needs(servo.axis.has_value(), "axis", servo.phases.has_value(), "phases", "withdrawal is a phase"),
+           needs(servo.axis.has_value(), "axis", servo.local_model.has_value(), "local_model",
+                 "it says where the entry point is"),
+           needs(servo.phases.has_value(), "phases", servo.local_model.has_value(), "local_model",
+                 "the phases follow its depth"),
+           needs(servo.repulsive.has_value(), "repulsive", servo.local_model.has_value(), "local_model",
+                 "it says where the cell is"),
+           needs(servo.vibration.has_value(), "vibration", servo.phases.has_value(), "phases",
+                 "contact and puncture are phases"),
+           needs(drawn && s.vision, "camera", cell, "sim.cell", "there is nothing to look at"),
+           needs(holder, "sim.holder", cell, "sim.cell", "there is nothing to hold"),
+           needs(s.devices.vacuum == kSimulated, "vacuum", holder, "sim.holder", "suction needs a pipette"),
+           needs(s.vision && s.vision->holder && drawn, "vision.holder", holder, "sim.holder",
+                 "there is no holding pipette to find"),
+           needs(s.vision && s.vision->inner && drawn, "vision.inner", !cell || s.sim->cell->inner,
+                 "sim.cell.inner", "there is no inner membrane to follow"),
+       }) {
+    if (p) {
+      return p;
+    }
+  }
+  return std::nullopt;
+}
+
+Found check_backends(const Scene& s) {
+  if (s.vision && s.vision->method == vision::Method::truth && !s.simulated_camera()) {
+    return Problem{"vision.method", "\"truth\" is known of a simulated camera only, allowed: \"paper\""};
+  }
+  if (s.clock == ClockKind::virtual_time) {
+    if (s.recorded) {
+      return Problem{"scene.clock", "\"virtual\" cannot wait for recorded frames, allowed: \"real\""};
+    }
+    for (const NamedDevice& d : scene_devices()) {
+      const std::string& backend = s.devices.*d.backend;
+      if (!backend.empty() && backend != kSimulated) {
+        return Problem{"scene.clock",
+                       fmt::format("\"virtual\" cannot wait for {}.device = \"{}\", allowed: \"real\"",
+                                   d.table, backend)};
+      }
+    }
+  }
+  if (s.recorded && s.recorded->frames.empty()) {
+    return Problem{"camera.frames", "is missing, allowed: a folder, a glob or a video file"};
+  }
+  return std::nullopt;
+}
+
+// ---- needle, cell and pipettes of the simulation ----
+
+Found check_cell(const sim::CellParams& c, const sim::NeedleParams& needle) {
+  if (needle.radius_m * 4 > c.R_m) {
+    return Problem{"sim.needle.radius_um",
+                   fmt::format("is too thick for the cell, allowed: at most sim.cell.radius_um / 4 = {:g}",
+                               um(c.R_m / 4))};
+  }
+  if (c.zona_h_m * 4 > c.R_m) {
+    return Problem{
+        "sim.cell.zona_h_um",
+        fmt::format("is too thick for the cell, allowed: at most radius_um / 4 = {:g}", um(c.R_m / 4))};
+  }
+  if (c.inner && c.zona_h_m + c.inner_gap_m > 0.5 * c.R_m) {
+    return Problem{
+        "sim.cell.inner.gap_um",
+        fmt::format("leaves no room inside the cell, allowed: at most radius_um / 2 - zona_h_um = {:g}",
+                    um(0.5 * c.R_m - c.zona_h_m))};
+  }
+  if (c.zona_puncture_strain <= c.zona_pretension) {
+    return Problem{"sim.cell.zona_puncture_strain",
+                   fmt::format("is reached before the needle touches, allowed: above zona_pretension = {:g}",
+                               c.zona_pretension)};
+  }
+  return std::nullopt;
+}
+
+Found check_start(const sim::SimConfig& sim) {
+  const auto& c = *sim.cell;
+  const double gap = (sim.stage.start_m - c.centre_m).norm() - c.R_m;
+  if (gap < sim.needle.radius_m) {
+    return Problem{"sim.stage.start_um",
+                   fmt::format("is inside or at the cell, allowed: at least {:g} um from its centre",
+                               um(c.R_m + sim.needle.radius_m))};
+  }
+  // Sizes differ by up to 2.5 sigma; a held cell grows away from its pipette, on both sides towards the
+  // needle.
+  const double grows_m = (sim.holder ? 5 : 2.5) * c.spread * c.R_m;
+  if (gap < sim.needle.radius_m + grows_m) {
+    return Problem{
+        "sim.stage.start_um",
+        fmt::format("would be inside a large cell of this spread, allowed: at least {:g} um from its centre",
+                    um(c.R_m + sim.needle.radius_m + grows_m))};
+  }
+  return std::nullopt;
+}
+
+Found check_depth(const sim::SimConfig& sim, const rt::LimitParams& limits) {
+  const double R_m = sim.cell->R_m;
+  if (um(limits.penetration_depth_m) > um(2 * R_m)) {
+    return Problem{
+        "limits.penetration_depth_um",
+        fmt::format("goes through the cell, allowed: at most 2 * sim.cell.radius_um = {:g}", um(2 * R_m))};
+  }
+  if (limits.far_wall_m > R_m) {
+    return Problem{
+        "limits.far_wall_um",
+        fmt::format("leaves no room to inject, allowed: at most sim.cell.radius_um = {:g}", um(R_m))};
+  }
+  if (sim.operator_params.depth_m > limits.penetration_depth_m) {
+    return Problem{
+        "sim.operator.depth_um",
+        fmt::format("is deeper than the limit, allowed: at most limits.penetration_depth_um = {:g}",
+                    um(limits.penetration_depth_m))};
+  }
+  return std::nullopt;
+}
+
+Found check_holder(const sim::HolderParams& h, double R_m, const std::optional<rt::VacuumParams>& vacuum) {
+  if (h.inner_radius_m >= h.outer_radius_m) {
+    return Problem{"sim.holder.inner_radius_um",
+                   fmt::format("is not smaller than the outer one, allowed: below outer_radius_um = {:g}",
+                               um(h.outer_radius_m))};
+  }
+  if (h.inner_radius_m >= R_m) {
+    return Problem{"sim.holder.inner_radius_um",
+                   fmt::format("swallows the cell, allowed: below sim.cell.radius_um = {:g}", um(R_m))};
+  }
+  if (vacuum && vacuum->min_Pa >= h.vacuum_Pa) {
+    return Problem{
+        "vacuum.min_Pa",
+        fmt::format("is above the suction itself, allowed: below sim.holder.vacuum_Pa = {:g}", h.vacuum_Pa)};
+  }
+  return std::nullopt;
+}
+
+Found check_plant(const Scene& s) {
+  if (!s.sim) {
+    return std::nullopt;
+  }
+  const auto& sim = *s.sim;
+  if (sim.needle.shaft_radius_m < sim.needle.radius_m) {
+    return Problem{"sim.needle.shaft_radius_um",
+                   fmt::format("{:g} is smaller than the tip, allowed: at least radius_um = {:g}",
+                               um(sim.needle.shaft_radius_m), um(sim.needle.radius_m))};
+  }
+  if (!sim.cell) {
+    return std::nullopt;
+  }
+  if (auto p = check_cell(*sim.cell, sim.needle)) {
+    return p;
+  }
+  if (auto p = check_start(sim)) {
+    return p;
+  }
+  if (auto p = check_depth(sim, s.servo.limits)) {
+    return p;
+  }
+  return sim.holder ? check_holder(*sim.holder, sim.cell->R_m, s.servo.vacuum) : std::nullopt;
+}
+
+// ---- what the haptic device can render ----
+
+std::string device_text(const rt::ServoConfig& servo) {
+  const auto& v = servo.velocity;
+  return fmt::format(
+      "m = haptic.mass_kg {:g}, T = 1/servo.rate_hz = {:g} ms, delay {} ticks, velocity by {}{}",
+      servo.device.mass_kg, 1e3 / servo.rate_Hz, servo.device.delay_ticks,
+      v.method == rt::VelocityParams::Method::kalman ? "Kalman filter"
+                                                     : fmt::format("window of {} at 1 kHz", v.window),
+      v.smooth_s > 0 ? fmt::format(" and low-pass of {:g} ms", v.smooth_s * 1e3) : "");
+}
+
+struct SpringWords {
+  const char* key;
+  const char* name;
+};
+SpringWords words_of(rt::Spring::Of spring) {
+  switch (spring) {
+    case rt::Spring::Of::cone:
+      return {"cone.K_N_m", "cone"};
+    case rt::Spring::Of::membrane:
+      return {"membrane.E_kPa", "membrane"};
+    case rt::Spring::Of::axis:
+      return {"axis.K_N_m", "axis"};
+    case rt::Spring::Of::repulsive:
+      return {"repulsive.K_N_m", "repulsive"};
+    case rt::Spring::Of::friction:
+      return {"friction.K_N_m", "friction"};
+  }
+  return {"servo", "?"};
+}
+
+Problem too_much_damping(const rt::ServoConfig& servo, const rt::NotRenderable& found) {
+  using What = rt::NotRenderable::What;
+  const double T_s = 1 / servo.rate_Hz;
+  const std::string formula =
+      fmt::format("at most {:g} m/T = {:g} ({})", rounded_down(found.most * T_s / servo.device.mass_kg),
+                  rounded_down(found.most), device_text(servo));
+  if (found.what == What::damping_inward) {
+    return {"axis.B_inward_Ns_m",
+            fmt::format("{:g} beside damping.B2_Ns_m = {:g} cannot be rendered, allowed: together {}",
+                        found.asked, found.beside_Ns_m, formula)};
+  }
+  return {found.what == What::damping_outside ? "damping.B1_Ns_m" : "damping.B2_Ns_m",
+          fmt::format("{:g} cannot be rendered, allowed: {}", found.asked, formula)};
+}
+
+Problem too_stiff(const rt::ServoConfig& servo, const rt::NotRenderable& found) {
+  std::string sum;
+  for (int i = 0; i < found.spring_count; ++i) {
+    const rt::Spring& spring = found.springs[static_cast<std::size_t>(i)];
+    sum += fmt::format("{}{} {:.4g}", sum.empty() ? "" : " + ", words_of(spring.of).name, spring.K_N_m);
+  }
+  const char* key = words_of(found.stiffest).key;
+  const double T_s = 1 / servo.rate_Hz;
+  if (found.what == rt::NotRenderable::What::not_passive) {
+    return {key, fmt::format("stiffness {} = {:.4g} N/m is not passive, allowed: at most b/(T/2 + delay) = "
+                             "{:g} (b = haptic.damping_Ns_m {:g}, {}), or add [guard]",
+                             sum, found.asked, rounded_down(found.most), servo.device.damping_Ns_m,
+                             device_text(servo))};
+  }
+  return {key, fmt::format(
+                   "stiffness {} = {:.4g} N/m beside B = {:g} Ns/m swings by itself, allowed: at most {:g} "
+                   "m/T^2 = {:g}, where a pole of 1 + (K + B V(z)) P(z) z^-delay reaches the unit circle "
+                   "(b = haptic.damping_Ns_m {:g}, {})",
+                   sum, found.asked, found.beside_Ns_m,
+                   rounded_down(found.most * T_s * T_s / servo.device.mass_kg), rounded_down(found.most),
+                   servo.device.damping_Ns_m, device_text(servo))};
+}
+
+Found check_renderable(const rt::ServoConfig& servo) {
+  using What = rt::NotRenderable::What;
+  if (servo.damping && servo.damping->B2_Ns_m < servo.damping->B1_Ns_m) {
+    return Problem{"damping.B2_Ns_m",
+                   fmt::format("is below the damping outside, allowed: at least B1_Ns_m = {:g}",
+                               servo.damping->B1_Ns_m)};
+  }
+  if (const auto found = rt::find_not_renderable(servo)) {
+    const bool springs = found->what == What::unstable || found->what == What::not_passive;
+    return springs ? too_stiff(servo, *found) : too_much_damping(servo, *found);
+  }
+  if (servo.vibration && servo.vibration->frequency_Hz > servo.rate_Hz / 4) {
+    return Problem{"vibration.frequency_hz",
+                   fmt::format("is too fast for the servo, allowed: at most servo.rate_hz / 4 = {:g}",
+                               servo.rate_Hz / 4)};
+  }
+  return std::nullopt;
+}
+
+// ---- limits and thresholds of the core ----
+
+Found check_limits(const rt::ServoConfig& servo) {
+  const auto& limits = servo.limits;
+  if (limits.tip_force_soft_N >= limits.tip_force_hard_N) {
+    return Problem{"limits.tip_force_soft_uN",
+                   fmt::format("is not below the hard limit, allowed: below tip_force_hard_uN = {:g}",
+                               um(limits.tip_force_hard_N))};
+  }
+  if (limits.hand_force_N > servo.device.force_max_N) {
+    return Problem{"limits.hand_force_N", fmt::format("is more than the device can do, allowed: at most "
+                                                      "haptic.force_max_N = {:g}",
+                                                      servo.device.force_max_N)};
+  }
+  return std::nullopt;
+}
+
+// Against the plant of a simulated stage.
+Found check_stage(const rt::ServoConfig& servo, const sim::StageParams& stage) {
+  const auto& limits = servo.limits;
+  if (limits.stage_velocity_m_s > stage.velocity_max_m_s) {
+    return Problem{"limits.stage_velocity_um_s",
+                   fmt::format("is more than the stage can do, allowed: at most "
+                               "sim.stage.velocity_max_um_s = {:g}",
+                               um(stage.velocity_max_m_s))};
+  }
+  // The drive lags behind at full speed without any fault.
+  const double lags_m = limits.stage_velocity_m_s * stage.lag_s;
+  if (lags_m > limits.following_error_m) {
+    return Problem{"limits.following_error_um",
+                   fmt::format("the stage lags further behind at full speed, allowed: at least "
+                               "stage_velocity_um_s * sim.stage.lag_ms = {:g}",
+                               um(lags_m))};
+  }
+  const double click_N = rt::stage_click_N(servo, stage.resolution_m);
+  if (click_N > rt::kLargestClick_N) {
+    return Problem{
+        "membrane.E_kPa",
+        fmt::format("one step of the stage would be {:.2g} N at the hand, allowed: at most {:g} N (softer, "
+                    "less mapping.force_scale or a finer sim.stage.resolution_um)",
+                    click_N, rt::kLargestClick_N)};
+  }
+  return std::nullopt;
+}
+
+Found check_workspace(const rt::MappingParams& m, const sim::StageParams* stage) {
+  for (int i = 0; i < 3; ++i) {
+    if (m.workspace_min_m[i] >= m.workspace_max_m[i]) {
+      return Problem{"mapping.workspace_min_um",
+                     fmt::format("is not below workspace_max_um in {}, allowed: below {:g}", "xyz"[i],
+                                 um(m.workspace_max_m[i]))};
+    }
+    if (stage == nullptr) {
+      continue;
+    }
+    if (stage->start_m[i] < m.workspace_min_m[i] || stage->start_m[i] > m.workspace_max_m[i]) {
+      return Problem{"sim.stage.start_um",
+                     fmt::format("is outside the workspace in {}, allowed: from {:g} to {:g}", "xyz"[i],
+                                 um(m.workspace_min_m[i]), um(m.workspace_max_m[i]))};
+    }
+    if (std::abs(stage->start_m[i]) > stage->travel_m) {
+      return Problem{"sim.stage.start_um",
+                     fmt::format("is beyond the stage's travel in {}, allowed: within +-{:g}", "xyz"[i],
+                                 um(stage->travel_m))};
+    }
+  }
+  return std::nullopt;
+}
+
+Found check_core(const Scene& s) {
+  const auto& servo = s.servo;
+  const sim::StageParams* stage = s.sim && s.devices.stage == kSimulated ? &s.sim->stage : nullptr;
+  if (auto p = check_renderable(servo)) {
+    return p;
+  }
+  if (auto p = check_limits(servo)) {
+    return p;
+  }
+  if (stage != nullptr) {
+    if (auto p = check_stage(servo, *stage)) {
+      return p;
+    }
+  }
+  if (servo.membrane && servo.membrane->c_m * 4 > servo.membrane->R_m) {
+    return Problem{"membrane.c_um", fmt::format("is too thick for the cell, allowed: at most R_um / 4 = {:g}",
+                                                um(servo.membrane->R_m / 4))};
+  }
+  if (auto p = check_workspace(servo.mapping, stage)) {
+    return p;
+  }
+  if (servo.phases && servo.phases->contact_on_m >= servo.phases->indentation_on_m) {
+    return Problem{"phases.contact_on_um", fmt::format("is not below indentation_on_um, allowed: below {:g}",
+                                                       um(servo.phases->indentation_on_m))};
+  }
+  if (servo.phases && servo.phases->contact_off_m >= servo.phases->clear_m) {
+    return Problem{"phases.contact_off_um",
+                   fmt::format("is not below clear_um, allowed: below {:g}", um(servo.phases->clear_m))};
+  }
+  return std::nullopt;
+}
+
+// ---- camera and vision ----
+
+Found check_camera(const Scene& s) {
+  const sim::MicroscopeParams* microscope = s.simulated_camera() ? &*s.sim->microscope : nullptr;
+  const double fps = s.recorded ? s.recorded->fps : microscope != nullptr ? microscope->fps : 0;
+  if (fps > s.servo.rate_Hz / 2) {
+    return Problem{"camera.fps", fmt::format("is too fast for the servo, allowed: at most rate_hz / 2 = {:g}",
+                                             s.servo.rate_Hz / 2)};
+  }
+  if (s.servo.local_model && fps > 0) {
+    const double least = 1.5 / fps + (microscope != nullptr ? microscope->latency_s : 0);
+    if (s.servo.local_model->stale_after_s < least) {
+      return Problem{
+          "local_model.stale_after_s",
+          fmt::format("every frame would be stale, allowed: at least 1.5 / fps + latency = {:g}", least)};
+    }
+  }
+  return std::nullopt;
+}
+
+Found check_vision(const Scene& s) {
+  if (!s.vision) {
+    return std::nullopt;
+  }
+  const auto& v = *s.vision;
+  if (v.R_min_m >= v.R_max_m) {
+    return Problem{"vision.radius_min_um",
+                   fmt::format("is not below radius_max_um, allowed: below {:g}", um(v.R_max_m))};
+  }
+  if (s.simulated_camera() && s.sim->cell && (s.sim->cell->R_m < v.R_min_m || s.sim->cell->R_m > v.R_max_m)) {
+    return Problem{"vision.radius_min_um",
+                   fmt::format("the cell's radius of {:g} is not looked for, allowed: a range "
+                               "that contains it",
+                               um(s.sim->cell->R_m))};
+  }
+  return std::nullopt;
+}
+
+// ---- scheduled failures ----
+
+bool can_fail(const Scene& s, sim::Device device) {
+  switch (device) {
+    case sim::Device::camera:
+    case sim::Device::vision:
+      return s.sim->microscope.has_value();
+    case sim::Device::injector:
+      return s.sim->injector.has_value();
+    case sim::Device::vacuum:
+      return s.sim->holder.has_value();
+    case sim::Device::force_sensor:
+      return s.sim->force_sensor.has_value();
+    case sim::Device::hand:
+      return s.devices.haptic == kSimulated;
+    case sim::Device::stage:
+      return s.devices.stage == kSimulated;
+    case sim::Device::estop:
+      return s.devices.estop == kSimulated;
+  }
+  return false;
+}
+
+// The names of an enumeration of [[sim.failure]] that pass.
+template <typename Enum, typename Passes>
+std::string names_of(Passes passes) {
+  std::string out;
+  const auto add = [&](const auto& key) {
+    if constexpr (requires {
+                    key.names;
+                    key.first;
+                  }) {
+      if constexpr (std::is_same_v<decltype(key.first), Enum>) {
+        for (std::size_t i = 0; i < key.names.size(); ++i) {
+          if (passes(static_cast<Enum>(static_cast<std::size_t>(key.first) + i))) {
+            out += fmt::format("{}\"{}\"", out.empty() ? "" : ", ", key.names[i]);
+          }
+        }
+      }
+    }
+  };
+  std::apply([&](const auto&... key) { (add(key), ...); },
+             keys_of(static_cast<const sim::ScheduledFailure*>(nullptr)));
+  return out;
+}
+template <typename Enum>
+std::string name_of(Enum value) {
+  return names_of<Enum>([value](Enum other) { return other == value; });
+}
+
+Found check_failure_size(const sim::ScheduledFailure& f, const std::string& name) {
+  const auto wrong = [&](const char* allowed) {
+    return Problem{name + ".size",
+                   fmt::format("{} does not suit kind = {}, allowed: {}", f.size, name_of(f.kind), allowed)};
+  };
+  using sim::Failure;
+  const bool yes_or_no = sim::is_yes_or_no(f.channel);
+  switch (f.kind) {
+    case Failure::sparse:
+    case Failure::repeat:
+      if (f.size < 2 || f.size > 1000 || f.size != std::floor(f.size)) {
+        return wrong("a whole number, 2 .. 1000");
+      }
+      return std::nullopt;
+    case Failure::creep:
+      if (f.size == 0 || std::abs(f.size) > 0.01) {
+        return wrong("a speed in m/s, -0.01 .. 0.01, not 0");
+      }
+      return std::nullopt;
+    case Failure::set:
+      if (yes_or_no && f.size != 0 && f.size != 1) {
+        return wrong("0 (no) or 1 (yes)");
+      }
+      break;
+    case Failure::glitch:
+    case Failure::offset:
+    case Failure::drift:
+      if (yes_or_no != (f.size == 0)) {
+        return wrong(yes_or_no ? "0: yes and no are exchanged" : "any number but 0");
+      }
+      break;
+    default:
+      if (f.size != 0) {
+        return wrong("0: it has no size");
+      }
+      return std::nullopt;
+  }
+  if (f.channel == sim::Channel::time && std::abs(f.size) > 1e6) {
+    return wrong("-1e6 .. 1e6 s");
+  }
+  return std::nullopt;
+}
+
+Found check_failure(const Scene& s, const sim::ScheduledFailure& f, const std::string& name) {
+  using sim::Channel;
+  using sim::Component;
+  using sim::Failure;
+  if (!can_fail(s, f.device)) {
+    return Problem{name + ".device", "this scene has no such simulated device, allowed: one that is there"};
+  }
+  if (!sim::can_have(f.device, f.kind)) {
+    return Problem{name + ".kind",
+                   fmt::format("{} is no failure of {}, allowed: {}", name_of(f.kind), name_of(f.device),
+                               names_of<Failure>([&](Failure k) { return sim::can_have(f.device, k); }))};
+  }
+  if (!sim::can_concern(f.device, f.kind, f.channel)) {
+    const std::string channels =
+        names_of<Channel>([&](Channel c) { return sim::can_concern(f.device, f.kind, c); });
+    return Problem{name + ".channel",
+                   f.channel == Channel::none
+                       ? fmt::format("kind = {} needs it, allowed: {}", name_of(f.kind), channels)
+                       : fmt::format("{} of {} does not concern {}, allowed: {}", name_of(f.kind),
+                                     name_of(f.device), name_of(f.channel), channels)};
+  }
+  const bool four = f.channel == Channel::orientation;
+  if ((f.component == Component::w && !four) || (f.component == Component::all && f.kind == Failure::creep)) {
+    return Problem{name + ".component",
+                   fmt::format("there is no such component, allowed: \"x\", \"y\", \"z\"{}",
+                               f.kind == Failure::creep ? "" : ", \"all\"")};
+  }
+  if (f.every_s != 0 && f.kind != Failure::glitch) {
+    return Problem{name + ".every_s", "only a glitch repeats, allowed: 0"};
+  }
+  return check_failure_size(f, name);
+}
+
+Found check_failures(const Scene& s) {
+  for (int i = 0; s.sim && i < s.sim->failure_count; ++i) {
+    if (auto p = check_failure(s, s.sim->failures[static_cast<std::size_t>(i)],
+                               fmt::format("sim.failure[{}]", i))) {
+      return p;
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::optional<Problem> check_together(const Scene& scene) {
+  for (const auto check :
+       {check_needs, check_backends, check_plant, check_core, check_camera, check_vision, check_failures}) {
+    if (auto p = check(scene)) {
+      return p;
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace punctum::tools

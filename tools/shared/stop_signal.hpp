@@ -1,0 +1,24 @@
+// Signals that ask a program to stop. They are counted: the first asks, later ones insist.
+#pragma once
+
+#include <cstdint>
+#include <initializer_list>
+
+#include "hal/realtime.hpp"
+
+namespace punctum::tools::stop_signal {
+
+// Called within the signal handler, with the number of signals so far: it may touch lock-free atomics only.
+using Wake = void (*)(int count) noexcept;
+
+void watch(std::initializer_list<int> signals, Wake wake = nullptr);
+
+// The death of the parent arrives as SIGTERM from here on. False: the station's maker, whose process id
+// stands in the header of its segments, has died already: it is not among this process's ancestors (a
+// debugger may stand between them).
+[[nodiscard]] bool watch_parent(std::uint64_t maker);
+
+[[nodiscard]] int count() NONBLOCKING;
+void request() noexcept;  // as if one signal had come, unless one has
+
+}  // namespace punctum::tools::stop_signal

@@ -1,0 +1,234 @@
+#include "tools/vision/observation_csv.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <string_view>
+
+#include "rt/forces/membrane.hpp"
+
+namespace punctum::tools {
+
+namespace {
+
+constexpr std::string_view kColumns =
+    "frame,t_s,phase,contact,punctured,holder_x_px,holder_y_px,holder_score,tip_x_px,tip_y_px,outer_ok,inner_"
+    "ok,"
+    "wd_um,a_um,R_um,force_N,total_us,verdict,"
+    "gap_um,gap_sd_um,R_inner_um,centre_x_px,centre_y_px,entry_x_px,entry_y_px,axis_x,axis_y,needle_score,"
+    "merged,"
+    "contact1_x_px,contact1_y_px,contact2_x_px,contact2_y_px,membrane_um_s,outer_support,outer_visible,"
+    "outer_scatter_px,inner_support,impurities,noise,prepare_us,holder_us,needle_us,erase_us,start_us,outer_"
+    "us,"
+    "inner_us,contact_us,measure_us";
+constexpr std::string_view kTruthColumns =
+    ",outer_rms_um,outer_p95_um,outer_max_um,inner_rms_um,tip_error_um,tip_lateral_um,gap_error_um,wd_error_"
+    "um,"
+    "a_error_um";
+
+class Row {
+ public:
+  explicit Row(std::FILE* file) : file_(file) {}
+  ~Row() {
+    line_ += '\n';
+    (void)std::fwrite(line_.data(), 1, line_.size(), file_);  // flush() tells
+  }
+  Row(const Row&) = delete;
+  Row& operator=(const Row&) = delete;
+
+  void text(std::string_view s) {
+    separate();
+    for (const char c : s) {
+      line_ += c == ',' || c == '\n' || c == '\r' ? ';' : c == '"' ? '\'' : c;
+    }
+  }
+  void number(double v, int digits) {
+    separate();
+    line_ += fmt::format("{:.{}f}", v, digits);
+  }
+  void number(const std::optional<double>& v, int digits, double scale = 1) {
+    if (v) {
+      number(*v * scale, digits);
+    } else {
+      separate();
+    }
+  }
+  void flag(bool v) { text(v ? "1" : "0"); }
+  void point(const std::optional<vision::Point>& p, cv::Point offset) {
+    if (p) {
+      number(p->x + offset.x, 3);
+      number(p->y + offset.y, 3);
+    } else {
+      nothing(2);
+    }
+  }
+  void nothing(int cells) {
+    for (int i = 0; i < cells; ++i) {
+      separate();
+    }
+  }
+
+ private:
+  void separate() {
+    if (!first_) {
+      line_ += ',';
+    }
+    first_ = false;
+  }
+  std::FILE* file_;
+  std::string line_;
+  bool first_ = true;
+};
+
+}  // namespace
+
+tl::expected<ObservationCsv, std::string> ObservationCsv::open(const std::string& path, bool append,
+                                                               bool with_truth) {
+  const std::string head = std::string(kColumns) + (with_truth ? std::string(kTruthColumns) : std::string());
+  bool same = false;
+  if (append) {
+    if (std::unique_ptr<std::FILE, Close> old{std::fopen(path.c_str(), "r")}) {
+      std::string first(head.size() + 1, '\0');
+      same = std::fread(first.data(), 1, first.size(), old.get()) == first.size() && first == head + "\n";
+    }
+  }
+  ObservationCsv csv;
+  csv.file_.reset(std::fopen(path.c_str(), same ? "a" : "w"));
+  if (!csv.file_) {
+    return tl::unexpected(fmt::format("{}: cannot be written: {}", path, std::strerror(errno)));
+  }
+  csv.with_truth_ = with_truth;
+  if (!same) {
+    (void)std::fputs((head + "\n").c_str(), csv.file_.get());
+  }
+  return csv;
+}
+
+std::optional<double> ObservationCsv::force_N(const vision::Result& r, const vision::VisionConfig& config) {
+  if (!r.wd_px) {
+    return std::nullopt;
+  }
+  if (*r.wd_px <= 0 || r.punctured) {
+    return 0.0;
+  }
+  const double a_m = r.a_px.value_or(0) * config.pixel_m;
+  if (!(a_m > config.c_m)) {
+    return std::nullopt;
+  }
+  return rt::membrane_force(config.E_Pa, config.nu, config.h_m, config.c_m, *r.wd_px * config.pixel_m, a_m);
+}
+
+void ObservationCsv::row(std::uint64_t frame, double t_s, double total_us, const std::string& verdict) {
+  Row row(file_.get());
+  row.text(std::to_string(frame));
+  row.number(t_s, 6);
+  row.nothing(8);
+  row.flag(false);
+  row.flag(false);
+  row.nothing(4);
+  row.number(total_us, 0);
+  row.text(verdict);
+  const auto more = std::count(kColumns.begin(), kColumns.end(), ',') + 1 - 18 +
+                    (with_truth_ ? std::count(kTruthColumns.begin(), kTruthColumns.end(), ',') : 0);
+  row.nothing(static_cast<int>(more));
+}
+
+void ObservationCsv::row(const vision::Result& r, const vision::VisionConfig& config, double t_s,
+                         cv::Point offset, const TruthError* truth) {
+  if (!r.usable) {
+    row(r.frame, t_s, r.us.total, r.verdict);
+    return;
+  }
+  const double um = config.pixel_m * 1e6;
+  const auto some = [](bool known, const vision::Point& p) {
+    return known ? std::optional<vision::Point>(p) : std::nullopt;
+  };
+  Row row(file_.get());
+  row.text(std::to_string(r.frame));
+  row.number(t_s, 6);
+  row.text(rt::name(r.phase));
+  const bool touch_known = !config.needle || (r.needle.ok && r.outer.ok);
+  if (touch_known) {
+    row.flag(r.contact);
+  } else {
+    row.nothing(1);
+  }
+  row.flag(r.punctured);
+  row.point(some(r.holder.ok, r.holder.mouth), offset);
+  row.number(r.holder.ok || r.holder.score > 0 ? std::optional<double>(r.holder.score) : std::nullopt, 5);
+  row.point(some(r.needle.ok, r.needle.tip), offset);
+  row.flag(r.outer.ok);
+  row.flag(r.inner.ok);
+  row.number(r.wd_px, 4, um);
+  row.number(r.a_px, 4, um);
+  row.number(r.undeformed ? std::optional<double>(r.undeformed->r) : std::nullopt, 4, um);
+  if (const auto f = force_N(r, config)) {
+    row.text(fmt::format("{:.6e}", *f));
+  } else {
+    row.nothing(1);
+  }
+  row.number(r.us.total, 0);
+  row.text(r.verdict);
+  row.number(r.gap_px, 4, um);
+  row.number(r.gap_px ? std::optional<double>(r.gap_noise_px) : std::nullopt, 4, um);
+  row.number(r.inner_radius_px, 4, um);
+  row.point(r.undeformed ? std::optional<vision::Point>(r.undeformed->centre) : std::nullopt, offset);
+  row.point(r.entry, offset);
+  row.number(r.needle.ok ? std::optional<double>(r.needle.axis.x) : std::nullopt, 6);
+  row.number(r.needle.ok ? std::optional<double>(r.needle.axis.y) : std::nullopt, 6);
+  row.number(r.needle.ok ? std::optional<double>(r.needle.score) : std::nullopt, 4);
+  row.flag(r.merged);
+  row.point(r.points.point[0], offset);
+  row.point(r.points.point[1], offset);
+  row.number(r.membrane_velocity_px_s * um, 3);
+  const auto when = [](bool known, double v) { return known ? std::optional<double>(v) : std::nullopt; };
+  row.number(when(!r.outer.contour.empty(), r.outer.support), 3);
+  row.number(when(!r.outer.contour.empty(), r.outer.visible), 3);
+  row.number(when(!r.outer.contour.empty(), r.outer.residual_px), 3);
+  row.number(when(!r.inner.contour.empty(), r.inner.support), 3);
+  row.text(std::to_string(r.impurities));
+  row.number(r.noise, 2);
+  for (const double us : {r.us.prepare, r.us.holder, r.us.needle, r.us.erase, r.us.start, r.us.outer,
+                          r.us.inner, r.us.contact, r.us.measure}) {
+    row.number(when(us > 0, us), 0);  // empty: the stage did not run
+  }
+  if (with_truth_) {
+    const TruthError none;
+    const TruthError& e = truth != nullptr ? *truth : none;
+    for (const auto& v : {e.outer_rms_um, e.outer_p95_um, e.outer_max_um, e.inner_rms_um, e.tip_um,
+                          e.tip_lateral_um, e.gap_um, e.wd_um, e.a_um}) {
+      row.number(v, 4);
+    }
+  }
+}
+
+bool ObservationCsv::flush() { return std::fflush(file_.get()) == 0 && std::ferror(file_.get()) == 0; }
+
+tl::expected<ContoursCsv, std::string> ContoursCsv::open(const std::string& path) {
+  ContoursCsv csv;
+  csv.file_.reset(std::fopen(path.c_str(), "w"));
+  if (!csv.file_) {
+    return tl::unexpected(fmt::format("{}: cannot be written: {}", path, std::strerror(errno)));
+  }
+  (void)std::fputs("frame,membrane,node,x_px,y_px\n", csv.file_.get());
+  return csv;
+}
+
+void ContoursCsv::rows(const vision::Result& r, cv::Point offset) {
+  for (const auto& [name, m] : {std::pair{"outer", &r.outer}, std::pair{"inner", &r.inner}}) {
+    if (!m->ok) {
+      continue;
+    }
+    for (std::size_t i = 0; i < m->contour.size(); ++i) {
+      const std::string line = fmt::format("{},{},{},{:.3f},{:.3f}\n", r.frame, name, i,
+                                           m->contour[i].x + offset.x, m->contour[i].y + offset.y);
+      (void)std::fwrite(line.data(), 1, line.size(), file_.get());
+    }
+  }
+}
+
+bool ContoursCsv::flush() { return std::fflush(file_.get()) == 0 && std::ferror(file_.get()) == 0; }
+
+}  // namespace punctum::tools

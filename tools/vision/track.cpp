@@ -1,0 +1,271 @@
+#include "tools/vision/track.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
+#include <system_error>
+#include <tl/expected.hpp>
+#include <utility>
+
+#include "hal/recorded/picture.hpp"
+#include "hal/recorded/recorded_camera.hpp"
+#include "tools/scene/scene.hpp"
+#include "tools/vision/observation_csv.hpp"
+#include "vision/events/scene_change.hpp"
+#include "vision/overlay.hpp"
+#include "vision/tracker.hpp"
+
+namespace punctum::tools {
+
+namespace {
+
+constexpr int kDone = 0, kNotWritten = 1, kBadInput = 2;
+
+template <class T>
+using Or = tl::expected<T, std::string>;  // the error is one line for the user
+
+tl::unexpected<std::string> wrong(std::string text) { return tl::unexpected<std::string>(std::move(text)); }
+
+Or<vision::VisionConfig> vision_of(const TrackOptions& options) {
+  const auto scene = load_scene(options.scene, options.overrides);
+  if (!scene) {
+    return wrong(scene.error());
+  }
+  if (!scene->vision) {
+    return wrong(fmt::format("{}: it has no [vision], so there is nothing to look for", options.scene));
+  }
+  vision::VisionConfig config = *scene->vision;
+  config.method = vision::Method::paper;  // recorded pictures have no simulated truth
+  return config;
+}
+
+Or<cv::Rect> region_of(const TrackOptions& options, const recorded::Camera& camera) {
+  if (!options.roi) {
+    return cv::Rect(0, 0, camera.width(), camera.height());
+  }
+  const auto& r = *options.roi;
+  if (r[0] < 0 || r[1] < 0 || r[2] < 32 || r[3] < 32 ||
+      static_cast<std::int64_t>(r[0]) + r[2] > camera.width() ||
+      static_cast<std::int64_t>(r[1]) + r[3] > camera.height()) {
+    return wrong(fmt::format("--roi {},{},{},{}: does not lie in the {}x{} picture, or is smaller than 32x32",
+                             r[0], r[1], r[2], r[3], camera.width(), camera.height()));
+  }
+  return cv::Rect(r[0], r[1], r[2], r[3]);
+}
+
+// In pixels of the region.
+Or<std::optional<vision::Circle>> seed_of(const TrackOptions& options, const cv::Rect& roi) {
+  if (!options.seed_circle) {
+    return std::nullopt;
+  }
+  const auto& c = *options.seed_circle;
+  if (!(c[0] >= roi.x && c[0] < roi.x + roi.width && c[1] >= roi.y && c[1] < roi.y + roi.height) ||
+      !(c[2] >= 4) || !(c[2] < 1e4)) {
+    return wrong(fmt::format("--seed-circle {},{},{}: a centre in the picture and a radius of at least 4 px",
+                             c[0], c[1], c[2]));
+  }
+  return vision::Circle{{c[0] - roi.x, c[1] - roi.y}, c[2], 0};
+}
+
+// Template of the holding pipette; empty when none is given.
+Or<cv::Mat> template_of(const TrackOptions& options, const vision::VisionConfig& config,
+                        const cv::Rect& roi) {
+  const std::string path = !options.holder_template.empty() ? options.holder_template
+                           : config.holder                  ? config.holder->template_path
+                                                            : "";
+  if (path.empty()) {
+    return cv::Mat();
+  }
+  const auto picture = recorded::read_picture(path);
+  if (!picture) {
+    return wrong(picture.error());
+  }
+  if (picture->width >= roi.width || picture->height >= roi.height || picture->width < 4 ||
+      picture->height < 4) {
+    return wrong(fmt::format("{}: {}x{} does not fit as a template in {}x{}", path, picture->width,
+                             picture->height, roi.width, roi.height));
+  }
+  return cv::Mat(picture->height, picture->width, CV_8U, const_cast<std::uint8_t*>(picture->pixels.data()))
+      .clone();
+}
+
+struct Input {
+  vision::VisionConfig config;
+  recorded::Camera camera;
+  cv::Rect roi;
+  std::optional<vision::Circle> seed;
+  cv::Mat holder_template;
+
+  [[nodiscard]] vision::Tracker new_tracker() const {
+    vision::Tracker tracker(config, roi.width, roi.height);
+    if (seed) {
+      tracker.seed_circle(*seed);
+    }
+    if (!holder_template.empty()) {
+      tracker.holder_template(holder_template);
+    }
+    return tracker;
+  }
+};
+
+Or<Input> open_input(const TrackOptions& options) {
+  auto config = vision_of(options);
+  if (!config) {
+    return wrong(config.error());
+  }
+  auto camera = recorded::Camera::open(options.frames, options.fps);
+  if (!camera) {
+    return wrong(camera.error());
+  }
+  const auto roi = region_of(options, *camera);
+  if (!roi) {
+    return wrong(roi.error());
+  }
+  const auto seed = seed_of(options, *roi);
+  if (!seed) {
+    return wrong(seed.error());
+  }
+  const auto holder_template = template_of(options, *config, *roi);
+  if (!holder_template) {
+    return wrong(holder_template.error());
+  }
+  return Input{std::move(*config), std::move(*camera), *roi, *seed, *holder_template};
+}
+
+struct Output {
+  ObservationCsv observations;
+  std::optional<ContoursCsv> contours;
+  std::string overlay_folder;  // empty: no overlays
+
+  void write_overlay(const cv::Mat& grey, const vision::Result& result, const vision::VisionConfig& config,
+                     const std::string& picture_name);
+};
+
+Or<Output> open_output(const TrackOptions& options) {
+  auto observations = ObservationCsv::open(options.out, false, false);
+  if (!observations) {
+    return wrong(observations.error());
+  }
+  Output out{std::move(*observations), std::nullopt, options.overlay};
+  if (!options.contours.empty()) {
+    auto contours = ContoursCsv::open(options.contours);
+    if (!contours) {
+      return wrong(contours.error());
+    }
+    out.contours = std::move(*contours);
+  }
+  if (!options.overlay.empty()) {
+    std::error_code error;
+    std::filesystem::create_directories(options.overlay, error);
+    if (error) {
+      return wrong(fmt::format("{}: {}", options.overlay, error.message()));
+    }
+  }
+  return out;
+}
+
+void Output::write_overlay(const cv::Mat& grey, const vision::Result& result,
+                           const vision::VisionConfig& config, const std::string& picture_name) {
+  if (overlay_folder.empty()) {
+    return;
+  }
+  const std::string stem = std::filesystem::path(picture_name).stem().string();
+  const std::string path = fmt::format("{}/{:06}_{}.png", overlay_folder, result.frame, stem);
+  bool written = false;
+  try {
+    written = cv::imwrite(path, vision::draw_overlay(grey, result, config));
+  } catch (const cv::Exception&) {
+    written = false;
+  }
+  if (!written) {
+    fmt::print(stderr, "{}: cannot be written; going on without overlays\n", path);
+    overlay_folder.clear();
+  }
+}
+
+struct Counts {
+  int frames = 0, outer = 0, inner = 0, unusable = 0;
+};
+
+Counts track_all(Input& input, Output& output) {
+  Counts counts;
+  vision::Tracker tracker = input.new_tracker();
+  cv::Mat before;
+  for (;;) {
+    hal::Frame frame;
+    const hal::Status status = input.camera.next(frame, 0);
+    if (status == hal::Status::disconnected || status == hal::Status::no_data) {
+      return counts;
+    }
+    ++counts.frames;
+    const double t_s = static_cast<double>(frame.exposure_ns) * 1e-9;
+    if (status == hal::Status::fault) {
+      ++counts.unusable;
+      output.observations.row(frame.sequence, t_s, 0, input.camera.last_error());
+      continue;
+    }
+    hal::Frame part = frame;
+    part.pixels += static_cast<std::ptrdiff_t>(input.roi.y) * frame.stride + input.roi.x;
+    part.width = input.roi.width;
+    part.height = input.roi.height;
+    const cv::Mat grey(part.height, part.width, CV_8U, const_cast<std::uint8_t*>(part.pixels),
+                       static_cast<std::size_t>(part.stride));
+    // Stills of different scenes may share a folder. What was learnt from one does not hold for the next.
+    if (!before.empty() && vision::similarity(before, grey) < vision::kSameScene) {
+      tracker = input.new_tracker();
+      fmt::print(stderr, "{}: another scene, started afresh\n", input.camera.name());
+    }
+    grey.copyTo(before);
+    const vision::Result& result = tracker.process(part);
+    output.observations.row(result, input.config, t_s, input.roi.tl());
+    counts.outer += result.outer.ok;
+    counts.inner += result.inner.ok;
+    counts.unusable += !result.usable;
+    if (output.contours) {
+      output.contours->rows(result, input.roi.tl());
+    }
+    output.write_overlay(grey, result, input.config, input.camera.name());
+    if (counts.frames == 1 && !result.outer.ok && !result.inner.ok) {
+      fmt::print(stderr, "first frame: {}\n", result.verdict);
+    }
+    input.camera.release(frame);
+  }
+}
+
+}  // namespace
+
+int track(const TrackOptions& options) {
+  auto input = open_input(options);
+  if (!input) {
+    fmt::print(stderr, "{}\n", input.error());
+    return kBadInput;
+  }
+  auto output = open_output(options);
+  if (!output) {
+    fmt::print(stderr, "{}\n", output.error());
+    return kBadInput;
+  }
+  const Counts counts = track_all(*input, *output);
+  int code = kDone;
+  const auto check_complete = [&code](bool written, const std::string& file) {
+    if (!written) {
+      fmt::print(stderr, "{}: not complete, is the disk full?\n", file);
+      code = kNotWritten;
+    }
+  };
+  check_complete(output->observations.flush(), options.out);
+  if (output->contours) {
+    check_complete(output->contours->flush(), options.contours);
+  }
+  fmt::print("{} frames, outer membrane in {}, inner in {}, unusable {}\n", counts.frames, counts.outer,
+             input->config.inner ? fmt::format("{}", counts.inner) : "-", counts.unusable);
+  return code;
+}
+
+}  // namespace punctum::tools

@@ -1,0 +1,28 @@
+// punctum-vision track: recorded frames -> obs.csv, contours.csv, overlays.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace punctum::tools {
+
+struct TrackOptions {
+  std::string frames;                  // folder, glob, one picture or a video file
+  std::string scene;                   // built-in name or path
+  std::vector<std::string> overrides;  // table.key=value
+  std::string out;                     // obs.csv
+  std::string contours;                // empty: not written
+  std::string overlay;                 // folder; empty: not drawn
+  double fps = 25;
+  std::optional<std::array<int, 4>> roi;             // x, y, width, height
+  std::optional<std::array<double, 3>> seed_circle;  // x, y, r in the whole picture
+  std::string holder_template;                       // picture file; empty: cut from the first frame
+};
+
+// Exit code. 0: done. 1: a table could not be written completely. 2, with one line on stderr: a bad scene,
+// first frame, region, seed circle or template, or an output that cannot be opened.
+[[nodiscard]] int track(const TrackOptions& options);
+
+}  // namespace punctum::tools

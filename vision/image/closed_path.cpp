@@ -1,0 +1,407 @@
+#include "vision/image/closed_path.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <numbers>
+#include <opencv2/core.hpp>
+
+#include "vision/image/median.hpp"
+#include "vision/image/periodic_smoothing.hpp"
+
+namespace punctum::vision {
+
+namespace {
+
+constexpr float kForbidden = 1e6F;   // cost of a sample outside the limits
+constexpr double kAnchorWeight = 4;  // in the smoothing; an edge weighs at most 1
+constexpr double kAnchorStiffness = 0.3;
+constexpr double kBridgeWeight = 0.01;  // of the straight bridge over an arc without edges
+constexpr double kTukey = 4.7;          // times the scale: 95 % efficiency for normally distributed errors
+constexpr double kLeastScale_px = 0.15;
+
+// The band as a grid of samples: the angle i runs round, the offset j outwards.
+class BandSearch {
+ public:
+  BandSearch(const GradientField& field, const EdgeBand& band, Polarity polarity)
+      : field_(field),
+        band_(band),
+        polarity_(polarity),
+        n_(static_cast<int>(band.middle.size())),
+        m_(2 * static_cast<int>(band.half_width / band.step) + 1),
+        half_(m_ / 2) {}
+
+  [[nodiscard]] bool empty() const { return n_ < 16 || m_ < 5 || field_.area.empty(); }
+
+  EdgePath search(double floor, double saturation) {
+    set_rays();
+    sample_edges();
+    set_costs(floor, saturation);
+    find_shortest_closed_path();
+    measure_edges(floor);
+    bridge_gaps();
+    smooth();
+    return std::move(out_);
+  }
+
+ private:
+  [[nodiscard]] std::size_t id(int i, int j) const {
+    return static_cast<std::size_t>(i) * static_cast<std::size_t>(m_) + static_cast<std::size_t>(j);
+  }
+  [[nodiscard]] std::size_t angle(int i) const { return static_cast<std::size_t>(((i % n_) + n_) % n_); }
+  [[nodiscard]] double radius(int i, int j) const {
+    return band_.middle[static_cast<std::size_t>(i)] + (j - half_) * band_.step;
+  }
+
+  void set_rays();
+  [[nodiscard]] double visibility(std::size_t angle, const Point& p, double r) const;
+  void sample_edges();
+  void set_costs(double floor, double saturation);
+  void find_shortest_closed_path();
+  void find_shortest_path(int from, int fixed, const std::vector<float>& bend);
+  [[nodiscard]] int top_of_edge(int i) const;
+  [[nodiscard]] double vertex_beside(int i, int j) const;
+  void measure_edges(double floor);
+  [[nodiscard]] double radius_beside_gap(int from, int step) const;
+  void bridge_gaps();
+  [[nodiscard]] std::vector<double> stiffness_per_angle() const;
+  void smooth();
+
+  const GradientField& field_;
+  const EdgeBand& band_;
+  Polarity polarity_;
+  int n_, m_, half_;
+  std::vector<Point> ray_, normal_;  // per angle, unit
+  double arc_ = 0;                   // between two angles, px
+  std::vector<float> edge_, cost_;   // per sample; edge: grey levels per px
+  std::vector<double> shown_;        // > 0: this angle is visible near the middle of the band
+  std::vector<int> path_;            // offset per angle
+  std::vector<double> weight_;       // per angle, in the smoothing
+  EdgePath out_;
+};
+
+void BandSearch::set_rays() {
+  const double turn = 2 * std::numbers::pi / n_;
+  ray_.resize(band_.middle.size());
+  normal_.resize(band_.middle.size());
+  double r_mean = 0;
+  for (int i = 0; i < n_; ++i) {
+    ray_[angle(i)] = Point(std::cos(i * turn), std::sin(i * turn));
+    r_mean += band_.middle[angle(i)] / n_;
+  }
+  arc_ = std::max(0.5, r_mean * turn);
+  // The edge is measured along the normal of the band's middle line: on the wall of a dimple that is far from
+  // radial. Neighbours two angles away smooth it a little.
+  for (int i = 0; i < n_; ++i) {
+    const std::size_t before = angle(i - 2), after = angle(i + 2);
+    const Point t = band_.middle[after] * ray_[after] - band_.middle[before] * ray_[before];
+    const double l = cv::norm(t);
+    normal_[angle(i)] = l > 0 ? Point(t.y / l, -t.x / l) : ray_[angle(i)];
+  }
+}
+
+double BandSearch::visibility(std::size_t angle, const Point& p, double r) const {
+  const cv::Rect& a = field_.area;
+  // The gradient is not known within one pixel of the border of the field.
+  if (p.x < a.x + 1 || p.y < a.y + 1 || p.x > a.x + a.width - 2 || p.y > a.y + a.height - 2) {
+    return 0;
+  }
+  const bool hidden_ray = !band_.hidden.empty() && band_.hidden[angle] != 0;
+  if (!(r > 2) || hidden_ray) {
+    return 0;
+  }
+  return band_.visible ? band_.visible(p) : 1;
+}
+
+void BandSearch::sample_edges() {
+  const std::size_t samples = static_cast<std::size_t>(n_) * static_cast<std::size_t>(m_);
+  edge_.resize(samples);
+  cost_.resize(samples);
+  shown_.assign(band_.middle.size(), 0.0);
+  for (int i = 0; i < n_; ++i) {
+    const std::size_t a = angle(i);
+    for (int j = 0; j < m_; ++j) {
+      const double r = radius(i, j);
+      const Point p = band_.centre + r * ray_[a];
+      const double v = visibility(a, p, r);
+      double e = 0;
+      if (v > 0) {
+        e = field_.gradient(p).dot(normal_[a]);
+        e = polarity_ == Polarity::any ? std::abs(e) : polarity_ == Polarity::darker_out ? -e : e;
+        e *= v;
+      }
+      const bool near_middle = std::abs(j - half_) < half_ / 2 + 1;
+      shown_[a] = std::max(shown_[a], v * (near_middle ? 1.0 : 0.0));
+      edge_[id(i, j)] = static_cast<float>(e);
+      const bool allowed =
+          (band_.lower.empty() || r >= band_.lower[a]) && (band_.upper.empty() || r <= band_.upper[a]);
+      cost_[id(i, j)] = !allowed ? kForbidden : v > 0 ? 0.0F : 1.0F;
+    }
+  }
+}
+
+void BandSearch::set_costs(double floor, double saturation) {
+  std::vector<float> strongest, all;
+  for (int i = 0; i < n_; ++i) {
+    float top = 0;
+    for (int j = 0; j < m_; ++j) {
+      if (cost_[id(i, j)] == 0.0F) {
+        top = std::max(top, edge_[id(i, j)]);
+        all.push_back(std::abs(edge_[id(i, j)]));
+      }
+    }
+    if (shown_[angle(i)] > 0) {
+      strongest.push_back(top);
+    }
+  }
+  if (!(saturation > 0)) {
+    saturation = std::max({0.7 * median_of(std::move(strongest)), 2 * floor, 1e-6});
+  }
+  out_.saturation = saturation;
+  out_.background = median_of(std::move(all));
+  for (std::size_t k = 0; k < cost_.size(); ++k) {
+    if (cost_[k] == 0.0F) {
+      cost_[k] = static_cast<float>(1 - std::clamp(static_cast<double>(edge_[k]) / saturation, -0.3, 1.0));
+    }
+  }
+  for (const auto& [i, r] : band_.anchors) {
+    for (int j = 0; j < m_; ++j) {
+      const double d = radius(i, j) - r;
+      cost_[id(i, j)] = static_cast<float>(std::min(40.0, 4 * d * d));
+    }
+  }
+}
+
+void BandSearch::find_shortest_closed_path() {
+  const int reach = std::clamp(static_cast<int>(std::lround(band_.slope * arc_ / band_.step)), 1, 8);
+  std::vector<float> bend(static_cast<std::size_t>(reach) + 1);
+  for (int k = 0; k <= reach; ++k) {
+    bend[static_cast<std::size_t>(k)] =
+        static_cast<float>(band_.stiffness * std::pow(k * band_.step / arc_, 2));
+  }
+  path_.resize(band_.middle.size());
+  find_shortest_path(0, -1, bend);
+  // That path is open at angle 0. A second one begins and ends half a turn away, where the first was closed.
+  const int opposite = n_ / 2;
+  find_shortest_path(opposite, path_[angle(opposite)], bend);
+}
+
+// Dynamic programming from the angle `from` once round. With `fixed` >= 0 the path begins and ends there.
+void BandSearch::find_shortest_path(int from, int fixed, const std::vector<float>& bend) {
+  const int reach = static_cast<int>(bend.size()) - 1;
+  std::vector<float> total(cost_.size());
+  std::vector<std::int8_t> back(cost_.size());
+  for (int j = 0; j < m_; ++j) {
+    total[id(0, j)] = fixed < 0 || j == fixed ? cost_[id(from, j)] : kForbidden * 100;
+  }
+  for (int i = 1; i < n_; ++i) {
+    const int at = (from + i) % n_;
+    for (int j = 0; j < m_; ++j) {
+      float best = std::numeric_limits<float>::max();
+      int best_k = 0;
+      for (int k = -reach; k <= reach; ++k) {
+        const int q = j + k;
+        if (q < 0 || q >= m_) {
+          continue;
+        }
+        const float c = total[id(i - 1, q)] + bend[static_cast<std::size_t>(std::abs(k))];
+        if (c < best) {
+          best = c;
+          best_k = k;
+        }
+      }
+      total[id(i, j)] = best + cost_[id(at, j)];
+      back[id(i, j)] = static_cast<std::int8_t>(best_k);
+    }
+  }
+  int end = 0;
+  float best = std::numeric_limits<float>::max();
+  for (int j = 0; j < m_; ++j) {
+    const int k = fixed < 0 ? 0 : std::abs(j - fixed);
+    if (k > reach) {
+      continue;
+    }
+    const float c = total[id(n_ - 1, j)] + bend[static_cast<std::size_t>(k)];
+    if (c < best) {
+      best = c;
+      end = j;
+    }
+  }
+  for (int i = n_ - 1; i >= 0; --i) {
+    path_[angle(from + i)] = end;
+    end += i > 0 ? back[id(i, end)] : 0;
+  }
+}
+
+// The cost saturates, so the path may lie beside the top of the edge: at most 2 px away.
+int BandSearch::top_of_edge(int i) const {
+  int j = path_[angle(i)];
+  for (int climbed = 0; climbed * band_.step < 2.0; ++climbed) {
+    const int up = j + 1 < m_ && edge_[id(i, j + 1)] > edge_[id(i, j)] ? 1 : 0;
+    const int down = j > 0 && edge_[id(i, j - 1)] > edge_[id(i, std::min(j + up, m_ - 1))] ? 1 : 0;
+    if (up + down == 0) {
+      break;
+    }
+    j += down ? -1 : 1;
+  }
+  return j;
+}
+
+// Vertex of a parabola fitted by least squares over about +-1.5 px, in steps from j. A narrower parabola is
+// drawn towards the pixel grid.
+double BandSearch::vertex_beside(int i, int j) const {
+  const int wide = std::clamp(static_cast<int>(std::lround(1.5 / band_.step)), 1, 4);
+  const int reach = std::min({wide, j, m_ - 1 - j});
+  if (reach < 1) {
+    return 0;
+  }
+  double s2 = 0, s4 = 0, y0 = 0, y1 = 0, y2 = 0;
+  const double count = 2.0 * reach + 1;
+  for (int q = -reach; q <= reach; ++q) {
+    const double y = static_cast<double>(edge_[id(i, j + q)]);
+    s2 += q * q;
+    s4 += static_cast<double>(q) * q * q * q;
+    y0 += y;
+    y1 += q * y;
+    y2 += q * q * y;
+  }
+  const double curvature = (count * y2 - s2 * y0) / (count * s4 - s2 * s2);
+  return curvature < -1e-9 ? std::clamp(-y1 / s2 / (2 * curvature), -2.0, 2.0) : 0.0;
+}
+
+void BandSearch::measure_edges(double floor) {
+  const std::size_t n = band_.middle.size();
+  out_.raw.resize(n);
+  out_.strength.resize(n);
+  out_.seen.assign(n, 0);
+  weight_.resize(n);
+  int visible = 0, seen = 0;
+  std::vector<float> levels;
+  for (int i = 0; i < n_; ++i) {
+    const std::size_t a = angle(i);
+    const int j = top_of_edge(i);
+    const double e = static_cast<double>(edge_[id(i, j)]);
+    out_.raw[a] = band_.middle[a] + (j - half_ + vertex_beside(i, j)) * band_.step;
+    out_.strength[a] = static_cast<float>(e);
+    if (shown_[a] > 0) {
+      ++visible;
+      levels.push_back(static_cast<float>(e));
+      if (e > floor) {
+        ++seen;
+        out_.seen[a] = 1;
+      }
+      out_.mean_strength += std::clamp(e / out_.saturation, 0.0, 1.0);
+    }
+    weight_[a] = e > 0 ? std::pow(std::min(e / out_.saturation, 1.0), 2) : 0;
+  }
+  out_.level = median_of(std::move(levels));
+  out_.visible = static_cast<double>(visible) / n_;
+  out_.support = visible > 0 ? static_cast<double>(seen) / visible : 0;
+  out_.mean_strength = visible > 0 ? out_.mean_strength / visible : 0;
+  for (const auto& [i, r] : band_.anchors) {
+    out_.raw[angle(i)] = r;
+    weight_[angle(i)] = kAnchorWeight;
+  }
+}
+
+// Median of the seen radii nearest to a gap, without the outermost, which may be half hidden; -1: too few.
+double BandSearch::radius_beside_gap(int from, int step) const {
+  std::vector<float> near;
+  for (int k = 0; k < n_ / 8 && near.size() < 8; ++k) {
+    const std::size_t a = angle(from + k * step);
+    if (out_.seen[a] && k > 0) {
+      near.push_back(static_cast<float>(out_.raw[a]));
+    }
+  }
+  return near.size() < 4 ? -1.0 : median_of(std::move(near));
+}
+
+// Over long arcs without edges the contour is drawn weakly to a straight bridge between the seen radii on
+// either side; otherwise noise at the ends of the arc would bend it far out.
+void BandSearch::bridge_gaps() {
+  std::vector<std::uint8_t> anchored(band_.middle.size(), 0);
+  for (const auto& anchor : band_.anchors) {
+    anchored[angle(anchor.first)] = 1;
+  }
+  for (int i = 0; i < n_; ++i) {
+    if (!out_.seen[angle(i)] || out_.seen[angle(i + 1)]) {
+      continue;
+    }
+    int run = 1;
+    while (run < n_ && !out_.seen[angle(i + 1 + run)]) {
+      ++run;
+    }
+    const double left = radius_beside_gap(i, -1), right = radius_beside_gap(i + 1 + run, 1);
+    if (left < 0 || right < 0) {
+      continue;
+    }
+    for (int k = 0; k < run; ++k) {
+      const std::size_t a = angle(i + 1 + k);
+      if (!anchored[a]) {
+        const double t = (k + 1.0) / (run + 1.0);
+        out_.raw[a] = (1 - t) * left + t * right;
+        weight_[a] = std::max(weight_[a], kBridgeWeight);
+      }
+    }
+  }
+}
+
+// About 25 modes of the contour are left free; more where the middle line itself is bent (a dimple), and at
+// the anchors.
+std::vector<double> BandSearch::stiffness_per_angle() const {
+  std::vector<double> stiffness(band_.middle.size());
+  for (int i = 0; i < n_; ++i) {
+    const double bend = band_.middle[angle(i - 3)] - 2 * band_.middle[angle(i)] + band_.middle[angle(i + 3)];
+    const double curvature = std::abs(bend) / (9 * arc_ * arc_);
+    stiffness[angle(i)] = 30 * std::pow(n_ / 256.0, 4) / (1 + std::pow(curvature * 100, 2));
+  }
+  for (const auto& anchor : band_.anchors) {
+    for (int d = -n_ / 16; d <= n_ / 16; ++d) {
+      double& s = stiffness[angle(anchor.first + d)];
+      s = std::min(s, kAnchorStiffness);
+    }
+  }
+  return stiffness;
+}
+
+void BandSearch::smooth() {
+  const std::vector<double> stiffness = stiffness_per_angle();
+  std::vector<double> w = weight_;
+  for (int round = 0; round < 3; ++round) {
+    out_.r = smooth_periodic(out_.raw, w, stiffness);
+    std::vector<double> distances;
+    for (std::size_t a = 0; a < out_.r.size(); ++a) {
+      if (out_.seen[a]) {
+        distances.push_back(std::abs(out_.raw[a] - out_.r[a]));
+      }
+    }
+    if (distances.size() < 8) {
+      break;
+    }
+    out_.residual = kSdOfMedian * median_of(std::move(distances));
+    const double limit = kTukey * std::max(out_.residual, kLeastScale_px);
+    for (std::size_t a = 0; a < out_.r.size(); ++a) {
+      const double t = (out_.raw[a] - out_.r[a]) / limit;
+      w[a] = std::abs(t) < 1 ? weight_[a] * std::pow(1 - t * t, 2) : 0;
+    }
+    for (const auto& anchor : band_.anchors) {
+      w[angle(anchor.first)] = kAnchorWeight;
+    }
+  }
+  if (!band_.upper.empty()) {
+    for (std::size_t a = 0; a < out_.r.size(); ++a) {
+      out_.r[a] = std::min(out_.r[a], std::max(band_.upper[a], 2.0));
+    }
+  }
+}
+
+}  // namespace
+
+EdgePath closed_path(const GradientField& field, const EdgeBand& band, Polarity polarity, double floor,
+                     double saturation) {
+  BandSearch search(field, band, polarity);
+  return search.empty() ? EdgePath{} : search.search(floor, saturation);
+}
+
+}  // namespace punctum::vision

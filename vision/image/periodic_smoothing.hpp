@@ -1,0 +1,14 @@
+// Penalised least squares on a closed line.
+#pragma once
+
+#include <vector>
+
+namespace punctum::vision {
+
+// The x that minimise  sum w_i (r_i - x_i)^2 + sum stiffness_i (x_{i-1} - 2 x_i + x_{i+1})^2,  cyclic. Fewer
+// than 8 values, and values without any weight, come back unchanged.
+[[nodiscard]] std::vector<double> smooth_periodic(const std::vector<double>& r,
+                                                  const std::vector<double>& weight,
+                                                  const std::vector<double>& stiffness);
+
+}  // namespace punctum::vision

@@ -1,0 +1,23 @@
+// A contour as one radius for each of a number of equally spaced polar angles about a centre. Angle 0 points
+// along +x.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "vision/image/contour.hpp"
+
+namespace punctum::vision {
+
+// The radii of a contour seen from `centre`. Where a wall overhangs, the outermost crossing counts. Empty if
+// fewer than half of the rays cross the contour.
+[[nodiscard]] std::vector<double> polar_radii(std::span<const Point> contour, const Point& centre,
+                                              int angles);
+[[nodiscard]] Contour from_polar(const Point& centre, std::span<const double> radii);
+
+[[nodiscard]] double polar_angle(int i, int angles);                // of the i-th ray, rad
+[[nodiscard]] int polar_index(const Point& direction, int angles);  // of the nearest ray
+[[nodiscard]] Point on_ray(const Point& centre, int i, int angles, double r);
+[[nodiscard]] double angle_between(double a, double b);  // 0 .. pi
+
+}  // namespace punctum::vision

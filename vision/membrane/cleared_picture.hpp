@@ -1,0 +1,50 @@
+// A picture made ready for the membranes: its gradient, and what pipettes and impurities hide of it.
+#pragma once
+
+#include <functional>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "hal/devices.hpp"
+#include "vision/image/closed_path.hpp"
+#include "vision/image/gradient.hpp"
+#include "vision/pipettes/holding_pipette.hpp"
+#include "vision/pipettes/pipette_mask.hpp"
+
+namespace punctum::vision {
+
+struct ClearedPicture {
+  cv::Mat grey;               // CV_8U, the whole picture
+  GradientField field;        // of the area that is searched
+  double noise = 0;           // grey levels
+  double gradient_noise = 0;  // grey levels per px
+  std::optional<HolderFace> holder_face;
+
+  cv::Mat covered;  // CV_8U, the whole picture: 255 = pipette or impurity
+  cv::Mat strong;   // CV_8U, field.area: 255 = strong gradient, with the pipettes, without the impurities
+  cv::Mat edge;     // CV_32F, field.area: Sobel magnitude, 0 where covered
+
+  // Copies the frame, which must have this size. Returns why it cannot be used; empty when it can.
+  [[nodiscard]] std::string load(const hal::Frame& frame, int width, int height);
+  void compute_gradient(const cv::Rect& area);  // after load()
+
+  // Covers the pipettes, and nothing else.
+  void cover(const std::vector<Polygon>& pipettes);
+  // Covers what is strong, smaller than max_side px and away from the membranes, and sets `strong` and
+  // `edge`. Strong: above `threshold`, grey levels per px. Returns the number of impurities; 0 without
+  // membranes.
+  int cover_impurities(const std::vector<Contour>& membranes, double threshold, double max_side);
+
+  [[nodiscard]] double edge_floor() const noexcept { return 3 * gradient_noise; }  // less is no edge
+  [[nodiscard]] bool hidden(const Point& p) const;                       // covered, or outside the picture
+  [[nodiscard]] std::function<double(const Point&)> visibility() const;  // for EdgeBand; refers to this
+
+  // For a membrane that is pressed against the holding pipette. Behind the face of the pipette the membrane
+  // cannot be; along the face it is not visible, because of the dark line of the face. expected: radius of
+  // the membrane per angle of the band.
+  void exclude_holder(EdgeBand& band, const std::vector<double>& expected) const;
+};
+
+}  // namespace punctum::vision

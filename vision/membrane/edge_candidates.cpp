@@ -1,0 +1,186 @@
+#include "vision/membrane/edge_candidates.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "vision/image/median.hpp"
+#include "vision/image/polar_contour.hpp"
+
+namespace punctum::vision {
+
+namespace {
+
+constexpr double kContrast = 4;           // of a second edge: times the median edge of its band
+constexpr double kOvalDeviation = 0.055;  // of the radius, rms: a cell is nearly an oval
+
+struct Radii {
+  double from, to, expected;  // px
+};
+
+EdgePath closed_edge_round(const Point& centre, const Radii& radii, const ClearedPicture& picture, int angles,
+                           Polarity polarity, double saturation) {
+  const double width = radii.to - radii.from;
+  EdgeBand band;
+  band.centre = centre;
+  band.step = std::max(0.5, width / 160);
+  band.half_width = width / 2;
+  band.middle.assign(static_cast<std::size_t>(angles), (radii.from + radii.to) / 2);
+  band.slope = 1.5;
+  band.stiffness = 0.5;
+  band.visible = picture.visibility();
+  picture.exclude_holder(band, std::vector<double>(band.middle.size(), 1.08 * radii.expected));
+  return closed_path(picture.field, band, polarity, picture.edge_floor(), saturation);
+}
+
+// Share of the angles that are visible and have less than half of the saturated edge.
+double weak_share(const EdgePath& p) {
+  const double angles = static_cast<double>(p.strength.size());
+  const auto weak = std::count_if(p.strength.begin(), p.strength.end(),
+                                  [&](float e) { return static_cast<double>(e) < 0.5 * p.saturation; });
+  return (static_cast<double>(weak) - (1 - p.visible) * angles) / angles;
+}
+
+// Whether the radii differ little from r(t) = c0 + c1 cos t + c2 sin t + c3 cos 2t + c4 sin 2t.
+bool nearly_oval(const std::vector<double>& r) {
+  constexpr int kTerms = 5;
+  const int n = static_cast<int>(r.size());
+  const auto f = [n](int i, int k) {
+    const double t = polar_angle(i, n);
+    switch (k) {
+      case 0:
+        return 1.0;
+      case 1:
+        return std::cos(t);
+      case 2:
+        return std::sin(t);
+      case 3:
+        return std::cos(2 * t);
+      default:
+        return std::sin(2 * t);
+    }
+  };
+  double c[kTerms] = {};
+  for (int i = 0; i < n; ++i) {
+    for (int k = 0; k < kTerms; ++k) {
+      c[k] += r[static_cast<std::size_t>(i)] * f(i, k) * (k == 0 ? 1 : 2) / n;
+    }
+  }
+  double mean_square = 0;
+  for (int i = 0; i < n; ++i) {
+    double e = r[static_cast<std::size_t>(i)];
+    for (int k = 0; k < kTerms; ++k) {
+      e -= c[k] * f(i, k);
+    }
+    mean_square += e * e / n;
+  }
+  return std::sqrt(mean_square) < kOvalDeviation * c[0];
+}
+
+}  // namespace
+
+std::optional<MainEdge> strongest_closed_edge(const Circle& circle, bool seeded, double saturation,
+                                              const ClearedPicture& picture, const VisionConfig& config) {
+  // Cells are not round: the radius seen from the centre varies more than the radius of the circle.
+  const Radii radii{seeded ? 0.75 * circle.r : 0.6 * config.px(config.R_min_m),
+                    seeded ? 1.25 * circle.r : 1.3 * config.px(config.R_max_m), circle.r};
+  // The centroid of the edge becomes the next centre.
+  const auto iterate = [&](Point centre, Polarity polarity, double edge_saturation, int rounds) {
+    ClosedEdge e;
+    e.polarity = polarity;
+    for (int i = 0; i < rounds; ++i) {
+      e.path = closed_edge_round(centre, radii, picture, config.contour_points, polarity, edge_saturation);
+      e.centre = centre;
+      if (e.path.r.empty()) {
+        break;
+      }
+      centre = centroid(from_polar(centre, e.path.r));
+      if (cv::norm(centre - e.centre) < 0.5) {
+        break;
+      }
+    }
+    return e;
+  };
+  MainEdge best;
+  best.of_any_sign = iterate(circle.centre, Polarity::any, saturation, 6);
+  const ClosedEdge& any = best.of_any_sign;
+  if (any.path.r.empty()) {
+    return std::nullopt;
+  }
+  // Where the edge has one sign all round (bright field), it is followed by that sign, which tells the two
+  // faces of a membrane apart. Where the sign changes round the cell, some arcs of a signed path are weak.
+  for (const Polarity q : {Polarity::brighter_out, Polarity::darker_out}) {
+    ClosedEdge e = iterate(any.centre, q, any.path.saturation, 2);
+    if (!e.path.r.empty() && e.path.mean_strength > 0.93 * any.path.mean_strength &&
+        weak_share(e.path) < weak_share(any.path) + 0.015 &&
+        (best.edge.path.r.empty() || e.path.mean_strength > best.edge.path.mean_strength)) {
+      best.edge = std::move(e);
+    }
+  }
+  if (best.edge.path.r.empty()) {
+    best.edge = any;
+  }
+  const EdgePath& path = best.edge.path;
+  if (path.visible < 0.45 || path.support < 0.6 || path.level < 1.8 * path.background ||
+      path.level < kEdgeClear_noise * picture.gradient_noise) {
+    return std::nullopt;
+  }
+  return best;
+}
+
+SecondEdge find_second(const std::vector<double>& r1, const Point& centre, Polarity known_sign, bool outside,
+                       const ClearedPicture& picture, const VisionConfig& config) {
+  const double r_max = config.px(config.R_max_m), mean = median_of(r1);
+  SecondEdge best;
+  for (const Polarity q : {Polarity::brighter_out, Polarity::darker_out, Polarity::any}) {
+    // Two edges of known sign may lie close together; a line whose sign is not known has two flanks.
+    const bool known = q != Polarity::any && known_sign != Polarity::any;
+    const double gap =
+        known ? std::max(2.5, 0.02 * mean) : std::max({3.5, 0.035 * mean, 1.2 * config.px(config.h_m)});
+    const double from = outside ? gap : -0.62 * mean;
+    const double to = outside ? std::min(0.6 * mean, 1.3 * r_max - mean) : -gap;
+    if (to - from < 4) {
+      continue;
+    }
+    EdgeBand band;
+    band.centre = centre;
+    band.half_width = (to - from) / 2;
+    band.step = std::max(0.5, (to - from) / 120);
+    band.middle = r1;
+    picture.exclude_holder(band, outside ? std::vector<double>(r1.size(), mean + gap) : r1);
+    for (double& r : band.middle) {
+      r += (from + to) / 2;
+    }
+    band.slope = 1.0;
+    band.stiffness = 0.8;
+    band.visible = picture.visibility();
+    EdgePath p = closed_path(picture.field, band, q, picture.edge_floor(), 0);
+    if (p.r.empty() || p.visible < 0.4) {
+      continue;
+    }
+    // Along the limit of the band it is the flank of the first edge.
+    std::vector<double> offsets;
+    for (std::size_t i = 0; i < p.r.size(); ++i) {
+      offsets.push_back(std::abs(p.r[i] - r1[i]));
+    }
+    if (median_of(offsets) < gap + 1.0) {
+      continue;
+    }
+    const double preference = q == Polarity::any ? 0.8 : q == known_sign ? 1.15 : 1.0;
+    const double quality = preference * p.level * p.support * std::min(1.0, p.visible / 0.8) /
+                           std::max({p.background, picture.gradient_noise, 0.02});
+    if (quality > best.quality) {
+      best = {std::move(p), q, quality};
+    }
+  }
+  return best;
+}
+
+bool clear_enough(const SecondEdge& edge, double first_level, const ClearedPicture& picture) {
+  // A path that is not nearly an oval has followed something else.
+  return edge.quality >= kContrast && edge.path.level >= kEdgeClear_noise * picture.gradient_noise &&
+         edge.path.level >= 0.12 * first_level && nearly_oval(edge.path.r);
+}
+
+}  // namespace punctum::vision

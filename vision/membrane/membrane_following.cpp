@@ -1,0 +1,219 @@
+#include "vision/membrane/membrane_following.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <opencv2/core.hpp>
+#include <utility>
+
+#include "vision/image/median.hpp"
+#include "vision/image/snake.hpp"
+#include "vision/image/spline.hpp"
+
+namespace punctum::vision {
+
+namespace {
+
+constexpr double kSnakeFloor_noise = 4;  // times the gradient's noise: spread of a flat neighbourhood
+constexpr double kMotionMax_px = 2.0;    // of the whole membrane, per frame and direction
+constexpr double kMotionLeast_px = 1.2;  // the nodes are on whole pixels: less is no motion
+constexpr double kNeedleHalf = 1.2;      // rad to either side of the entry: what a needle may dent
+
+// One evolution of the snake, in the coordinates of the whole picture.
+Contour snake_from(const Contour& nodes, const ClearedPicture& picture, const SnakeParams& params) {
+  const Point offset(picture.field.area.x, picture.field.area.y);
+  Contour local = nodes;
+  for (Point& p : local) {
+    p -= offset;
+  }
+  local = evolve(picture.edge, std::move(local), params, kSnakeFloor_noise * picture.gradient_noise);
+  for (Point& p : local) {
+    p += offset;
+  }
+  return local;
+}
+
+// The paper's contour: the spline through the snake's nodes.
+void take_snake(FollowedMembrane& m, const ClearedPicture& picture, Membrane& out) {
+  const int angles = static_cast<int>(m.r.size());
+  out.contour = spline_through(m.nodes, angles);
+  const Point centre = centroid(out.contour);
+  const std::vector<double> r = polar_radii(out.contour, centre, angles);
+  const double area = signed_area(out.contour), before = signed_area(m.contour());
+  double strength = 0;
+  for (const Point& p : m.nodes) {
+    strength += cv::norm(picture.field.gradient(p)) / static_cast<double>(m.nodes.size());
+  }
+  if (r.empty() || area < 0.6 * before || area > 1.6 * before || strength < picture.edge_floor()) {
+    out.reason = "snake lost the edge";
+    m.known = false;
+    return;
+  }
+  m.centre = centre;
+  m.r = r;
+  out.support = 1;
+  out.visible = 1;
+  out.ok = true;
+}
+
+// Median motion of the nodes; 0 when it is less than the snake can tell.
+Point common_motion(const Contour& from, const Contour& to) {
+  std::vector<double> dx, dy;
+  for (std::size_t i = 0; i < from.size() && i < to.size(); ++i) {
+    dx.push_back(to[i].x - from[i].x);
+    dy.push_back(to[i].y - from[i].y);
+  }
+  const Point shift(std::clamp(median_of(dx), -kMotionMax_px, kMotionMax_px),
+                    std::clamp(median_of(dy), -kMotionMax_px, kMotionMax_px));
+  return cv::norm(shift) < kMotionLeast_px ? Point() : shift;
+}
+
+// Blur moves the two faces of a wall apart that is thinner than the blur. The outer face then lies too far
+// out, by half of the difference between the apparent and the true thickness. 0 where the wall appears as
+// thick as it is.
+double thin_wall_bias(const MembraneSearch& search, const EdgePath& path, double thickness) {
+  constexpr double kPsf_px = 1.2;     // px, of a lens in focus
+  constexpr double kPixelling = 0.5;  // px^2, of the pixels and the gradient mask
+  constexpr double kStep = 0.25;      // px
+  const GradientField& field = search.picture.field;
+  const double sigma = std::sqrt(field.sigma * field.sigma + kPsf_px * kPsf_px + kPixelling);
+  if (search.m.polarity == Polarity::any || !(thickness > 0) || thickness > 2 * sigma) {
+    return 0;
+  }
+  const double sign = search.m.polarity == Polarity::brighter_out ? 1 : -1;
+  std::vector<double> apart;
+  for (int i = 0; i < search.angles; ++i) {
+    const std::size_t k = static_cast<std::size_t>(i);
+    if (!path.seen[k]) {
+      continue;
+    }
+    const Point d = on_ray(Point(0, 0), i, search.angles, 1);
+    double top = 0.4 * static_cast<double>(path.strength[k]), at = 0;
+    for (double s = 1; s < 3 * sigma; s += kStep) {
+      const double e = -sign * field.gradient(search.band.centre + (path.r[k] - s) * d).dot(d);
+      if (e > top) {
+        top = e;
+        at = s;
+      }
+    }
+    if (at > 0) {
+      apart.push_back(at);
+    }
+  }
+  if (static_cast<int>(apart.size()) < search.angles / 2) {
+    return 0;
+  }
+  const double seen = median_of(apart);
+  return seen < 2.6 * sigma ? std::max(0.0, 0.5 * (seen - thickness)) : 0;
+}
+
+// Away from the needle a membrane keeps its outline. An arc that has left the outline follows something else.
+bool left_outline(const MembraneSearch& s, const EdgePath& path) {
+  if (s.rest.size() != path.r.size() || !s.needle || !s.m.rest.reliable()) {
+    return false;
+  }
+  const double limit = std::max(6.0, 0.1 * median_of(s.rest));
+  int off = 0, n = 0;
+  for (int i = 0; i < s.angles; ++i) {
+    const std::size_t k = static_cast<std::size_t>(i);
+    if (s.from_needle(i) > kNeedleHalf) {
+      ++n;
+      off += std::abs(path.r[k] - s.rest[k]) > limit;
+    }
+  }
+  return off > n / 12;
+}
+
+// Empty when it is still the same edge.
+std::string why_not_the_same_edge(const MembraneSearch& s, const EdgeFound& found, double shift) {
+  const EdgePath& path = found.path;
+  std::vector<double> jump;
+  for (int i = 0; i < s.angles; ++i) {
+    const std::size_t k = static_cast<std::size_t>(i);
+    if (!found.is_free || s.from_needle(i) >= kNeedleHalf) {
+      jump.push_back(std::abs(path.r[k] - s.m.r[k]));
+    }
+  }
+  if (path.visible < 0.35) {
+    return "mostly hidden";
+  }
+  if (path.support < 0.55) {
+    return "edge seen over " + std::to_string(std::lround(100 * path.support)) + " % only";
+  }
+  if (path.level < 0.35 * s.m.level) {
+    return "edge has faded";
+  }
+  if (median_of(jump) + shift > 0.6 * s.band.half_width) {
+    return "contour jumped";
+  }
+  if (left_outline(s, path)) {
+    return "contour left the cell's outline";
+  }
+  return {};
+}
+
+}  // namespace
+
+Membrane follow(FollowedMembrane& m, const ClearedPicture& picture, const VisionConfig& config,
+                const Surroundings& surroundings) {
+  Membrane out;
+  if (!m.known) {
+    out.reason = "not found";
+    return out;
+  }
+  const Contour nodes =
+      config.refine || m.nodes.size() < 3 ? spline_through(m.contour(), config.snake.nodes) : m.nodes;
+  m.nodes = snake_from(nodes, picture, config.snake);
+  out.nodes = m.nodes;
+  if (!config.refine) {
+    take_snake(m, picture, out);
+    return out;
+  }
+
+  const Point shift = common_motion(nodes, m.nodes);
+  const MembraneSearch search(m, picture, surroundings, shift);
+  const EdgeFound found = pushed_or_free(search);
+  const EdgePath& path = found.path;
+  if (path.r.empty()) {
+    out.reason = "no band to search";
+    ++m.lost_frames;
+    return out;
+  }
+  std::vector<double> face = path.r;
+  if (surroundings.outermost) {
+    const double bias = thin_wall_bias(search, path, config.px(config.h_m));
+    for (double& r : face) {
+      r -= bias;
+    }
+  }
+  out.contour = from_polar(search.band.centre, face);
+  out.support = path.support;
+  out.visible = path.visible;
+  out.residual_px = path.residual;
+  out.reason = why_not_the_same_edge(search, found, cv::norm(shift));
+  if (!out.reason.empty()) {
+    ++m.lost_frames;
+    return out;
+  }
+  m.level += 0.1 * (path.level - m.level);
+  const Point centre = centroid(out.contour);
+  const std::vector<double> r = polar_radii(out.contour, centre, search.angles);
+  if (r.empty()) {
+    out.reason = "contour crosses itself";
+    ++m.lost_frames;
+    return out;
+  }
+  out.ok = true;
+  m.lost_frames = 0;
+  // The centre stays while it is well inside the contour, since resampling costs accuracy.
+  if (cv::norm(centre - search.band.centre) > 0.06 * search.usual_r) {
+    m.centre = centre;
+    m.r = r;
+  } else {
+    m.centre = search.band.centre;
+    m.r = path.r;
+  }
+  return out;
+}
+
+}  // namespace punctum::vision

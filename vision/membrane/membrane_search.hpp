@@ -1,0 +1,71 @@
+// The search of one membrane in one frame: in a band round its last contour, pushed in by the needle or free
+// of it.
+#pragma once
+
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "vision/membrane/cleared_picture.hpp"
+#include "vision/membrane/followed_membrane.hpp"
+
+namespace punctum::vision {
+
+// What else is near the membrane.
+struct Surroundings {
+  const NeedlePose& needle;
+  std::optional<Point> last_tip;  // one frame ago
+  bool punctured = false;
+  bool outermost = true;                     // the membrane is the outer one
+  const FollowedMembrane* around = nullptr;  // the membrane outside of it, if this frame shows it
+  const FollowedMembrane* within = nullptr;  // the membrane inside of it, one frame ago
+  const Undeformed* undeformed = nullptr;    // of the outer membrane; or null
+};
+
+// Where the needle meets a membrane, seen from the centre of the band.
+struct NeedleSeen {
+  double entry_angle = 0;  // of the entry point; it is the angle of the axis only for a central needle
+  int tip_index = 0;       // angle nearest to the tip
+  double tip_r = 0;        // px
+};
+
+struct MembraneSearch {
+  const FollowedMembrane& m;
+  const ClearedPicture& picture;
+  const Surroundings& surroundings;
+  int angles;
+  double usual_r;            // px
+  double saturation;         // grey levels per px
+  EdgeBand band;             // round the last contour
+  std::vector<double> rest;  // rest outline, seen from the centre of the band; empty: not known
+  std::optional<NeedleSeen> needle;
+
+  MembraneSearch(const FollowedMembrane& followed, const ClearedPicture& cleared, const Surroundings& s,
+                 const Point& shift);
+
+  // Angle between the ray i and the entry of the needle, rad.
+  [[nodiscard]] double from_needle(int i) const {
+    return angle_between(polar_angle(i, angles), needle ? needle->entry_angle : 0);
+  }
+  [[nodiscard]] EdgePath path_in(const EdgeBand& b) const {
+    return closed_path(picture.field, b, m.polarity, picture.edge_floor(), saturation);
+  }
+  [[nodiscard]] EdgePath path_free() const;
+  [[nodiscard]] EdgePath path_pushed() const;
+  [[nodiscard]] std::vector<std::pair<int, double>> end_face() const;
+  [[nodiscard]] double mean_beside_needle(const std::vector<double>& per_angle) const;
+
+ private:
+  void keep_membranes_apart();
+  void limit_depth_to_tip();
+};
+
+struct EdgeFound {
+  EdgePath path;
+  bool is_free = false;  // the needle is inside, but the membrane is at its rest outline
+};
+
+// The better of the two: the membrane pushed by the needle, or free of it.
+[[nodiscard]] EdgeFound pushed_or_free(const MembraneSearch& search);
+
+}  // namespace punctum::vision

@@ -1,0 +1,109 @@
+#include "vision/membrane/rest_shape.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "vision/image/median.hpp"
+#include "vision/image/polar_contour.hpp"
+
+namespace punctum::vision {
+
+namespace {
+
+constexpr int kReliable = 6;              // frames without contact; then the outline is relied on
+constexpr int kOutlineMemory = 12;        // frames averaged
+constexpr int kCircleMemory = 20;         // frames averaged
+constexpr double kDentHalf = 0.9;         // rad to either side of the entry
+constexpr double kHolderHalf = 0.6;       // rad to either side of the holding pipette's mouth
+constexpr double kHolderMotion_px = 1.0;  // less is no motion of the holding pipette
+
+double angle_of(const Point& d, const Point& e) { return std::abs(std::atan2(d.cross(e), d.dot(e))); }
+
+}  // namespace
+
+bool RestOutline::reliable() const noexcept { return frames >= kReliable; }
+
+std::vector<double> RestOutline::seen_from(const Point& other_centre) const {
+  return r.empty() ? r : polar_radii(from_polar(centre, r), other_centre, static_cast<int>(r.size()));
+}
+
+void RestOutline::learn(const Point& now_centre, const std::vector<double>& now_r) {
+  if (r.empty() || cv::norm(centre - now_centre) > 0.1 * median_of(now_r)) {
+    *this = {now_centre, now_r, 1};
+    return;
+  }
+  const std::vector<double> now =
+      polar_radii(from_polar(now_centre, now_r), centre, static_cast<int>(r.size()));
+  const double gain = 1.0 / std::min(++frames, kOutlineMemory);
+  for (std::size_t i = 0; i < now.size(); ++i) {
+    r[i] += gain * (now[i] - r[i]);
+  }
+}
+
+Point LearntUndeformed::update(const Undeformed& now, bool touched, const std::optional<Point>& mouth) {
+  if (!shape_ || (!touched && now.round)) {
+    if (shape_ && shape_->round && now.round &&
+        cv::norm(now.circle.centre - shape_->circle.centre) < 0.05 * shape_->circle.r) {
+      const double gain = 1.0 / std::min(++frames_, kCircleMemory);
+      Circle& c = shape_->circle;
+      c.centre += gain * (now.circle.centre - c.centre);
+      c.r += gain * (now.circle.r - c.r);
+      c.rms = now.circle.rms;
+      shape_->shape = circle_contour(c, static_cast<int>(now.shape.size()));
+    } else {
+      shape_ = now;
+      frames_ = 1;
+    }
+    mouth_ = mouth;
+  } else if (!touched) {
+    shape_ = now;
+    mouth_ = mouth;
+  } else if (mouth_ && mouth && cv::norm(*mouth - *mouth_) > kHolderMotion_px) {
+    const Point shift = *mouth - *mouth_;
+    shape_->circle.centre += shift;
+    for (Point& p : shape_->shape) {
+      p += shift;
+    }
+    mouth_ = mouth;
+    return shift;
+  }
+  return {};
+}
+
+void LearntUndeformed::forget() {
+  shape_.reset();
+  frames_ = 0;
+}
+
+bool LearntUndeformed::same_cell(const Contour& outer, const Point& centre, const NeedlePose& needle) const {
+  if (!shape_) {
+    return false;
+  }
+  std::vector<double> weight(outer.size(), 1.0);
+  if (needle.ok) {
+    for (std::size_t i = 0; i < outer.size(); ++i) {
+      const Point d = outer[i] - centre;
+      weight[i] = d.dot(needle.axis) < -0.3 * cv::norm(d) ? 0 : 1;
+    }
+  }
+  const auto fitted = fit_circle(outer, weight);
+  const Circle& known = shape_->circle;
+  return fitted && cv::norm(fitted->centre - known.centre) < 0.08 * known.r &&
+         std::abs(fitted->r - known.r) < 0.06 * known.r;
+}
+
+std::vector<double> undeformed_weights(const Contour& contour, const ClearedPicture& picture,
+                                       const std::optional<Point>& entry, const std::optional<Point>& mouth) {
+  const Point centre = centroid(contour);
+  std::vector<double> weight(contour.size(), 1.0);
+  for (std::size_t i = 0; i < contour.size(); ++i) {
+    const Point d = contour[i] - centre;
+    if (picture.hidden(contour[i]) || (entry && angle_of(d, *entry - centre) < kDentHalf) ||
+        (mouth && angle_of(d, *mouth - centre) < kHolderHalf)) {
+      weight[i] = 0;
+    }
+  }
+  return weight;
+}
+
+}  // namespace punctum::vision

@@ -1,0 +1,47 @@
+// The shape of a membrane at rest: learnt while nothing touches it, kept while the needle does.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "vision/membrane/cleared_picture.hpp"
+#include "vision/membrane/undeformed.hpp"
+
+namespace punctum::vision {
+
+// Contour of one membrane.
+struct RestOutline {
+  Point centre;
+  std::vector<double> r;  // px per angle; empty: not known
+  int frames = 0;         // that it was learnt from
+
+  [[nodiscard]] bool reliable() const noexcept;                                  // learnt from enough frames
+  [[nodiscard]] std::vector<double> seen_from(const Point& other_centre) const;  // empty: not known
+  void learn(const Point& now_centre, const std::vector<double>& now_r);
+};
+
+// Fitted shape of the outer membrane. It moves with the holding pipette.
+class LearntUndeformed {
+ public:
+  // now: fitted to this frame. mouth: of the holding pipette, where it is seen. Returns by how much the
+  // holding pipette has moved the cell.
+  [[nodiscard]] Point update(const Undeformed& now, bool touched, const std::optional<Point>& mouth);
+  void forget();
+  [[nodiscard]] bool known() const noexcept { return shape_.has_value(); }
+  [[nodiscard]] const std::optional<Undeformed>& shape() const noexcept { return shape_; }
+  // Whether a new outer contour is this cell in the same place. Where the needle may dent it, it may differ.
+  [[nodiscard]] bool same_cell(const Contour& outer, const Point& centre, const NeedlePose& needle) const;
+
+ private:
+  std::optional<Undeformed> shape_;
+  int frames_ = 0;  // that it was learnt from
+  std::optional<Point> mouth_;
+};
+
+// Weights for fit_undeformed: 0 where the contour is hidden, may be dented at `entry`, or is pressed by the
+// holding pipette.
+[[nodiscard]] std::vector<double> undeformed_weights(const Contour& contour, const ClearedPicture& picture,
+                                                     const std::optional<Point>& entry,
+                                                     const std::optional<Point>& mouth);
+
+}  // namespace punctum::vision

@@ -1,0 +1,112 @@
+#include "vision/pipettes/border_section.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <opencv2/core.hpp>
+#include <vector>
+
+namespace punctum::vision {
+
+namespace {
+
+constexpr double kInset_px = 4;      // borders of recorded pictures are often black
+constexpr int kTiltMax_deg = 20;     // of a pipette against the horizontal
+constexpr double kLeastEdge = 0.25;  // grey levels per px
+
+struct EdgeGroup {
+  double lo = 0, hi = 0;  // outermost edges
+  double energy = 0;      // sum of the squared edges
+};
+
+// Mean grey along lines of one tilt; at the tube's own tilt its edges are sharpest.
+struct TiltedProfile {
+  std::vector<double> edge;  // per row, |change of grey| per px
+  double strongest = 0;
+  int samples = 0;  // along each line
+};
+
+TiltedProfile profile_at(const GradientField& field, double border_x, double into_x, double slope,
+                         double strip) {
+  const cv::Rect a = field.area;
+  const int h = a.height;
+  std::vector<double> sum(static_cast<std::size_t>(h));
+  TiltedProfile out;
+  for (double s = 0; s < strip; s += 2) {
+    ++out.samples;
+    for (int y = 0; y < h; ++y) {
+      const double yy = std::clamp(a.y + y + s * slope, a.y + 0.0, a.y + h - 1.001);
+      sum[static_cast<std::size_t>(y)] += field.grey(Point(border_x + s * into_x, yy));
+    }
+  }
+  out.edge.assign(static_cast<std::size_t>(h), 0.0);
+  for (int y = 4; y + 4 < h; ++y) {
+    const std::size_t k = static_cast<std::size_t>(y);
+    out.edge[k] = std::abs(sum[k + 1] - sum[k - 1]) / (2.0 * out.samples);
+    out.strongest = std::max(out.strongest, out.edge[k]);
+  }
+  return out;
+}
+
+// Edges above the floor that are nearer to the first of their group than `width_max`. total: energy of all.
+std::vector<EdgeGroup> groups_of(const std::vector<double>& edge, double floor, double width_max,
+                                 double& total) {
+  std::vector<EdgeGroup> groups;
+  total = 0;
+  for (std::size_t y = 4; y + 4 < edge.size(); ++y) {
+    const double e = edge[y];
+    if (e <= floor || e < edge[y - 1] || e < edge[y + 1]) {
+      continue;
+    }
+    total += e * e;
+    const double at = static_cast<double>(y);
+    if (groups.empty() || at - groups.back().lo > width_max) {
+      groups.push_back({at, at, e * e});
+    } else {
+      groups.back().hi = at;
+      groups.back().energy += e * e;
+    }
+  }
+  return groups;
+}
+
+}  // namespace
+
+std::optional<TubeTrace> border_section(const GradientField& field, Side side, double width_min,
+                                        double width_max, double noise, double strip, double relative) {
+  const cv::Rect a = field.area;
+  const double into_x = side == Side::right ? -1 : 1;
+  const double border_x = side == Side::right ? a.x + a.width - 1 - kInset_px : a.x + kInset_px;
+  std::optional<TubeTrace> best;
+  double best_energy = 0;
+  for (int degree = -kTiltMax_deg; degree <= kTiltMax_deg; ++degree) {
+    const double slope = std::tan(degree * CV_PI / 180);
+    const TiltedProfile profile = profile_at(field, border_x, into_x, slope, strip);
+    // Four standard deviations of what the noise leaves.
+    const double floor = std::max({4 * field.noise_of_gradient(noise) / std::sqrt(0.6 * profile.samples),
+                                   kLeastEdge, relative * profile.strongest});
+    double total = 0;
+    for (const EdgeGroup& group : groups_of(profile.edge, floor, width_max, total)) {
+      const double width = group.hi - group.lo;
+      if (width < width_min || width > width_max || group.energy <= best_energy) {
+        continue;
+      }
+      best_energy = group.energy;
+      TubeTrace t;
+      t.side = side;
+      t.axis = Point(into_x, slope) / std::hypot(1.0, slope);
+      t.root = Point(border_x, a.y + 0.5 * (group.lo + group.hi));
+      t.half_width = 0.5 * width;
+      t.edge_share = group.energy / total;
+      best = t;
+    }
+  }
+  return best;
+}
+
+Point across_tube(const Point& axis) {
+  const Point across(-axis.y, axis.x);
+  return across.y < 0 ? -across : across;
+}
+
+}  // namespace punctum::vision

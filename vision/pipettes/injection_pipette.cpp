@@ -1,0 +1,213 @@
+#include "vision/pipettes/injection_pipette.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+
+#include "vision/image/correlation.hpp"
+#include "vision/pipettes/narrow_tube.hpp"
+#include "vision/pipettes/needle_walls.hpp"
+
+namespace punctum::vision {
+
+namespace {
+
+constexpr double kLeastScore = 0.3;  // of the centred correlation
+constexpr double kJump_px = 4;       // along the axis, from what motion and correlation predict
+constexpr int kJumpsMax = 3;         // frames in a row; then it is where it is seen
+constexpr int kLostMax = 3;          // frames in a row; then it is looked for from the border
+
+// The best narrow tube of both borders, or of the one that is known.
+std::optional<TubeTrace> best_tube(const GradientField& field, Side side, double width_max, double noise) {
+  std::optional<TubeTrace> best;
+  for (const Side s : {Side::right, Side::left}) {
+    if (side != Side::automatic && s != side) {
+      continue;
+    }
+    const auto t = trace_narrow_tube(field, s, 3, width_max, noise);
+    if (t && t->edge_share > 0.5 && t->similarity > 0.5 && t->length > 12 &&
+        (!best || t->edge_share * t->similarity > best->edge_share * best->similarity)) {
+      best = t;
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+bool InjectionPipette::cut_template(const GradientField& field) {
+  // Shaft and end face, and almost nothing of what lies ahead of the tip.
+  const double back = std::clamp(6 * last_.half_width, 14.0, 40.0), ahead = 2.5;
+  const double wide = last_.half_width_at(back) + 4;
+  const Point a = last_.at(back, 0), b = last_.at(-ahead, 0);
+  const cv::Rect box = cv::Rect(static_cast<int>(std::lround(std::min(a.x, b.x))),
+                                static_cast<int>(std::lround(std::min(a.y, b.y) - wide)),
+                                static_cast<int>(std::lround(std::abs(a.x - b.x))) + 1,
+                                static_cast<int>(std::lround(std::abs(a.y - b.y) + 2 * wide)) + 1) &
+                       field.area;
+  if (box.width < 8 || box.height < 6) {
+    return false;
+  }
+  template_ = field.smooth(box - field.area.tl()).clone();
+  tip_in_template_ = last_.tip - Point(box.x, box.y);
+  return true;
+}
+
+bool InjectionPipette::start(const GradientField& field, double noise) {
+  const auto tube = best_tube(field, side_, std::max(22.0, 8 * radius_px_), noise);
+  if (!tube) {
+    reason_ = "no narrow tube enters through the border";
+    return false;
+  }
+  last_ = {};
+  last_.axis = tube->axis;
+  last_.half_width = tube->end_half_width;
+  last_.taper = std::clamp((tube->half_width - tube->end_half_width) / std::max(tube->length, 1.0), 0.0, 0.2);
+  last_.tip = tube->end();
+  double straight = 0;
+  for (int round = 0; round < 3; ++round) {
+    straight = fit_walls(field, noise, radius_px_, last_);
+    const double back = std::min(30.0, 0.5 * tube->length), ahead = round == 0 ? 25 : 10;
+    if (const auto s = end_of_profile(field, last_, back, ahead, noise)) {
+      last_.tip += *s * last_.axis;
+    }
+  }
+  step_sign_ = 0;
+  end_offset_ = 0.15 * last_.half_width;
+  offset_frames_ = 0;
+  calibrate_end(field, last_, noise);
+  last_.tip += end_offset_ * last_.axis;
+  if (straight < 0.65 || last_.half_width > 2 * radius_px_ + 1) {
+    reason_ = "what enters through the border is not a straight needle";
+    return false;
+  }
+  if (!cut_template(field)) {
+    reason_ = "tip too close to the border";
+    return false;
+  }
+  last_.ok = true;
+  last_.score = 1;
+  found_side_ = tube->side;
+  velocity_ = {};
+  lost_ = 0;
+  started_ = true;
+  reason_.clear();
+  return true;
+}
+
+NeedlePose InjectionPipette::find(const GradientField& field, double noise) {
+  NeedlePose needle = last_;
+  needle.ok = false;
+  needle.reason.clear();
+  if (!started_) {
+    needle.reason = reason_.empty() ? "not started" : reason_;
+    return needle;
+  }
+  const cv::Rect all = field.area;
+  const Point expected = last_.tip + velocity_ - tip_in_template_;
+  const int rx = 24 + 8 * lost_, ry = 10 + 6 * lost_;
+  const cv::Rect window =
+      cv::Rect(static_cast<int>(std::lround(expected.x)) - rx, static_cast<int>(std::lround(expected.y)) - ry,
+               template_.cols + 2 * rx, template_.rows + 2 * ry) &
+      all;
+  const auto p = peak(centred_correlation_map(field.smooth(window - all.tl()), template_));
+  needle.score = p ? p->score : 0;
+  if (!p || p->score < kLeastScore) {
+    return not_recognised(field, noise, needle);
+  }
+  // Across the needle the correlation tells its place.
+  const Point correlated = p->at + Point(window.x, window.y) + tip_in_template_;
+  const Point across(-last_.axis.y, last_.axis.x);
+  needle.tip = last_.tip + velocity_ - end_offset_ * last_.axis;
+  needle.tip += (correlated - needle.tip).dot(across) * across;
+  bool near = false;
+  if (!find_end(field, noise, needle, near)) {
+    needle.reason = "end of the needle not seen";
+    velocity_ = {};
+    ++lost_;
+    return needle;
+  }
+  needle.tip += end_offset_ * needle.axis;
+  // Far from where the motion predicts the end, and from where the whole tip is recognised: something else
+  // crosses the needle.
+  if (!near && std::abs((needle.tip - last_.tip - velocity_).dot(needle.axis)) > kJump_px &&
+      std::abs((needle.tip - correlated).dot(needle.axis)) > kJump_px && ++jumps_ <= kJumpsMax) {
+    needle.reason = "end of the needle jumped";
+    return needle;
+  }
+  jumps_ = 0;
+  needle.ok = true;
+  velocity_ = lost_ == 0 ? needle.tip - last_.tip : Point();
+  lost_ = 0;
+  last_ = needle;
+  return needle;
+}
+
+NeedlePose InjectionPipette::not_recognised(const GradientField& field, double noise, NeedlePose needle) {
+  needle.reason = "tip not recognised";
+  velocity_ = {};
+  if (++lost_ > kLostMax) {
+    const NeedlePose before = last_;
+    if (start(field, noise)) {
+      return last_;
+    }
+    last_ = before;
+    started_ = true;
+  }
+  return needle;
+}
+
+bool InjectionPipette::find_end(const GradientField& field, double noise, NeedlePose& needle,
+                                bool& near) const {
+  (void)fit_walls(field, noise, radius_px_, needle);
+  // First near where the motion predicts it: what lies further ahead cannot be mistaken for it then.
+  auto end = end_of_profile(field, needle, 18, 18, noise);
+  near = end.has_value();
+  if (!near) {
+    end = end_of_profile(field, needle, 36, 44, noise);
+  }
+  if (!end) {
+    return false;
+  }
+  needle.tip += *end * needle.axis;
+  (void)fit_walls(field, noise, radius_px_, needle);
+  if (const auto again = end_of_profile(field, needle, 16, 16, noise)) {
+    needle.tip += *again * needle.axis;
+  }
+  return true;
+}
+
+// The profile of the walls ends a little before the end face. How far, the steepest change of grey along the
+// walls tells, averaged over 30 frames.
+void InjectionPipette::calibrate_end(const GradientField& field, const NeedlePose& walls, double noise) {
+  const auto step = steepest_wall_step(field, walls, 3.5, 3 * field.noise_of_gradient(noise), step_sign_);
+  if (!step) {
+    return;
+  }
+  if (step_sign_ == 0) {
+    const double e = field.gradient(walls.at(-*step, 0.8 * walls.half_width)).dot(walls.axis) +
+                     field.gradient(walls.at(-*step, -0.8 * walls.half_width)).dot(walls.axis);
+    step_sign_ = e > 0 ? 1 : -1;
+  }
+  end_offset_ += (*step - end_offset_) / std::min(++offset_frames_, 30);
+}
+
+void InjectionPipette::learn(const GradientField& field, const NeedlePose& needle, double noise) {
+  if (!needle.ok || template_.empty()) {
+    return;
+  }
+  NeedlePose walls = needle;
+  walls.tip -= end_offset_ * walls.axis;
+  calibrate_end(field, walls, noise);
+  cv::Mat here;
+  cv::getRectSubPix(
+      field.smooth, template_.size(),
+      cv::Point2f(
+          static_cast<float>(needle.tip.x - field.area.x - tip_in_template_.x + (template_.cols - 1) / 2.0),
+          static_cast<float>(needle.tip.y - field.area.y - tip_in_template_.y + (template_.rows - 1) / 2.0)),
+      here);
+  cv::addWeighted(template_, 0.9, here, 0.1, 0, template_);
+}
+
+}  // namespace punctum::vision

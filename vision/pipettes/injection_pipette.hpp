@@ -1,0 +1,53 @@
+// Injection pipette. It is found from the border through which it enters, and then followed by normalised
+// correlation of its tip; its walls are fitted anew in every frame.
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <string>
+
+#include "vision/config.hpp"
+#include "vision/image/gradient.hpp"
+#include "vision/pipettes/needle_pose.hpp"
+
+namespace punctum::vision {
+
+class InjectionPipette {
+ public:
+  // side: the border through which it enters. radius_px: expected at the tip.
+  InjectionPipette(Side side, double radius_px) : side_(side), radius_px_(radius_px) {}
+
+  // Looks for it from the border. True when a template of the tip was cut. noise: grey levels.
+  [[nodiscard]] bool start(const GradientField& field, double noise);
+  [[nodiscard]] NeedlePose find(const GradientField& field, double noise);
+  // Lets the template of the tip follow slow changes of focus and light. Only while nothing touches the tip.
+  void learn(const GradientField& field, const NeedlePose& needle, double noise);
+
+  [[nodiscard]] bool started() const noexcept { return started_; }
+  [[nodiscard]] Side side() const noexcept { return found_side_; }
+
+ private:
+  bool cut_template(const GradientField& field);
+  // Along the needle its shaft looks the same everywhere, so there the end of its walls tells its place.
+  // `near`: it was found near where the motion predicts it.
+  [[nodiscard]] bool find_end(const GradientField& field, double noise, NeedlePose& needle, bool& near) const;
+  void calibrate_end(const GradientField& field, const NeedlePose& walls, double noise);
+  [[nodiscard]] NeedlePose not_recognised(const GradientField& field, double noise, NeedlePose needle);
+
+  Side side_;
+  double radius_px_;
+  bool started_ = false;
+  Side found_side_ = Side::right;
+  std::string reason_;  // why it was not started
+  cv::Mat template_;
+  Point tip_in_template_;
+  NeedlePose last_;
+  Point velocity_;  // px per frame
+  int lost_ = 0;    // frames in a row without the tip
+  int jumps_ = 0;   // frames in a row in which the end lay somewhere else
+
+  double end_offset_ = 0;  // from where the profile of the walls ends to the end face, px
+  int offset_frames_ = 0;  // that end_offset_ was learnt from
+  double step_sign_ = 0;   // +1: it is brighter ahead of the walls, -1: darker, 0: not known yet
+};
+
+}  // namespace punctum::vision

@@ -1,0 +1,240 @@
+#include "vision/pipettes/narrow_tube.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <numeric>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "vision/pipettes/border_section.hpp"
+#include "vision/pipettes/robust_line.hpp"
+
+namespace punctum::vision {
+
+namespace {
+
+constexpr double kStride_px = 2, kWindow_px = 5;  // a station every stride, averaged over the window
+constexpr double kAlongStep_px = 1.5;             // between the lines that a profile is averaged over
+constexpr double kSameTube = 0.6;                 // similarity above which the learnt profile follows
+constexpr double kLearning = 0.12;                // share of a new profile in the learnt one
+constexpr double kContinued = 0.5;                // similarity: the tube goes on
+constexpr double kGiveUp = 8;                     // so far below its best value the sum does not recover
+
+// Takes off mean and slope and scales to unit length. Returns the length before the scaling, 0 for a flat
+// profile.
+double normalise(std::vector<double>& v) {
+  const double n = static_cast<double>(v.size());
+  double mean = 0, tilt = 0, ss = 0;
+  for (double x : v) {
+    mean += x / n;
+  }
+  for (std::size_t i = 0; i < v.size(); ++i) {
+    const double u = static_cast<double>(i) - (n - 1) / 2;
+    tilt += u * v[i] * 12 / (n * (n * n - 1));
+  }
+  for (std::size_t i = 0; i < v.size(); ++i) {
+    v[i] -= mean + tilt * (static_cast<double>(i) - (n - 1) / 2);
+    ss += v[i] * v[i];
+  }
+  if (ss < 1e-6 * n) {
+    return 0;
+  }
+  for (double& x : v) {
+    x /= std::sqrt(ss);
+  }
+  return std::sqrt(ss);
+}
+
+// Follows a tube by its cross profile, which it learns on the way.
+class ProfileTracer {
+ public:
+  ProfileTracer(const GradientField& field, const TubeTrace& tube)
+      : field_(field),
+        tube_(tube),
+        across_(across_tube(tube.axis)),
+        n_(2 * static_cast<int>(tube.half_width + 5) + 1) {}
+
+  // False: the profile at the border is flat.
+  bool learn_at_border(double strip) {
+    learnt_ = profile(tube_.root, strip * 0.8);
+    contrast_ = normalise(learnt_);
+    return contrast_ > 0;
+  }
+  void follow() {
+    const double longest = 0.85 * field_.area.width / std::abs(tube_.axis.x);
+    for (double s = 0; s < longest; s += kStride_px) {
+      step(s);
+    }
+  }
+  // Index of the last station on the tube: there the sum of (similarity - kContinued) is largest, so that a
+  // short foreign thing across the tube does not end it. Empty: it does not end in the picture.
+  [[nodiscard]] std::optional<std::size_t> last_station() const {
+    double sum = 0, sum_best = 0;
+    std::size_t last = 0;
+    for (std::size_t i = 0; i < similarity_.size(); ++i) {
+      sum += std::clamp(similarity_[i], -0.5, 1.0) - kContinued;
+      if (sum > sum_best) {
+        sum_best = sum;
+        last = i;
+      }
+      if (sum < sum_best - kGiveUp) {
+        break;
+      }
+    }
+    if (last < 3 || last + 1 >= similarity_.size()) {
+      return std::nullopt;
+    }
+    return last;
+  }
+  // Root, axis, length and similarity, from the stations up to `last`. Empty: they are not on a line.
+  [[nodiscard]] std::optional<TubeTrace> straight_tube(std::size_t last);
+  // Half the distance of the outermost edges of the mean cross profile near the tube's end.
+  [[nodiscard]] double half_width_near_end(const TubeTrace& t) const;
+
+ private:
+  void step(double s);
+  [[nodiscard]] std::vector<double> profile(const Point& at, double length) const;
+
+  const GradientField& field_;
+  const TubeTrace& tube_;
+  Point across_;
+  int n_;  // samples of a profile, 1 px apart
+  std::vector<double> learnt_;
+  double contrast_ = 0;
+  double lateral_ = 0;  // of the tube at the present station, px
+  std::vector<double> along_, shift_, similarity_;
+};
+
+std::vector<double> ProfileTracer::profile(const Point& at, double length) const {
+  const cv::Rect& a = field_.area;
+  std::vector<double> v(static_cast<std::size_t>(n_), 0.0);
+  int stations = 0;
+  for (double k = 0; k < length; k += kAlongStep_px) {
+    ++stations;
+    for (int i = 0; i < n_; ++i) {
+      Point q = at + k * tube_.axis + (i - n_ / 2) * across_;
+      q.y = std::clamp(q.y, a.y + 0.0, a.y + a.height - 1.001);
+      q.x = std::clamp(q.x, a.x + 0.0, a.x + a.width - 1.001);
+      v[static_cast<std::size_t>(i)] += field_.grey(q);
+    }
+  }
+  for (double& x : v) {
+    x /= stations;
+  }
+  return v;
+}
+
+void ProfileTracer::step(double s) {
+  double top = -2, at = lateral_, top_contrast = 0;
+  std::vector<double> top_profile;
+  for (double dl = -2; dl <= 2; dl += 0.5) {
+    std::vector<double> v = profile(tube_.root + s * tube_.axis + (lateral_ + dl) * across_, kWindow_px);
+    const double strength = normalise(v);
+    if (!(strength > 0)) {
+      continue;
+    }
+    // A faint pattern of the same shape is something else. What lies in front of the glass or behind it may
+    // change its contrast by half.
+    const double ratio = std::min(1.0, 1.6 * strength / contrast_);
+    const double c =
+        ratio * std::inner_product(v.begin(), v.end(), learnt_.begin(), 0.0) - 0.004 * std::abs(dl);
+    if (c > top) {
+      top = c;
+      at = lateral_ + dl;
+      top_profile = v;
+      top_contrast = strength;
+    }
+  }
+  along_.push_back(s);
+  similarity_.push_back(top);
+  shift_.push_back(at);
+  if (top > kSameTube) {
+    lateral_ += 0.5 * (at - lateral_);
+    contrast_ += kLearning * (top_contrast - contrast_);
+    for (std::size_t i = 0; i < learnt_.size(); ++i) {
+      learnt_[i] += kLearning * (top_profile[i] - learnt_[i]);
+    }
+    (void)normalise(learnt_);
+  }
+}
+
+std::optional<TubeTrace> ProfileTracer::straight_tube(std::size_t last) {
+  TubeTrace t = tube_;
+  double sum = 0;
+  for (std::size_t i = 0; i <= last; ++i) {
+    sum += similarity_[i];
+  }
+  t.similarity = sum / static_cast<double>(last + 1);
+  for (auto* v : {&along_, &shift_, &similarity_}) {
+    v->resize(last + 1);
+  }
+  for (double& weight : similarity_) {
+    weight = std::max(0.0, weight);
+  }
+  const RobustLine middle = fit_robust_line(along_, shift_, similarity_, 2.0);
+  if (middle.rms > 0.15 * t.half_width + 1.0) {
+    return std::nullopt;
+  }
+  t.root += middle.line.offset * across_;
+  t.axis = t.axis + middle.line.slope * across_;
+  t.axis *= 1 / cv::norm(t.axis);
+  t.length = along_[last] + kWindow_px;
+  return t;
+}
+
+double ProfileTracer::half_width_near_end(const TubeTrace& t) const {
+  const Point across(-t.axis.y, t.axis.x);
+  const double back = std::min(t.length * 0.6, 26.0);
+  std::vector<double> tail(static_cast<std::size_t>(n_), 0.0);
+  const Point near_end = t.root + (t.length - back) * t.axis;
+  for (double k = 0; k < 0.6 * back; k += kAlongStep_px) {
+    for (int i = 0; i < n_; ++i) {
+      tail[static_cast<std::size_t>(i)] += field_.grey(near_end + k * t.axis + (i - n_ / 2) * across);
+    }
+  }
+  const auto edge = [&](int i) {
+    return std::abs(tail[static_cast<std::size_t>(i + 1)] - tail[static_cast<std::size_t>(i - 1)]);
+  };
+  double steepest = 0;
+  for (int i = 1; i + 1 < n_; ++i) {
+    steepest = std::max(steepest, edge(i));
+  }
+  double lo = 0, hi = 0;
+  bool any = false;
+  for (int i = 1; i + 1 < n_; ++i) {
+    if (edge(i) > 0.4 * steepest && std::abs(i - n_ / 2) <= t.half_width + 2) {
+      lo = any ? lo : i - n_ / 2;
+      hi = i - n_ / 2;
+      any = true;
+    }
+  }
+  return any ? std::clamp(0.5 * (hi - lo), 1.0, t.half_width + 2) : t.half_width;
+}
+
+}  // namespace
+
+std::optional<TubeTrace> trace_narrow_tube(const GradientField& field, Side side, double width_min,
+                                           double width_max, double noise) {
+  if (field.area.width < 48 || field.area.height < 48) {
+    return std::nullopt;
+  }
+  const double strip = std::clamp(0.09 * field.area.width, 16.0, 70.0);
+  const auto section = border_section(field, side, width_min, width_max, noise, strip, 0.12);
+  if (!section) {
+    return std::nullopt;
+  }
+  ProfileTracer tracer(field, *section);
+  if (!tracer.learn_at_border(strip)) {
+    return std::nullopt;
+  }
+  tracer.follow();
+  const auto last = tracer.last_station();
+  auto tube = last ? tracer.straight_tube(*last) : std::nullopt;
+  if (tube) {
+    tube->end_half_width = tracer.half_width_near_end(*tube);
+  }
+  return tube;
+}
+
+}  // namespace punctum::vision

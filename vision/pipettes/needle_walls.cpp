@@ -1,0 +1,259 @@
+#include "vision/pipettes/needle_walls.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "vision/image/median.hpp"
+#include "vision/image/parabola.hpp"
+#include "vision/image/straight_line.hpp"
+
+namespace punctum::vision {
+
+namespace {
+
+// ---- the straight lines along the walls ----
+
+// The outermost strong edge near the distance u0 across the axis; a wall has two faces. Averaged over 4 px of
+// length. Empty when no edge exceeds the floor.
+std::optional<double> outer_edge(const GradientField& field, const NeedlePose& needle, double s, double u0,
+                                 double floor) {
+  constexpr double kStep_px = 0.5;
+  constexpr int kReach = 6, kSamples = 2 * kReach + 1;
+  const Point across(-needle.axis.y, needle.axis.x);
+  std::array<double, kSamples> g{};
+  for (int k = 0; k < kSamples; ++k) {
+    double e = 0;
+    for (const double ds : {-1.5, 0.0, 1.5}) {
+      e += field.gradient(needle.at(s + ds, u0 + (k - kReach) * kStep_px)).dot(across) / 3;
+    }
+    g[static_cast<std::size_t>(k)] = std::abs(e);
+  }
+  const auto is_peak = [&g](std::size_t k) { return g[k] >= g[k - 1] && g[k] >= g[k + 1]; };
+  double strongest = 0;
+  for (std::size_t k = 1; k + 1 < kSamples; ++k) {
+    if (is_peak(k)) {
+      strongest = std::max(strongest, g[k]);
+    }
+  }
+  for (std::size_t q = 1; q + 1 < kSamples; ++q) {
+    const std::size_t k = u0 > 0 ? kSamples - 1 - q : q;  // from outside
+    if (is_peak(k) && g[k] >= 0.5 * strongest) {
+      if (strongest < floor) {
+        return std::nullopt;
+      }
+      const double at = static_cast<int>(k) - kReach + vertex_offset(g[k - 1], g[k], g[k + 1]);
+      return u0 + at * kStep_px;
+    }
+  }
+  return std::nullopt;
+}
+
+struct ShaftStations {
+  std::vector<double> along, middle, half;
+  int tried = 0;
+};
+
+ShaftStations stations_along(const GradientField& field, const NeedlePose& needle, double floor) {
+  const cv::Rect& a = field.area;
+  ShaftStations out;
+  for (double s = 8; s < 170; s += 5) {
+    const Point p = needle.at(s, 0);
+    if (p.x < a.x + 3 || p.x > a.x + a.width - 4 || p.y < a.y + 3 || p.y > a.y + a.height - 4) {
+      break;
+    }
+    ++out.tried;
+    const double w = needle.half_width_at(s);
+    const auto low = outer_edge(field, needle, s, -w, floor);
+    const auto high = low ? outer_edge(field, needle, s, w, floor) : std::nullopt;
+    if (high && *high - *low > 0.5 * w) {
+      out.along.push_back(s);
+      out.middle.push_back(0.5 * (*low + *high));
+      out.half.push_back(0.5 * (*high - *low));
+    }
+  }
+  return out;
+}
+
+// ---- the cross profile of walls and lumen ----
+
+constexpr int kLanes = 21;
+constexpr double kProfileReach = 1.5;  // half-widths to either side
+using Profile = std::array<double, kLanes>;
+
+// Across the needle, in units of its half-width, without mean and slope: a membrane that the needle meets
+// head-on is even across it and drops out. Empty near the border of the field.
+std::optional<Profile> cross_profile(const GradientField& field, const NeedlePose& needle, double s) {
+  const cv::Rect& a = field.area;
+  const double w = needle.half_width_at(s);
+  Profile v{};
+  double mean = 0, tilt = 0, xx = 0;
+  const auto place = [](std::size_t i) { return 2.0 * static_cast<double>(i) / (kLanes - 1) - 1; };
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    const Point p = needle.at(s, place(i) * kProfileReach * w);
+    if (p.x < a.x + 1 || p.y < a.y + 1 || p.x > a.x + a.width - 2 || p.y > a.y + a.height - 2) {
+      return std::nullopt;
+    }
+    v[i] = field.grey(p);
+    mean += v[i] / kLanes;
+  }
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    tilt += place(i) * v[i];
+    xx += place(i) * place(i);
+  }
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    v[i] -= mean + tilt / xx * place(i);
+  }
+  return v;
+}
+
+struct ShaftProfile {
+  Profile sum{};
+  double norm2 = 0;
+  int stations = 0;
+};
+
+// The sum of the profiles of 58 px of the shaft. Empty when walls and lumen do not stand out of what the
+// smoothing leaves of the noise.
+std::optional<ShaftProfile> shaft_profile(const GradientField& field, const NeedlePose& needle, double back,
+                                          double noise) {
+  ShaftProfile out;
+  for (double s = back + 2; s < back + 60; s += 1) {
+    if (const auto v = cross_profile(field, needle, s)) {
+      ++out.stations;
+      for (std::size_t i = 0; i < kLanes; ++i) {
+        out.sum[i] += (*v)[i];
+      }
+    }
+  }
+  for (double x : out.sum) {
+    out.norm2 += x * x;
+  }
+  const double contrast = std::sqrt(out.norm2 / kLanes) / std::max(out.stations, 1);
+  const double smooth_noise = noise / (2 * field.sigma * std::sqrt(std::numbers::pi));
+  if (out.stations < 5 || contrast < std::max(0.7, 4 * smooth_noise / std::sqrt(out.stations))) {
+    return std::nullopt;
+  }
+  return out;
+}
+
+}  // namespace
+
+double fit_walls(const GradientField& field, double noise, double radius, NeedlePose& needle) {
+  const ShaftStations stations = stations_along(field, needle, 4 * field.noise_of_gradient(noise));
+  const std::size_t n = stations.along.size();
+  if (n < 4) {
+    return 0;
+  }
+  std::vector<double> weight(n, 1.0);
+  StraightLine middle, half;
+  for (int round = 0; round < 5; ++round) {
+    const auto new_middle = fit_line(stations.along, stations.middle, weight);
+    const auto new_half = fit_line(stations.along, stations.half, weight);
+    if (!new_middle || !new_half) {
+      return 0;
+    }
+    middle = *new_middle;
+    half = *new_half;
+    for (std::size_t i = 0; i < n; ++i) {
+      const double e = middle.residual(stations.along[i], stations.middle[i]) / 0.6;
+      const double f = half.residual(stations.along[i], stations.half[i]) / 0.8;
+      weight[i] = 1 / std::pow(1 + e * e + f * f, 2);
+    }
+  }
+  // A short shaft tells its tilt poorly, so the tilt is corrected in part only.
+  const double trust = std::clamp(stations.along.back() / 60, 0.0, 1.0);
+  const Point across(-needle.axis.y, needle.axis.x);
+  needle.tip += middle.offset * across;
+  needle.axis -= trust * middle.slope * across;
+  needle.axis *= 1 / cv::norm(needle.axis);
+  if (half.offset > 0.3 * needle.half_width && half.offset < 2 * std::max(needle.half_width, radius)) {
+    needle.half_width = half.offset;
+    needle.taper = std::clamp(half.slope, 0.0, 0.2);
+  }
+  int straight = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    straight += std::abs(middle.residual(stations.along[i], stations.middle[i])) < 1 &&
+                std::abs(half.residual(stations.along[i], stations.half[i])) < 1;
+  }
+  return static_cast<double>(straight) / stations.tried;
+}
+
+std::optional<double> end_of_profile(const GradientField& field, const NeedlePose& needle, double back,
+                                     double ahead, double noise) {
+  constexpr double kStep_px = 0.5;
+  constexpr double kPresent = 0.22;  // share of the shaft's profile above which it counts as present
+  const auto shaft = shaft_profile(field, needle, back, noise);
+  if (!shaft) {
+    return std::nullopt;
+  }
+  // How much of the shaft's profile each station holds, and its distance ahead of the tip.
+  std::vector<double> share, place;
+  for (double s = back; s >= -ahead; s -= kStep_px) {
+    const auto v = cross_profile(field, needle, s);
+    if (!v) {
+      break;
+    }
+    double dot = 0;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      dot += (*v)[i] * shaft->sum[i];
+    }
+    share.push_back(dot * shaft->stations / shaft->norm2);
+    place.push_back(-s);
+  }
+  // Change point of (share - kPresent).
+  double sum = 0, top = -1;
+  std::size_t last = 0;
+  for (std::size_t i = 0; i < share.size(); ++i) {
+    sum += std::clamp(share[i], -0.3, 0.6) - kPresent;
+    if (sum > top) {
+      top = sum;
+      last = i;
+    }
+  }
+  if (last < 8 || last + 4 >= share.size()) {
+    return std::nullopt;
+  }
+  // Sub-pixel: half of the share just before the end. Blur does not move the middle of a step.
+  const std::vector<double> before(share.begin() + static_cast<std::ptrdiff_t>(last >= 24 ? last - 24 : 0),
+                                   share.begin() + static_cast<std::ptrdiff_t>(last - 6));
+  const double half = 0.5 * median_of(before);
+  for (std::size_t i = last - 6; i + 1 < std::min(share.size(), last + 8); ++i) {
+    if (share[i] >= half && share[i + 1] < half) {
+      return place[i] + kStep_px * (share[i] - half) / (share[i] - share[i + 1]);
+    }
+  }
+  return place[last];
+}
+
+std::optional<double> steepest_wall_step(const GradientField& field, const NeedlePose& needle, double reach,
+                                         double floor, double sign) {
+  constexpr double kStep_px = 0.25;
+  const int n = 2 * static_cast<int>(reach / kStep_px) + 1;
+  std::vector<double> g(static_cast<std::size_t>(n), 0.0);
+  for (int i = 0; i < n; ++i) {
+    const double ahead = (i - n / 2) * kStep_px;
+    double e = 0;
+    for (const double u : {-0.95, -0.8, -0.65, 0.65, 0.8, 0.95}) {
+      e += field.gradient(needle.at(-ahead, u * needle.half_width)).dot(needle.axis) / 6;
+    }
+    g[static_cast<std::size_t>(i)] = sign == 0 ? std::abs(e) : sign * e;
+  }
+  std::optional<std::size_t> best;
+  for (std::size_t k = 1; k + 1 < g.size(); ++k) {
+    if (g[k] > floor && g[k] >= g[k - 1] && g[k] >= g[k + 1] && (!best || g[k] > g[*best])) {
+      best = k;
+    }
+  }
+  if (!best) {
+    return std::nullopt;
+  }
+  const std::size_t k = *best;
+  return (static_cast<int>(k) - n / 2 + vertex_offset(g[k - 1], g[k], g[k + 1])) * kStep_px;
+}
+
+}  // namespace punctum::vision

@@ -1,0 +1,26 @@
+// The walls of the injection pipette: the straight lines along their outside, and where they end.
+#pragma once
+
+#include <optional>
+
+#include "vision/image/gradient.hpp"
+#include "vision/pipettes/needle_pose.hpp"
+
+namespace punctum::vision {
+
+// Fits middle, axis, half-width and taper of the pose to the outer edges of the walls, which are looked for
+// near where the pose has them. noise: grey levels. radius: expected at the tip, px. Returns the share of the
+// stations along the shaft whose edges lie on the two straight lines; 0 when there are too few.
+[[nodiscard]] double fit_walls(const GradientField& field, double noise, double radius, NeedlePose& needle);
+
+// Distance ahead of the tip (< 0: behind it) at which the cross profile of walls and lumen ends; sub-pixel.
+// Searched from `back` px behind the tip to `ahead` px ahead of it. Empty when it does not end there.
+[[nodiscard]] std::optional<double> end_of_profile(const GradientField& field, const NeedlePose& needle,
+                                                   double back, double ahead, double noise);
+
+// Distance ahead of the tip, within +-reach px, of the steepest change of grey along both walls. sign: of
+// that change going ahead; 0 = either. Changes below `floor` (grey levels per px) do not count.
+[[nodiscard]] std::optional<double> steepest_wall_step(const GradientField& field, const NeedlePose& needle,
+                                                       double reach, double floor, double sign);
+
+}  // namespace punctum::vision

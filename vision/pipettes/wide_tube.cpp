@@ -1,0 +1,147 @@
+#include "vision/pipettes/wide_tube.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <numeric>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "vision/image/parabola.hpp"
+#include "vision/pipettes/border_section.hpp"
+#include "vision/pipettes/robust_line.hpp"
+
+namespace punctum::vision {
+
+namespace {
+
+constexpr double kStride_px = 1.5;
+constexpr std::size_t kUsualStations = 6;  // at the border they tell how strong the edges usually are
+constexpr double kContinued = 0.4;         // of the usual edge: the tube goes on
+constexpr double kGiveUp = 3;              // so far below its best value the sum does not recover
+
+struct Stations {
+  std::vector<double> along, middle, half, similarity;
+  void resize(std::size_t n) {
+    for (auto* v : {&along, &middle, &half, &similarity}) {
+      v->resize(n);
+    }
+  }
+};
+
+// Follows both outer edges, each within 3 px of where it was. The tube ends where the sum of
+// (similarity - kContinued) is largest. Empty when it does not end in the picture.
+std::optional<Stations> follow_edges(const GradientField& field, const TubeTrace& t, const Point& across) {
+  std::array<double, 2> at{-t.half_width, t.half_width}, usual{};
+  Stations out;
+  const double longest = 0.85 * field.area.width / std::abs(t.axis.x);
+  double sum = 0, sum_best = 0;
+  std::size_t last = 0;
+  for (double s = 0; s < longest; s += kStride_px) {
+    std::array<double, 2> place = at, strength{};
+    for (std::size_t k = 0; k < 2; ++k) {
+      for (double du = -3; du <= 3; du += 0.5) {
+        const Point p = t.root + s * t.axis + (at[k] + du) * across;
+        const double e = std::abs(field.gradient(p).dot(across));
+        if (e > strength[k]) {
+          strength[k] = e;
+          place[k] = at[k] + du;
+        }
+      }
+    }
+    const std::size_t count = out.along.size();
+    if (count < kUsualStations) {
+      for (std::size_t k = 0; k < 2; ++k) {
+        usual[k] += strength[k] / kUsualStations;
+      }
+    }
+    const double ratio =
+        count < kUsualStations ? 1.0 : std::min(strength[0] / usual[0], strength[1] / usual[1]);
+    const double similarity = std::clamp(ratio, 0.0, 1.0);
+    out.along.push_back(s);
+    out.middle.push_back(0.5 * (place[0] + place[1]));
+    out.half.push_back(0.5 * (place[1] - place[0]));
+    out.similarity.push_back(similarity);
+    sum += similarity - kContinued;
+    if (sum > sum_best) {
+      sum_best = sum;
+      last = count;
+    }
+    if (sum < sum_best - kGiveUp) {
+      break;
+    }
+    if (ratio > kContinued) {
+      at[0] += 0.4 * (place[0] - at[0]);
+      at[1] += 0.4 * (place[1] - at[1]);
+    }
+  }
+  if (last < 4 || last + 1 >= out.along.size()) {
+    return std::nullopt;
+  }
+  out.resize(last + 1);
+  return out;
+}
+
+}  // namespace
+
+std::optional<TubeTrace> trace_wide_tube(const GradientField& field, Side side, double width_min,
+                                         double width_max, double noise) {
+  if (field.area.width < 48 || field.area.height < 48) {
+    return std::nullopt;
+  }
+  const double strip = std::clamp(0.03 * field.area.width, 8.0, 24.0);
+  auto found = border_section(field, side, width_min, width_max, noise, strip, 0.3);
+  if (!found) {
+    return std::nullopt;
+  }
+  TubeTrace& t = *found;
+  const Point across = across_tube(t.axis);
+  const auto stations = follow_edges(field, t, across);
+  if (!stations) {
+    return std::nullopt;
+  }
+  t.similarity = std::accumulate(stations->similarity.begin(), stations->similarity.end(), 0.0) /
+                 static_cast<double>(stations->similarity.size());
+  const RobustLine middle = fit_robust_line(stations->along, stations->middle, stations->similarity, 1.0);
+  const RobustLine width = fit_robust_line(stations->along, stations->half, stations->similarity, 1.0);
+  if (middle.rms > 2.5 || width.rms > 0.08 * t.half_width + 1.0) {
+    return std::nullopt;  // not straight
+  }
+  t.root += middle.line.offset * across;
+  t.axis = t.axis + middle.line.slope * across;
+  t.axis *= 1 / cv::norm(t.axis);
+  t.length = stations->along.back();
+  t.half_width = width.line.offset;
+  t.end_half_width =
+      std::clamp(width.line.offset + width.line.slope * t.length, 0.5 * t.half_width, 1.5 * t.half_width);
+  return found;
+}
+
+std::optional<double> end_face(const GradientField& field, const Point& guess, const Point& axis,
+                               double half_width, double reach, double noise) {
+  constexpr double kStep_px = 0.25;
+  const Point across(-axis.y, axis.x);
+  const int n = 2 * static_cast<int>(reach / kStep_px) + 1;
+  std::vector<double> g(static_cast<std::size_t>(n));
+  const double half = std::max(1.0, half_width);
+  const int lanes = 2 * static_cast<int>(half) + 1;
+  for (int i = 0; i < n; ++i) {
+    const double s = (i - n / 2) * kStep_px;
+    double sum = 0;
+    for (int k = 0; k < lanes; ++k) {
+      const double u = lanes > 1 ? (2.0 * k / (lanes - 1) - 1) * half : 0;
+      // The magnitudes are added, since wall and lumen may change in opposite senses.
+      sum += std::abs(field.gradient(guess + s * axis + u * across).dot(axis));
+    }
+    g[static_cast<std::size_t>(i)] = sum / lanes;
+  }
+  const auto top = std::max_element(g.begin() + 1, g.end() - 1);
+  if (top == g.end() - 1 || *top < 3 * field.noise_of_gradient(noise)) {
+    return std::nullopt;
+  }
+  const auto i = static_cast<std::size_t>(top - g.begin());
+  return (static_cast<int>(i) - n / 2 + vertex_offset(g[i - 1], *top, g[i + 1])) * kStep_px;
+}
+
+}  // namespace punctum::vision

@@ -44,6 +44,9 @@ Contour closed_contour(const DeformedCell& cell) {
 // `count` points at equal distances along a closed polygon, beginning at its first point.
 Contour equally_spaced(const Contour& polygon, int count) {
   const std::size_t n = polygon.size();
+  if (n == 0) {
+    return {};
+  }
   std::vector<double> at(n + 1, 0.0);
   for (std::size_t i = 0; i < n; ++i) {
     at[i + 1] = at[i] + cv::norm(polygon[(i + 1) % n] - polygon[i]);

@@ -55,6 +55,13 @@ Chord chord(const Vec3& m, const Vec3& b, double R) NONBLOCKING {
 
 }  // namespace
 
+enum class Cell::Event : std::uint8_t { none, touch, leave, outer_gives, inner_gives, far_wall, rip };
+
+struct Cell::Occurrence {
+  Event event = Event::none;
+  double at = 1;  // part of the step's way
+};
+
 // The needle against the undeformed cell at one instant.
 struct Cell::Pose {
   Vec3 tip, axis;
@@ -208,9 +215,134 @@ void Cell::hold(CellState& state, const Vec3& force_on_needle, double vacuum_Pa)
   }
 }
 
-CellForce Cell::step(CellState& state, const TipMotion& motion, double dt_s) const NONBLOCKING {
-  enum class Event { none, touch, leave, outer_gives, inner_gives, far_wall, rip };
+// How far past an event a pose is: it has happened where this is positive.
+double Cell::past(const CellState& state, Event event, const Pose& p) const NONBLOCKING {
+  constexpr double never = -std::numeric_limits<double>::infinity();
+  if (event == Event::leave) {
+    return !state.contact ? never : p.outer.hit ? -p.outer.depth : -never;
+  }
+  if (!p.outer.hit) {
+    return never;
+  }
+  if (event == Event::touch) {
+    return state.contact ? never : p.outer.depth;
+  }
+  if (!(p.outer.depth > 0)) {
+    return never;
+  }
+  switch (event) {
+    case Event::outer_gives:
+      return state.outer.punctured || !state.attached ? never : p.normal_depth - outer_puncture_m_;
+    case Event::inner_gives:
+      return !params_.inner || !p.inner.hit || !state.outer.punctured || state.inner.punctured ||
+                     !state.attached
+                 ? never
+                 : p.inner_normal_depth - inner_puncture_m_;
+    case Event::far_wall:
+      return state.far_wall_pierced || !state.attached
+                 ? never
+                 : p.outer.depth - 2 * p.outer.half - params_.far_wall_strain_margin_m;
+    case Event::rip:
+      return !state.outer.punctured || state.torn ? never : p.sideways - params_.tear_lateral_m;
+    default:
+      return never;
+  }
+}
 
+// Where on the way from `before` on an event that has happened at the end did: Illinois, and halves.
+double Cell::locate(const CellState& state, const TipMotion& motion, Event event, double before,
+                    double past_end) const NONBLOCKING {
+  double past_before = past(state, event, pose(state, motion, before));
+  if (past_before > 0) {
+    return before;
+  }
+  double after = 1, past_after = past_end;
+  int side = 0;
+  constexpr double fine = std::numeric_limits<double>::epsilon();
+  for (int i = 0; i < kTrials && after - before > 2 * fine; ++i) {
+    const double secant = before + (after - before) * past_before / (past_before - past_after);
+    const double trial = std::isfinite(secant) && i % 3 != 2 ? std::clamp(secant, before + fine, after - fine)
+                                                             : before + (after - before) / 2;
+    const double there = past(state, event, pose(state, motion, trial));
+    if (there == 0) {
+      return trial;
+    }
+    if (there > 0) {
+      after = trial;
+      past_after = there;
+      if (side == 1) {
+        past_before /= 2;
+      }
+      side = 1;
+    } else {
+      before = trial;
+      past_before = there;
+      if (side == -1) {
+        past_after /= 2;
+      }
+      side = -1;
+    }
+  }
+  return after;
+}
+
+// The first event on the way from `at` to the end, and where on it; Event::none when there is none.
+Cell::Occurrence Cell::first_event(const CellState& state, const TipMotion& motion, double at) const
+    NONBLOCKING {
+  const Pose end = pose(state, motion, 1);
+  Occurrence first;
+  for (const Event event :
+       {Event::touch, Event::outer_gives, Event::inner_gives, Event::far_wall, Event::rip, Event::leave}) {
+    const double past_end = past(state, event, end);
+    if (!(past_end > 0)) {
+      continue;
+    }
+    const double there = locate(state, motion, event, at, past_end);
+    if (first.event == Event::none || there < first.at) {
+      first = {event, there};
+    }
+  }
+  return first;
+}
+
+void Cell::happen(CellState& state, Event event, const Pose& p, double now_s) const NONBLOCKING {
+  const auto give_way = [&](MembraneState& membrane, const Chord& c) {
+    membrane.punctured = true;
+    membrane.puncture_time_s = now_s;
+    membrane.puncture_depth_m = membrane.dimple_m / c.normal.dot(p.axis);
+  };
+  switch (event) {
+    case Event::touch:
+      state.contact = true;
+      if (state.first_contact_time_s < 0) {
+        state.first_contact_time_s = now_s;
+      }
+      break;
+    case Event::leave:
+      state.contact = false;
+      if (state.outer.punctured) {
+        state.clear_time_s = now_s;
+      }
+      break;
+    case Event::outer_gives:
+      give_way(state.outer, p.outer);
+      put(state.hole_m, p.tip - p.outer.depth * p.axis);
+      break;
+    case Event::inner_gives:
+      give_way(state.inner, p.inner);
+      break;
+    case Event::far_wall:
+      state.far_wall_pierced = true;
+      break;
+    case Event::rip:
+      state.torn = true;
+      break;
+    case Event::none:
+      break;
+  }
+}
+
+CellForce Cell::step(CellState& state, const TipMotion& motion, double dt_s) const NONBLOCKING {
   // A cell that is torn off goes where the needle that carries it goes.
   if (!state.attached && state.contact) {
     const Vec3 moved = motion.tip_end_m - motion.tip_begin_m;
@@ -218,136 +350,18 @@ CellForce Cell::step(CellState& state, const TipMotion& motion, double dt_s) con
     put(state.hole_m, vec(state.hole_m) + moved);
   }
 
-  // How far past an event a pose is: it has happened where this is positive.
-  const auto past = [&](Event event, const Pose& p) {
-    constexpr double never = -std::numeric_limits<double>::infinity();
-    if (event == Event::leave) {
-      return !state.contact ? never : p.outer.hit ? -p.outer.depth : -never;
-    }
-    if (!p.outer.hit) {
-      return never;
-    }
-    if (event == Event::touch) {
-      return state.contact ? never : p.outer.depth;
-    }
-    if (!(p.outer.depth > 0)) {
-      return never;
-    }
-    switch (event) {
-      case Event::outer_gives:
-        return state.outer.punctured || !state.attached ? never : p.normal_depth - outer_puncture_m_;
-      case Event::inner_gives:
-        return !params_.inner || !p.inner.hit || !state.outer.punctured || state.inner.punctured ||
-                       !state.attached
-                   ? never
-                   : p.inner_normal_depth - inner_puncture_m_;
-      case Event::far_wall:
-        return state.far_wall_pierced || !state.attached
-                   ? never
-                   : p.outer.depth - 2 * p.outer.half - params_.far_wall_strain_margin_m;
-      case Event::rip:
-        return !state.outer.punctured || state.torn ? never : p.sideways - params_.tear_lateral_m;
-      default:
-        return never;
-    }
-  };
-  // Where on the way from `before` on an event that has happened at the end did: Illinois, and halves.
-  const auto locate = [&](Event event, double before, double past_end) {
-    double past_before = past(event, pose(state, motion, before));
-    if (past_before > 0) {
-      return before;
-    }
-    double after = 1, past_after = past_end;
-    int side = 0;
-    constexpr double fine = std::numeric_limits<double>::epsilon();
-    for (int i = 0; i < kTrials && after - before > 2 * fine; ++i) {
-      const double secant = before + (after - before) * past_before / (past_before - past_after);
-      const double trial = std::isfinite(secant) && i % 3 != 2
-                               ? std::clamp(secant, before + fine, after - fine)
-                               : before + (after - before) / 2;
-      const double there = past(event, pose(state, motion, trial));
-      if (there == 0) {
-        return trial;
-      }
-      if (there > 0) {
-        after = trial;
-        past_after = there;
-        if (side == 1) {
-          past_before /= 2;
-        }
-        side = 1;
-      } else {
-        before = trial;
-        past_before = there;
-        if (side == -1) {
-          past_after /= 2;
-        }
-        side = -1;
-      }
-    }
-    return after;
-  };
-
   double at = 0, time = 0;  // parts of the way and of the time
   for (int handled = 0; handled < kEventsPerStep; ++handled) {
-    const Pose end = pose(state, motion, 1);
-    Event first = Event::none;
-    double first_at = 1;
-    for (const Event event :
-         {Event::touch, Event::outer_gives, Event::inner_gives, Event::far_wall, Event::rip, Event::leave}) {
-      const double past_end = past(event, end);
-      if (!(past_end > 0)) {
-        continue;
-      }
-      const double after = locate(event, at, past_end);
-      if (first == Event::none || after < first_at) {
-        first = event;
-        first_at = after;
-      }
-    }
-    if (first == Event::none) {
+    const Occurrence first = first_event(state, motion, at);
+    if (first.event == Event::none) {
       break;
     }
-    const Pose p = pose(state, motion, first_at);
-    at = first_at;
+    at = first.at;
+    const Pose p = pose(state, motion, at);
     const double time_now = motion.time_at(at);
     relax(state, p, (time_now - time) * dt_s);
     time = time_now;
-    const double now_s = state.time_s + time * dt_s;
-    const auto give_way = [&](MembraneState& membrane, const Chord& c) {
-      membrane.punctured = true;
-      membrane.puncture_time_s = now_s;
-      membrane.puncture_depth_m = membrane.dimple_m / c.normal.dot(p.axis);
-    };
-    switch (first) {
-      case Event::touch:
-        state.contact = true;
-        if (state.first_contact_time_s < 0) {
-          state.first_contact_time_s = now_s;
-        }
-        break;
-      case Event::leave:
-        state.contact = false;
-        if (state.outer.punctured) {
-          state.clear_time_s = now_s;
-        }
-        break;
-      case Event::outer_gives:
-        give_way(state.outer, p.outer);
-        put(state.hole_m, p.tip - p.outer.depth * p.axis);
-        break;
-      case Event::inner_gives:
-        give_way(state.inner, p.inner);
-        break;
-      case Event::far_wall:
-        state.far_wall_pierced = true;
-        break;
-      case Event::rip:
-        state.torn = true;
-        break;
-      case Event::none:
-        break;
-    }
+    happen(state, first.event, p, state.time_s + time * dt_s);
   }
   const Pose p = pose(state, motion, 1);
   relax(state, p, (1 - time) * dt_s);
@@ -355,7 +369,12 @@ CellForce Cell::step(CellState& state, const TipMotion& motion, double dt_s) con
   if (state.torn || state.far_wall_pierced) {
     state.leak = 1 - (1 - state.leak) * math::exp(-dt_s / kLeak_s);
   }
+  return force(state, p, motion, dt_s);
+}
 
+// What the needle feels and what there is to see where the step ends; a force too large tears the cell off.
+CellForce Cell::force(CellState& state, const Pose& p, const TipMotion& motion, double dt_s) const
+    NONBLOCKING {
   CellForce out;
   out.contact = state.contact;
   out.aims_at_cell = p.outer.hit;

@@ -123,8 +123,18 @@ class Cell {
   }
 
  private:
+  enum class Event : std::uint8_t;
+  struct Occurrence;
   struct Pose;
   [[nodiscard]] Pose pose(const CellState& state, const TipMotion& motion, double s) const NONBLOCKING;
+  [[nodiscard]] double past(const CellState& state, Event event, const Pose& pose) const NONBLOCKING;
+  [[nodiscard]] double locate(const CellState& state, const TipMotion& motion, Event event, double before,
+                              double past_end) const NONBLOCKING;
+  [[nodiscard]] Occurrence first_event(const CellState& state, const TipMotion& motion, double at) const
+      NONBLOCKING;
+  void happen(CellState& state, Event event, const Pose& pose, double now_s) const NONBLOCKING;
+  [[nodiscard]] CellForce force(CellState& state, const Pose& pose, const TipMotion& motion,
+                                double dt_s) const NONBLOCKING;
   void relax(CellState& state, const Pose& pose, double dt_s) const NONBLOCKING;
   void hold(CellState& state, const Vec3& force_on_needle, double vacuum_Pa) const NONBLOCKING;
   [[nodiscard]] double seat_radius_m() const NONBLOCKING;

@@ -71,14 +71,14 @@ TEST(LargeDeflection, follows_the_full_equations_where_it_was_not_fitted) {
 
 TEST(LargeDeflection, follows_an_independent_solution_by_scipy) {
   // Rows of membrane_truth_reference.py: other equations, other mesh, another program.
-  struct Reference {
+  struct Row {
     double w, force, pressure;
   };
-  constexpr Reference kReference[] = {{0.005, 0.00374892275, 0.66721481318},
-                                      {0.03125, 0.02294748426, 0.67013591288},
-                                      {0.125, 0.08799309422, 0.68162489015},
-                                      {0.375, 0.27014301859, 0.72419092915}};
-  for (const Reference& r : kReference) {
+  constexpr Row kRows[] = {{0.005, 0.00374892275, 0.66721481318},
+                           {0.03125, 0.02294748426, 0.67013591288},
+                           {0.125, 0.08799309422, 0.68162489015},
+                           {0.375, 0.27014301859, 0.72419092915}};
+  for (const Row& r : kRows) {
     const Deflection law = large_deflection({r.w, 0.0625, 0.5, 0.5, 0.2});
     EXPECT_NEAR(law.force / r.force, 1, 0.02) << r.w;
     EXPECT_NEAR(law.pressure / r.pressure, 1, 0.005) << r.w;

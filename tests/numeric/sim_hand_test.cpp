@@ -20,13 +20,13 @@ HandParams handle(double mass_kg, double damping_Ns_m, double coulomb_N) {
   return p;
 }
 
-struct Reference {
+struct HandReference {
   double m, b, K, B, friction, force, u, x, v, p, T;
   double x_end, v_end;
 };
 
 // Printed by sim_hand_reference.py.
-constexpr Reference kReferences[] = {
+constexpr HandReference kReferences[] = {
     {0.075, 0.1, 250.0, 6.0, 0.0, 0.8, 0.02, 0.001, -0.03, 0.002, 0.001, 0.00097880514245328878291,
      -0.012602661108794278093},  // smooth
     {0.075, 0.1, 250.0, 6.0, 0.0, 0.8, 0.02, 0.001, -0.03, 0.002, 0.2, 0.0091909256283799565019,
@@ -52,7 +52,7 @@ constexpr Reference kReferences[] = {
 };
 
 TEST(SimHand, matches_the_matrix_exponential_in_40_digits) {
-  for (const Reference& r : kReferences) {
+  for (const HandReference& r : kReferences) {
     HandAxis axis{r.x, r.v};
     advance(axis, handle(r.m, r.b, r.friction), {r.K, r.B}, r.force, r.p, r.u, r.T);
     EXPECT_NEAR(axis.x_m, r.x_end, 1e-14) << "K " << r.K << " friction " << r.friction << " T " << r.T;
@@ -61,7 +61,7 @@ TEST(SimHand, matches_the_matrix_exponential_in_40_digits) {
 }
 
 TEST(SimHand, gives_the_same_however_the_interval_is_cut) {
-  for (const Reference& r : kReferences) {
+  for (const HandReference& r : kReferences) {
     for (const int pieces : {7, 400}) {
       HandAxis axis{r.x, r.v};
       const double dt = r.T / pieces;

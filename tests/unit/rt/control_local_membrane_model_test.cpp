@@ -7,13 +7,14 @@
 #include <random>
 
 #include "rt/control/local_membrane_model.hpp"
+#include "tests/support/tick.hpp"
 
 namespace punctum::rt {
 namespace {
 
 using hal::Vec3;
-constexpr std::int64_t kTick_ns = 1'000'000;
-constexpr double kTick_s = 1e-3;
+using test::kTick_ns;
+using test::kTick_s;
 
 // A cell in the picture; the stage's encoders read tip + registration.
 struct World {
@@ -47,8 +48,8 @@ struct World {
   }
 };
 
-struct Bench {
-  explicit Bench(const LocalModelParams& params = {}) : model(params, 3.8e-6, 60e-6) {}
+struct ModelInWorld {
+  explicit ModelInWorld(const LocalModelParams& params = {}) : model(params, 3.8e-6, 60e-6) {}
   LocalMembraneModel model;
   World world;
   std::int64_t now = 5'000'000'000;
@@ -74,7 +75,7 @@ struct Bench {
 };
 
 TEST(LocalMembraneModel, follows_a_moving_needle_between_late_frames) {
-  Bench b;
+  ModelInWorld b;
   double worst = 0;
   for (int k = 0; k < 4000; ++k) {
     b.tip += Vec3(-30e-9, 4e-9 * std::sin(0.01 * k), 0);  // 30 um/s
@@ -92,7 +93,7 @@ TEST(LocalMembraneModel, follows_a_moving_needle_between_late_frames) {
 
 TEST(LocalMembraneModel, corrects_itself_at_a_bounded_rate) {
   const LocalModelParams params;
-  Bench b(params);
+  ModelInWorld b(params);
   for (int k = 0; k < 500; ++k) {
     b.step();
   }
@@ -128,7 +129,7 @@ TEST(LocalMembraneModel, stays_bounded_whatever_vision_claims) {
         return 200e-6 * u(random);
     }
   };
-  Bench b(params);
+  ModelInWorld b(params);
   for (int k = 0; k < 200; ++k) {
     b.step();
   }
@@ -166,7 +167,7 @@ TEST(LocalMembraneModel, stays_bounded_whatever_vision_claims) {
 TEST(LocalMembraneModel, learns_the_width_of_the_dimple_when_it_may) {
   LocalModelParams params;
   params.dimple_scale_rate_1_s = 0.5;
-  Bench b(params);
+  ModelInWorld b(params);
   b.tip = Vec3(25e-6, 2e-6, 0);
   for (int k = 0; k < 6000; ++k) {
     if (b.tip.x() > 8e-6) {
@@ -179,7 +180,7 @@ TEST(LocalMembraneModel, learns_the_width_of_the_dimple_when_it_may) {
 
 TEST(LocalMembraneModel, fades_when_vision_falls_silent_and_returns_by_a_ramp) {
   const LocalModelParams params;
-  Bench b(params);
+  ModelInWorld b(params);
   EXPECT_TRUE(b.model.stale());
   EXPECT_EQ(b.model.age_s(), -1);
   for (int k = 0; k < 1500; ++k) {
@@ -218,7 +219,7 @@ TEST(LocalMembraneModel, fades_when_vision_falls_silent_and_returns_by_a_ramp) {
 }
 
 TEST(LocalMembraneModel, believes_only_frames_that_show_needle_and_cell) {
-  Bench b;
+  ModelInWorld b;
   for (int k = 0; k < 300; ++k) {
     b.step();
   }
@@ -247,7 +248,7 @@ TEST(LocalMembraneModel, believes_only_frames_that_show_needle_and_cell) {
 }
 
 TEST(LocalMembraneModel, forgets_the_old_cell_and_waits_for_a_frame_of_the_new_one) {
-  Bench b;
+  ModelInWorld b;
   for (int k = 0; k < 1500; ++k) {
     b.step();
   }
@@ -266,7 +267,7 @@ TEST(LocalMembraneModel, forgets_the_old_cell_and_waits_for_a_frame_of_the_new_o
 }
 
 TEST(LocalMembraneModel, keeps_the_focal_plane_from_cell_to_cell) {
-  Bench b;
+  ModelInWorld b;
   for (int k = 0; k < 1500; ++k) {
     b.step();
   }
@@ -322,7 +323,7 @@ TEST(PoseHistory, interpolates_and_reaches_back_more_than_a_second_at_8_k_hz) {
 }
 
 // Usable observations of a cell that is there, up to the present.
-void see_for(Bench& b, int ticks) {
+void see_for(ModelInWorld& b, int ticks) {
   for (int k = 0; k < ticks; ++k) {
     b.step();
   }
@@ -330,7 +331,7 @@ void see_for(Bench& b, int ticks) {
 
 TEST(LocalMembraneModel, refuses_another_radius_and_another_place_and_is_stale_while_they_last) {
   for (const int claim : {0, 1, 2, 3}) {
-    Bench b;
+    ModelInWorld b;
     see_for(b, 1000);
     const World truth = b.world;
     b.world.R *= claim == 0 ? 1.12 : claim == 1 ? 0.88 : 1;
@@ -354,7 +355,7 @@ TEST(LocalMembraneModel, once_touched_moves_no_further_than_picture_and_stage_ma
   std::mt19937_64 random(4);
   std::normal_distribution<double> n(0, 1);
   for (int seed = 0; seed < 20; ++seed) {
-    Bench b;
+    ModelInWorld b;
     see_for(b, 1000);
     b.model.touch();
     const Vec3 entry = b.model.membrane().entry_m;
@@ -384,7 +385,7 @@ TEST(LocalMembraneModel, looks_only_for_cells_as_large_as_the_scene_says) {
   params.R_min_m = 35e-6;
   params.R_max_m = 80e-6;
   for (const double R_um : {30.0, 60.0, 90.0}) {
-    Bench b(params);
+    ModelInWorld b(params);
     b.world.R = 1e-6 * R_um;
     b.tip.x() = 90e-6;
     see_for(b, 500);
@@ -394,7 +395,7 @@ TEST(LocalMembraneModel, looks_only_for_cells_as_large_as_the_scene_says) {
 }
 
 TEST(LocalMembraneModel, holds_later_frames_against_the_median_of_the_first_ones) {
-  Bench b;
+  ModelInWorld b;
   b.world.R = 85e-6;
   see_for(b, 121);  // one frame
   ASSERT_TRUE(b.model.membrane().known);
@@ -406,7 +407,7 @@ TEST(LocalMembraneModel, holds_later_frames_against_the_median_of_the_first_ones
 }
 
 TEST(LocalMembraneModel, counts_no_observation_from_the_future_as_fresh) {
-  Bench b;
+  ModelInWorld b;
   see_for(b, 1000);
   b.seeing = false;
   // One tick ten seconds ahead, with an observation of that time.
@@ -427,7 +428,7 @@ TEST(LocalMembraneModel, counts_no_observation_from_the_future_as_fresh) {
 }
 
 TEST(LocalMembraneModel, takes_observations_only_in_their_order_and_only_young_ones) {
-  Bench b;
+  ModelInWorld b;
   see_for(b, 1000);
   b.seeing = false;
   const auto usable = [&](std::uint64_t frame, std::int64_t exposure_ns) {
@@ -453,7 +454,7 @@ TEST(LocalMembraneModel, takes_observations_only_in_their_order_and_only_young_o
 }
 
 TEST(LocalMembraneModel, believes_a_flag_that_two_observations_in_a_row_show) {
-  Bench b;
+  ModelInWorld b;
   b.tip.x() = 10e-6;
   see_for(b, 1000);
   b.seeing = false;

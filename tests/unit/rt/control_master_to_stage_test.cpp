@@ -7,12 +7,13 @@
 #include <random>
 
 #include "rt/control/master_to_stage.hpp"
+#include "tests/support/tick.hpp"
 
 namespace punctum::rt {
 namespace {
 
 using hal::Vec3;
-constexpr double kTick_s = 1e-3;
+using test::kTick_s;
 
 hal::HandState hand_at(const Vec3& x, const hal::Quat& q = hal::Quat::Identity()) {
   hal::HandState hand;

@@ -7,11 +7,12 @@
 #include <vector>
 
 #include "rt/control/phases.hpp"
+#include "tests/support/tick.hpp"
 
 namespace punctum::rt {
 namespace {
 
-constexpr double kTick_s = 1e-3;
+using test::kTick_s;
 
 struct Needle {
   explicit Needle(const PhaseParams& params = {}) : phases(params) { in.membrane_known = true; }

@@ -6,13 +6,13 @@
 #include <random>
 
 #include "rt/forces/cone_guide.hpp"
+#include "tests/support/fixtures.hpp"
 
 namespace punctum::rt {
 namespace {
 
 using hal::Vec3;
-constexpr double kScale = 500;
-constexpr EffectSetup kSetup{.position_scale = kScale};
+using namespace test;
 
 FixtureFrame tilted_frame() { return {Vec3(21e-6, -4e-6, 2e-6), Vec3(-0.97, 0.15, -0.2).normalized()}; }
 
@@ -63,16 +63,8 @@ TEST(ConeGuide, force_is_the_gradient_of_its_potential_at_hand_scale) {
   for (int i = 0; i < 20000; ++i) {
     const Vec3 tip = at(frame, d(random), r(random), phi(random));
     const auto U = [&](const Vec3& p) { return cone_pull(params, kScale, frame, p).energy_J; };
-    Vec3 gradient;
-    for (int k = 0; k < 3; ++k) {
-      const Vec3 e = Vec3::Unit(k) * h;
-      // Sixth-order central difference.
-      gradient[k] = (45 * (U(tip + e) - U(tip - e)) - 9 * (U(tip + 2 * e) - U(tip - 2 * e)) +
-                     (U(tip + 3 * e) - U(tip - 3 * e))) /
-                    (60 * h);
-    }
     const Vec3 force = cone_pull(params, kScale, frame, tip).force_N;
-    worst = std::max(worst, (force + gradient / kScale).norm());
+    worst = std::max(worst, (force + gradient(U, tip, h) / kScale).norm());
   }
   EXPECT_LT(worst, 2e-6);  // N, of forces up to 0.8 N
   std::printf("worst difference from the gradient: %.1e N\n", worst);

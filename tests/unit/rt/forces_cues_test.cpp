@@ -12,13 +12,13 @@
 #include "rt/forces/friction.hpp"
 #include "rt/forces/repulsive_region.hpp"
 #include "rt/forces/vibration.hpp"
+#include "tests/support/fixtures.hpp"
 
 namespace punctum::rt {
 namespace {
 
 using hal::Vec3;
-constexpr double kScale = 500;
-constexpr EffectSetup kSetup{.position_scale = kScale};
+using namespace test;
 const Vec3 kCentre(3e-6, -37e-6, 1e-6);
 
 EffectInput in_cell(const Vec3& tip, const Vec3& cell_centre, bool known, double dt) {
@@ -45,15 +45,8 @@ TEST(RepulsiveRegion, pushes_away_by_the_gradient_of_its_hill) {
   for (int i = 0; i < 5000; ++i) {
     const Vec3 tip = kCentre + 8e-6 * Vec3(n(random), n(random), n(random));
     const auto U = [&](const Vec3& p) { return repulsive_push(params, kScale, kCentre, p).energy_J; };
-    Vec3 gradient;
-    for (int k = 0; k < 3; ++k) {
-      const Vec3 e = Vec3::Unit(k) * h;
-      gradient[k] = (45 * (U(tip + e) - U(tip - e)) - 9 * (U(tip + 2 * e) - U(tip - 2 * e)) +
-                     (U(tip + 3 * e) - U(tip - 3 * e))) /
-                    (60 * h);
-    }
     const Vec3 force = repulsive_push(params, kScale, kCentre, tip).force_N;
-    EXPECT_LT((force + gradient / kScale).norm(), 1e-6);
+    EXPECT_LT((force + gradient(U, tip, h) / kScale).norm(), 1e-6);
     EXPECT_GE(force.dot(tip - kCentre), 0);
   }
   EXPECT_EQ(repulsive_push(params, kScale, kCentre, kCentre).force_N.norm(), 0);

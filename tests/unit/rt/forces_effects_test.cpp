@@ -11,7 +11,7 @@ namespace punctum::rt {
 namespace {
 
 using hal::Vec3;
-constexpr EffectSetup kSetup{.position_scale = 500, .force_scale = 1e5};
+constexpr EffectSetup kForcesScaled{.position_scale = 500, .force_scale = 1e5};
 
 EffectParams all() {
   EffectParams params;
@@ -53,7 +53,7 @@ TEST(Effects, give_half_the_force_and_energy_at_half_a_commanded_gain) {
   EffectParams params;
   params.cone.emplace();
   params.damping.emplace();
-  Effects whole(params, kSetup), halved(params, kSetup);
+  Effects whole(params, kForcesScaled), halved(params, kForcesScaled);
   EffectGains half = kFullGains;
   half.fill(0.5);
   for (int k = 0; k < 2000; ++k) {
@@ -70,7 +70,7 @@ TEST(Effects, give_half_the_force_and_energy_at_half_a_commanded_gain) {
 TEST(Effects, count_the_energy_that_a_changed_gain_gives_to_a_standing_hand) {
   EffectParams params;
   params.cone.emplace();
-  Effects effects(params, kSetup);
+  Effects effects(params, kForcesScaled);
   EffectGains gains = kFullGains;
   for (int k = 0; k < 3000; ++k) {  // the guide's own ramp is over
     (void)effects.step(in_the_guide(), gains);
@@ -86,7 +86,7 @@ TEST(Effects, count_the_energy_that_a_changed_gain_gives_to_a_standing_hand) {
 }
 
 TEST(Effects, sum_to_nothing_where_the_scene_has_none) {
-  Effects effects(EffectParams{}, kSetup);
+  Effects effects(EffectParams{}, kForcesScaled);
   const EffectSum& sum = effects.step(in_the_guide());
   EXPECT_EQ(sum.force_N.norm(), 0);
   EXPECT_EQ(sum.parts.wanted_N().norm(), 0);
@@ -95,7 +95,7 @@ TEST(Effects, sum_to_nothing_where_the_scene_has_none) {
 }
 
 TEST(Effects, give_the_guard_the_same_force_in_parts_that_the_hand_is_to_feel) {
-  Effects effects(all(), kSetup);
+  Effects effects(all(), kForcesScaled);
   EffectInput in = in_the_guide();
   for (int k = 0; k < 500; ++k) {
     in.inside_cell = in.punctured = k > 250;
@@ -115,7 +115,7 @@ TEST(Effects, fade_all_together_and_are_told_without_the_fade) {
     EffectParams params;
     params.cone.emplace();
     params.damping.emplace();
-    Effects effects(params, kSetup);
+    Effects effects(params, kForcesScaled);
     in.force_fade = fade;
     for (int k = 0; k < 400; ++k) {
       (fade == 1.0 ? whole : half) = effects.step(in);
@@ -136,7 +136,7 @@ TEST(Effects, are_scaled_with_their_energy_by_the_gain_of_the_fixtures) {
   params.repulsive->offset_m = Vec3(65e-6, 5e-6, 0);
   EffectSum sums[2];
   for (const int i : {0, 1}) {
-    Effects effects(params, kSetup);
+    Effects effects(params, kForcesScaled);
     EffectInput in = in_the_guide();
     in.fixture_gain = i == 0 ? 1 : 0.25;
     for (int k = 0; k < 400; ++k) {
@@ -152,7 +152,7 @@ TEST(Effects, are_scaled_with_their_energy_by_the_gain_of_the_fixtures) {
 TEST(Effects, count_as_injected_what_a_gain_stores_at_a_standing_hand) {
   EffectParams params;
   params.cone.emplace();
-  Effects effects(params, kSetup);
+  Effects effects(params, kForcesScaled);
   EffectInput in = in_the_guide();
   for (int k = 0; k < 1000; ++k) {
     in.fixture_gain = 0.5 + 0.5 * std::sin(0.01 * k);
@@ -166,7 +166,7 @@ TEST(Effects, store_at_the_point_that_their_energy_depends_on) {
   params.membrane.emplace();
   params.cone.emplace();
   params.friction.emplace();
-  Effects effects(params, kSetup);
+  Effects effects(params, kForcesScaled);
   EffectInput in = in_the_guide();
   (void)effects.step(in);
   in.handle_m.x() += 0.5e-3;

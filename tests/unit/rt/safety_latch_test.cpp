@@ -7,10 +7,12 @@
 #include <deque>
 #include <vector>
 
+#include "tests/support/tick.hpp"
+
 namespace punctum::rt {
 namespace {
 
-constexpr double kTick_s = 1e-3;
+using test::kTick_s;
 
 std::vector<LatchInput> every_input() {
   std::vector<LatchInput> all;

@@ -10,11 +10,14 @@
 #include "hal/sim/noise.hpp"
 #include "hal/sim/plant/cell.hpp"
 #include "hal/sim/plant/hand.hpp"
+#include "tests/support/plain_cell.hpp"
 
 namespace punctum::sim {
 namespace {
 
 using std::numbers::pi;
+using test::plain_cell;
+using test::uniform_cell;
 
 struct Drive {  // of one axis over one step
   double force_N, p0_m, u_m_s;
@@ -123,18 +126,6 @@ TEST(PlantEnergy, of_the_handle_closes_over_a_million_steps) {
   EXPECT_GT(contacts, 600);  // in and out, some 310 times
   EXPECT_GT(stuck, 1000);
   EXPECT_GT(dissipated, 1);  // J: nothing of this is at rest
-}
-
-CellParams uniform_cell() {
-  CellParams p;
-  p.centre_m = Vec3::Zero();
-  p.spread = 0;
-  return p;
-}
-
-const Cell& plain_cell() {
-  static const Cell cell(uniform_cell(), NeedleParams{}, HolderParams{}, 1, 0);
-  return cell;
 }
 
 // Needle that moves straight along its axis or beside it; work on the cell by Simpson's rule on the force.

@@ -148,6 +148,11 @@ struct Bench {
       tick();
     }
   }
+  // Runs with these buttons of the handle held down; they stay so.
+  void hold(std::uint32_t buttons, double seconds) {
+    hand.buttons = buttons;
+    run(seconds);
+  }
   void move(double to, double speed) {
     const double way = to - wanted_x;
     const double from = wanted_x;

@@ -10,6 +10,8 @@
 #include <numbers>
 #include <vector>
 
+#include "tests/support/plain_cell.hpp"
+
 namespace {
 bool g_heap_forbidden = false;
 }  // namespace
@@ -31,19 +33,9 @@ namespace punctum::sim {
 namespace {
 
 using std::numbers::pi;
+using test::plain_cell;
+using test::uniform_cell;
 using Points = std::vector<std::array<double, 2>>;
-
-CellParams uniform_cell() {
-  CellParams params;
-  params.centre_m = Vec3::Zero();
-  params.spread = 0;
-  return params;
-}
-
-const Cell& plain_cell() {
-  static const Cell cell(uniform_cell(), NeedleParams{}, HolderParams{}, 1, 0);
-  return cell;
-}
 
 // Moves the needle in a straight line, in steps of dt.
 struct Needle {

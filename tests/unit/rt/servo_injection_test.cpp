@@ -38,11 +38,9 @@ TEST(Servo, takes_a_needle_through_a_whole_injection) {
     };
     b.to_inside();
     b.move(b.wanted_x - 20e-6, 20e-6);
-    b.hand.buttons = hal::kButtonInject;
-    b.run(1);
+    b.hold(hal::kButtonInject, 1);
     EXPECT_TRUE(b.injector.open);
-    b.hand.buttons = 0;
-    b.run(0.1);
+    b.hold(0, 0.1);
     EXPECT_FALSE(b.injector.open);
     b.move(60e-6, 40e-6);
     b.run(1);
@@ -85,8 +83,7 @@ TEST(Servo, takes_the_next_cell_with_a_fresh_model) {
   Bench b(config);
   const auto inject = [&] {
     b.to_inside();
-    b.hand.buttons = hal::kButtonInject;
-    b.run(0.3);
+    b.hold(hal::kButtonInject, 0.3);
     b.hand.buttons = 0;
     b.move(60e-6, 40e-6);
     b.run(0.5);
@@ -103,8 +100,7 @@ TEST(Servo, takes_the_next_cell_with_a_fresh_model) {
   EXPECT_EQ(b.servo->phase(), free);
   EXPECT_EQ(b.sample().cell, 1U);
   EXPECT_EQ(b.sample().R_m, 0);
-  b.hand.buttons = 0;
-  b.run(0.5);
+  b.hold(0, 0.5);
   EXPECT_NEAR(b.sample().R_m, 64e-6, 0.1e-6);
   inject();
   EXPECT_EQ(b.servo->outcome(), RunEnd::done);
@@ -118,23 +114,19 @@ TEST(Servo, clamps_the_injection) {
   config.injector->max_open_s = 0.25;
   Bench b(config);
   b.to_inside();
-  b.hand.buttons = hal::kButtonInject;
-  b.run(2);
+  b.hold(hal::kButtonInject, 2);
   EXPECT_EQ(b.injector.open_ticks, 250);
   EXPECT_FALSE(b.injector.open);
   // Pressing again does not open it again for this cell.
-  b.hand.buttons = 0;
-  b.run(0.1);
-  b.hand.buttons = hal::kButtonInject;
-  b.run(1);
+  b.hold(0, 0.1);
+  b.hold(hal::kButtonInject, 1);
   EXPECT_EQ(b.injector.open_ticks, 250);
 }
 
 TEST(Servo, does_not_open_the_injector_again_after_a_stop_while_the_button_is_still_held) {
   Bench b(icsi());
   b.to_inside();
-  b.hand.buttons = hal::kButtonInject;
-  b.run(0.2);
+  b.hold(hal::kButtonInject, 0.2);
   ASSERT_TRUE(b.injector.open);
   b.estop.state.contact_a_closed = b.estop.state.contact_b_closed = false;
   b.run(1);
@@ -146,18 +138,15 @@ TEST(Servo, does_not_open_the_injector_again_after_a_stop_while_the_button_is_st
   ASSERT_EQ(b.servo->stop_stage(), StopStage::running);
   ASSERT_EQ(b.servo->phase(), injection);
   EXPECT_EQ(b.injector.open_ticks, open_ticks);
-  b.hand.buttons = 0;
-  b.run(0.1);
-  b.hand.buttons = hal::kButtonInject;
-  b.run(0.1);
+  b.hold(0, 0.1);
+  b.hold(hal::kButtonInject, 0.1);
   EXPECT_TRUE(b.injector.open);
 }
 
 TEST(Servo, shuts_the_gate_while_vision_is_silent_and_waits_for_a_new_press) {
   Bench b(icsi());
   b.to_inside();
-  b.hand.buttons = hal::kButtonInject;
-  b.run(0.3);
+  b.hold(hal::kButtonInject, 0.3);
   ASSERT_TRUE(b.injector.open);
   b.seeing = false;
   b.run(0.5);
@@ -166,10 +155,8 @@ TEST(Servo, shuts_the_gate_while_vision_is_silent_and_waits_for_a_new_press) {
   b.seeing = true;
   b.run(1);
   EXPECT_FALSE(b.injector.open);  // still held down
-  b.hand.buttons = 0;
-  b.run(0.05);
-  b.hand.buttons = hal::kButtonInject;
-  b.run(0.05);
+  b.hold(0, 0.05);
+  b.hold(hal::kButtonInject, 0.05);
   EXPECT_TRUE(b.injector.open);
 }
 
@@ -321,8 +308,7 @@ TEST(Servo, survives_a_puncture_that_vision_takes_back) {
   ASSERT_EQ(b.servo->phase(), puncture);
   lying = false;
   b.run(0.5);
-  b.hand.buttons = hal::kButtonInject;
-  b.run(0.5);
+  b.hold(hal::kButtonInject, 0.5);
   EXPECT_EQ(b.injector.open_ticks, 0);
   b.move(60e-6, 30e-6);
   b.run(0.5);
@@ -339,10 +325,8 @@ TEST(Servo, opens_the_gate_only_on_a_press_that_begins_inside) {
   b.run(0.5);
   EXPECT_EQ(b.injector.open_ticks, 0);
   EXPECT_EQ(b.servo->phase(), puncture);
-  b.hand.buttons = 0;
-  b.run(0.05);
-  b.hand.buttons = hal::kButtonInject;
-  b.run(0.05);
+  b.hold(0, 0.05);
+  b.hold(hal::kButtonInject, 0.05);
   EXPECT_TRUE(b.injector.open);
 }
 
@@ -357,12 +341,10 @@ TEST(Servo, opens_the_gate_once_whatever_the_rate_of_the_hand) {
     edges += b.injector.open != was ? 1 : 0;
     was = b.injector.open;
   };
-  b.hand.buttons = hal::kButtonInject;
-  b.run(1);
+  b.hold(hal::kButtonInject, 1);
   std::printf("%d edges of the gate in a second\n", edges);
   EXPECT_EQ(edges, 1);
-  b.hand.buttons = 0;
-  b.run(0.1);
+  b.hold(0, 0.1);
   EXPECT_EQ(edges, 2);
 }
 

@@ -35,6 +35,11 @@ constexpr double kLower_s = 0.5;
 // The mean period holds some tens of lost ticks, so that each of them moves the stiffness by a percent at
 // most.
 constexpr double kMeanPeriod_s = 5;
+// Samples' periods. A position that is at most two of its periods old misses one sample at most, and is
+// believed. In twice that time the handle may be anywhere: force x way, see README.
+constexpr double kSlowest_s = 1.0 / 250;  // no device renders a wall that samples more slowly
+constexpr double kSeen = 2;
+constexpr double kBlind = 4;
 // Periods: a longer interval is an event of its own, not a rate.
 constexpr double kSingleDelay = 8;
 // The kept period steps up when its mean exceeds it by more than the mean's own ripple ...
@@ -66,7 +71,7 @@ constexpr double kSteadyForce_N = 0.02;
   bool good = in.position_m.allFinite() && in.dissipative_N.allFinite() && in.active_N.allFinite() &&
               std::isfinite(in.stiffness_N_m) && std::isfinite(in.damping_Ns_m) &&
               std::isfinite(in.elapsed_s) && in.elapsed_s > 0 && std::isfinite(in.stored_J) &&
-              std::isfinite(in.between_s);
+              std::isfinite(in.between_s) && std::isfinite(in.age_s);
   for (const StoringForce& s : in.storing) {
     good = good && s.force_N.allFinite() && s.point_m.allFinite();
   }
@@ -151,6 +156,9 @@ PassivityGuard::PassivityGuard(const GuardParams& params, const HandDevice& devi
 double PassivityGuard::delay_s() const NONBLOCKING {
   return 0.5 * sample_.kept_s() + device_.delay_ticks * tick_.kept_s();
 }
+
+// The time between two samples of a device that keeps its period.
+double PassivityGuard::regular_s() const NONBLOCKING { return std::min(sample_.kept_s(), kSlowest_s); }
 
 double PassivityGuard::allowed_stiffness_N_m() const NONBLOCKING {
   return params_.margin * device_.damping_Ns_m / delay_s();
@@ -314,7 +322,9 @@ hal::Vec3 PassivityGuard::step(const GuardInput& in) NONBLOCKING {
   tick_.follow(in.elapsed_s, params_.recover_s);
   since_s_ += in.elapsed_s;
   if (in.fresh) {
-    sample_.follow(in.between_s > 0 ? in.between_s : since_s_, params_.recover_s);
+    const double between_s = in.between_s > 0 ? in.between_s : since_s_;
+    sample_.follow(between_s, params_.recover_s);
+    gap_ = between_s > kSeen * regular_s();
   }
   lower_gain(in);
   if (!first_) {
@@ -334,18 +344,31 @@ hal::Vec3 PassivityGuard::step(const GuardInput& in) NONBLOCKING {
     if (first_) {
       way_ = {Way{in.position_m.x()}, Way{in.position_m.y()}, Way{in.position_m.z()}};
     }
+    moved_m_ = first_ ? hal::Vec3::Zero().eval() : hal::Vec3(in.position_m - position_m_);
     first_ = false;
     position_m_ = in.position_m;
     forget_interval();
   }
 
+  // A hand that is silent may be anywhere by now.
+  const double age = in.age_s / regular_s();
+  const double seen = std::clamp((kBlind - age) / (kBlind - kSeen), 0.0, 1.0);
+  const double rendered_gain = seen * gain_;
+  // A velocity over a gap is the mean of it, and says little of now. After it, or after a false position, it
+  // may be wrong for a while: a handle that has got too much is not pushed the way it goes.
+  hal::Vec3 damping_N = gap_ ? hal::Vec3::Zero().eval() : hal::Vec3(share * in.dissipative_N + damper_N_);
+  const double along = damping_N.dot(moved_m_);
+  if (net_J_ < -kUnnoticed * kAllowed_J && along > 0) {
+    damping_N -= along / moved_m_.squaredNorm() * moved_m_;
+  }
+
   last_storing_ = in.storing;
   for (StoringForce& s : last_storing_) {
-    s.force_N *= gain_;
+    s.force_N *= rendered_gain;
   }
-  asked_.passive_N = gain_ * in.stored_N() + share * in.dissipative_N + damper_N_;
-  asked_.active_N = active_gain_ * in.active_N;
-  asked_.stored_J = gain_ * in.stored_J;
+  asked_.passive_N = rendered_gain * in.stored_N() + seen * damping_N;
+  asked_.active_N = seen * active_gain_ * in.active_N;
+  asked_.stored_J = rendered_gain * in.stored_J;
   return asked_.passive_N + asked_.active_N;
 }
 

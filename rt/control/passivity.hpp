@@ -55,6 +55,7 @@ struct GuardInput : ForceParts {
   double elapsed_s = 0;                      // since the last step
   bool fresh = true;                         // the position is a new sample
   double between_s = 0;  // between the two newest samples; 0: not known, the time of the ticks counts
+  double age_s = 0;      // of the position
   bool begins = false;   // it has nothing to do with the one before: no motion lies between them
 };
 
@@ -115,6 +116,7 @@ class PassivityGuard {
     int samples = 0;
   };
 
+  [[nodiscard]] double regular_s() const NONBLOCKING;
   [[nodiscard]] double delay_s() const NONBLOCKING;  // of hold and transport
   [[nodiscard]] double allowed_stiffness_N_m() const NONBLOCKING;
   [[nodiscard]] double real_J(const GuardInput& in) const NONBLOCKING;
@@ -137,7 +139,9 @@ class PassivityGuard {
   Period sample_;
 
   bool first_ = true;
+  bool gap_ = false;                                      // samples were missed before the last one
   hal::Vec3 position_m_ = hal::Vec3::Zero();              // the last sample
+  hal::Vec3 moved_m_ = hal::Vec3::Zero();                 // to it
   std::array<StoringForce, kEnergyPoints> last_storing_;  // as rendered on the last step
   std::array<Forces, kRing> written_;
   std::size_t newest_ = 0;

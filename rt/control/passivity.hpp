@@ -20,6 +20,9 @@
 // own. Dissipative effects are scaled down where the device cannot render them. Nothing is banked:
 // dissipation is forgotten within kForget_s, so no credit winds up however long it runs.
 //
+// A hand that is silent may be anywhere: the force fades between the second and the fourth period of its
+// samples, and no velocity over a longer gap is rendered.
+//
 // A hand that is sampled more slowly than the ticks is judged per sample: of the forces written between two
 // samples the mean acted on the motion between them, and hold and damping follow the samples' period.
 //
@@ -85,18 +88,16 @@ class PassivityGuard {
  private:
   static constexpr std::size_t kRing = 8;  // written forces; more than the longest delay
 
-  // A period that is really kept, with some reserve.
+  // A period that is really kept: the time-weighted mean of the intervals. By hold, a spring K gives K v^2
+  // T/2 over each interval T, so this mean is the period that gives as much.
   class Period {
    public:
     explicit Period(double nominal_s) NONBLOCKING;
-    void follow(double interval_s, double recover_s) NONBLOCKING;
-    [[nodiscard]] double kept_s() const NONBLOCKING { return kept_s_; }
+    void follow(double interval_s) NONBLOCKING;
+    [[nodiscard]] double kept_s() const NONBLOCKING { return mean_s_; }
 
    private:
-    double nominal_s_;
-    double mean_s_;      // time-weighted
-    double reserved_s_;  // steps with the mean
-    double kept_s_;      // follows it without a step
+    double mean_s_;
     std::array<double, 4> last_s_;
     std::size_t newest_ = 0;
   };

@@ -35,18 +35,17 @@ constexpr double kLower_s = 0.5;
 // The mean period holds some tens of lost ticks, so that each of them moves the stiffness by a percent at
 // most.
 constexpr double kMeanPeriod_s = 5;
+// A device that samples more slowly renders no wall.
+constexpr double kSlowest_s = 1.0 / 250;
+// Samples' periods. A position of this age misses one sample at most and is believed; the force is gone when
+// it is twice as old. 3 N for 2 ms, then down by 300 N/s, the limit behind the guard, give a free handle of
+// 75 g 0.28 m/s: 3 mJ.
+constexpr double kSeen = 2;
+constexpr double kBlind = 4;
 // Periods: a longer interval is an event of its own, not a rate.
 constexpr double kSingleDelay = 8;
-// The kept period steps up when its mean exceeds it by more than the mean's own ripple ...
-constexpr double kPeriodUp = 1.03;
-// ... to this above the mean, so that it rarely steps again: more than the jitter of the ticks (20 %), ...
-constexpr double kPeriodReserve = 1.25;
-// ... steps back when the mean is so far below that it will not step up at once (kPeriodReserve squared), ...
-constexpr double kPeriodDown = 1.6;
-// ... and to the nominal one when hardly a tick is late.
-constexpr double kOnTime = 1.005;
-// The stiffness that follows from it moves within this, without a click.
-constexpr double kPeriodUp_s = 0.1;
+// Of the mean period: ticks jitter by 20 %, so that four intervals in a row above this are another period.
+constexpr double kJitter = 1.25;
 // Periods, halfway between one and two: the surplus of a longer interval is kept apart until it is taken.
 constexpr double kLate = 1.5;
 // The velocity is hardly known just after it: the damper aims at half as much again.
@@ -66,7 +65,7 @@ constexpr double kSteadyForce_N = 0.02;
   bool good = in.position_m.allFinite() && in.dissipative_N.allFinite() && in.active_N.allFinite() &&
               std::isfinite(in.stiffness_N_m) && std::isfinite(in.damping_Ns_m) &&
               std::isfinite(in.elapsed_s) && in.elapsed_s > 0 && std::isfinite(in.stored_J) &&
-              std::isfinite(in.between_s);
+              std::isfinite(in.between_s) && std::isfinite(in.age_s);
   for (const StoringForce& s : in.storing) {
     good = good && s.force_N.allFinite() && s.point_m.allFinite();
   }
@@ -107,31 +106,18 @@ void approach(T& x, const T& to, double dt_s, double tau_s) NONBLOCKING {
 
 }  // namespace
 
-PassivityGuard::Period::Period(double nominal_s) NONBLOCKING : nominal_s_(nominal_s),
-                                                               mean_s_(nominal_s),
-                                                               reserved_s_(nominal_s),
-                                                               kept_s_(nominal_s) {
-  last_s_.fill(0);
-}
+PassivityGuard::Period::Period(double nominal_s) NONBLOCKING : mean_s_(nominal_s) { last_s_.fill(0); }
 
-void PassivityGuard::Period::follow(double interval_s, double recover_s) NONBLOCKING {
+void PassivityGuard::Period::follow(double interval_s) NONBLOCKING {
   // A period that is never kept is another period, at once.
   newest_ = (newest_ + 1) % last_s_.size();
   last_s_[newest_] = interval_s;
   const double least_s = *std::min_element(last_s_.begin(), last_s_.end());
-  if (least_s > kPeriodReserve * mean_s_) {
-    mean_s_ = reserved_s_ = least_s;
-    kept_s_ = std::max(kept_s_, least_s);
+  if (least_s > kJitter * mean_s_) {
+    mean_s_ = least_s;
   }
-
   const double counted_s = std::min(interval_s, kSingleDelay * mean_s_);
   approach(mean_s_, counted_s, counted_s, kMeanPeriod_s);
-  if (mean_s_ < kOnTime * nominal_s_) {
-    reserved_s_ = nominal_s_;
-  } else if (mean_s_ > kPeriodUp * reserved_s_ || kPeriodDown * mean_s_ < reserved_s_) {
-    reserved_s_ = kPeriodReserve * mean_s_;
-  }
-  approach(kept_s_, reserved_s_, counted_s, reserved_s_ > kept_s_ ? kPeriodUp_s : recover_s);
 }
 
 PassivityGuard::PassivityGuard(const GuardParams& params, const HandDevice& device,
@@ -151,6 +137,9 @@ PassivityGuard::PassivityGuard(const GuardParams& params, const HandDevice& devi
 double PassivityGuard::delay_s() const NONBLOCKING {
   return 0.5 * sample_.kept_s() + device_.delay_ticks * tick_.kept_s();
 }
+
+// The time between two samples of a device that keeps its period.
+double PassivityGuard::regular_s() const NONBLOCKING { return std::min(sample_.kept_s(), kSlowest_s); }
 
 double PassivityGuard::allowed_stiffness_N_m() const NONBLOCKING {
   return params_.margin * device_.damping_Ns_m / delay_s();
@@ -311,10 +300,12 @@ hal::Vec3 PassivityGuard::step(const GuardInput& in) NONBLOCKING {
     forget_interval();
   }
   elapsed_s_ = in.elapsed_s;
-  tick_.follow(in.elapsed_s, params_.recover_s);
+  tick_.follow(in.elapsed_s);
   since_s_ += in.elapsed_s;
   if (in.fresh) {
-    sample_.follow(in.between_s > 0 ? in.between_s : since_s_, params_.recover_s);
+    const double between_s = in.between_s > 0 ? in.between_s : since_s_;
+    sample_.follow(between_s);
+    gap_ = between_s > kSeen * regular_s();
   }
   lower_gain(in);
   if (!first_) {
@@ -334,18 +325,31 @@ hal::Vec3 PassivityGuard::step(const GuardInput& in) NONBLOCKING {
     if (first_) {
       way_ = {Way{in.position_m.x()}, Way{in.position_m.y()}, Way{in.position_m.z()}};
     }
+    moved_m_ = first_ ? hal::Vec3::Zero().eval() : hal::Vec3(in.position_m - position_m_);
     first_ = false;
     position_m_ = in.position_m;
     forget_interval();
   }
 
+  // A hand that is silent may be anywhere by now.
+  const double age = in.age_s / regular_s();
+  const double seen = std::clamp((kBlind - age) / (kBlind - kSeen), 0.0, 1.0);
+  const double rendered_gain = seen * gain_;
+  // A velocity over a gap is the mean of it, and says little of now. After it, or after a false position, it
+  // may be wrong for a while: a handle that has got too much is not pushed the way it goes.
+  hal::Vec3 damping_N = gap_ ? hal::Vec3::Zero().eval() : hal::Vec3(share * in.dissipative_N + damper_N_);
+  const double along = damping_N.dot(moved_m_);
+  if (net_J_ < -kUnnoticed * kAllowed_J && along > 0) {
+    damping_N -= along / moved_m_.squaredNorm() * moved_m_;
+  }
+
   last_storing_ = in.storing;
   for (StoringForce& s : last_storing_) {
-    s.force_N *= gain_;
+    s.force_N *= rendered_gain;
   }
-  asked_.passive_N = gain_ * in.stored_N() + share * in.dissipative_N + damper_N_;
-  asked_.active_N = active_gain_ * in.active_N;
-  asked_.stored_J = gain_ * in.stored_J;
+  asked_.passive_N = rendered_gain * in.stored_N() + seen * damping_N;
+  asked_.active_N = seen * active_gain_ * in.active_N;
+  asked_.stored_J = rendered_gain * in.stored_J;
   return asked_.passive_N + asked_.active_N;
 }
 

@@ -20,6 +20,9 @@
 // own. Dissipative effects are scaled down where the device cannot render them. Nothing is banked:
 // dissipation is forgotten within kForget_s, so no credit winds up however long it runs.
 //
+// A hand that is silent may be anywhere: the force fades between the second and the fourth period of its
+// samples, and no velocity over a longer gap is rendered.
+//
 // A hand that is sampled more slowly than the ticks is judged per sample: of the forces written between two
 // samples the mean acted on the motion between them, and hold and damping follow the samples' period.
 //
@@ -55,6 +58,7 @@ struct GuardInput : ForceParts {
   double elapsed_s = 0;                      // since the last step
   bool fresh = true;                         // the position is a new sample
   double between_s = 0;  // between the two newest samples; 0: not known, the time of the ticks counts
+  double age_s = 0;      // of the position
   bool begins = false;   // it has nothing to do with the one before: no motion lies between them
 };
 
@@ -84,18 +88,16 @@ class PassivityGuard {
  private:
   static constexpr std::size_t kRing = 8;  // written forces; more than the longest delay
 
-  // A period that is really kept, with some reserve.
+  // A period that is really kept: the time-weighted mean of the intervals. By hold, a spring K gives K v^2
+  // T/2 over each interval T, so this mean is the period that gives as much.
   class Period {
    public:
     explicit Period(double nominal_s) NONBLOCKING;
-    void follow(double interval_s, double recover_s) NONBLOCKING;
-    [[nodiscard]] double kept_s() const NONBLOCKING { return kept_s_; }
+    void follow(double interval_s) NONBLOCKING;
+    [[nodiscard]] double kept_s() const NONBLOCKING { return mean_s_; }
 
    private:
-    double nominal_s_;
-    double mean_s_;      // time-weighted
-    double reserved_s_;  // steps with the mean
-    double kept_s_;      // follows it without a step
+    double mean_s_;
     std::array<double, 4> last_s_;
     std::size_t newest_ = 0;
   };
@@ -115,6 +117,7 @@ class PassivityGuard {
     int samples = 0;
   };
 
+  [[nodiscard]] double regular_s() const NONBLOCKING;
   [[nodiscard]] double delay_s() const NONBLOCKING;  // of hold and transport
   [[nodiscard]] double allowed_stiffness_N_m() const NONBLOCKING;
   [[nodiscard]] double real_J(const GuardInput& in) const NONBLOCKING;
@@ -137,7 +140,9 @@ class PassivityGuard {
   Period sample_;
 
   bool first_ = true;
+  bool gap_ = false;                                      // samples were missed before the last one
   hal::Vec3 position_m_ = hal::Vec3::Zero();              // the last sample
+  hal::Vec3 moved_m_ = hal::Vec3::Zero();                 // to it
   std::array<StoringForce, kEnergyPoints> last_storing_;  // as rendered on the last step
   std::array<Forces, kRing> written_;
   std::size_t newest_ = 0;

@@ -151,6 +151,91 @@ TEST(Passivity, a_wall_that_is_stable_by_itself_gives_back_all_but_a_hundredth_o
   }
 }
 
+// A spring of 100 N/m pressed by 1 mm; the hand's newest sample grows old.
+TEST(Passivity, the_force_is_gone_after_four_periods_of_a_silent_hand_and_whole_after_two) {
+  constexpr double kPeriod_s = 1e-3;
+  PassivityGuard guard({}, {}, {}, 1 / kPeriod_s);
+  GuardInput in;
+  in.stiffness_N_m = 100;
+  in.position_m = {1e-3, 0, 0};
+  in.storing[0] = {{-0.1, 0, 0}, in.position_m};
+  in.elapsed_s = kPeriod_s;
+  for (int k = 0; k < 100; ++k) {
+    guard.wrote(guard.step(in));
+  }
+  in.fresh = false;
+  double before_N = -0.1;
+  for (int k = 1; k <= 4; ++k) {
+    in.age_s = k * kPeriod_s;
+    const double force_N = guard.step(in).x();
+    guard.wrote({force_N, 0, 0});
+    EXPECT_GE(force_N, before_N) << k;
+    if (k <= 2) {
+      EXPECT_NEAR(force_N, -0.1, 1e-6) << k;
+    }
+    before_N = force_N;
+  }
+  EXPECT_EQ(before_N, 0);
+}
+
+TEST(Passivity, a_device_of_1_kHz_feels_no_fading_between_its_samples_under_faster_ticks) {
+  for (const double rate : {4000.0, 8000.0}) {
+    PassivityGuard guard({}, {}, {}, rate);
+    GuardInput in;
+    in.stiffness_N_m = 100;
+    in.position_m = {1e-3, 0, 0};
+    in.storing[0] = {{-0.1, 0, 0}, in.position_m};
+    in.elapsed_s = 1 / rate;
+    in.between_s = 1e-3;
+    const int per_sample = static_cast<int>(rate / 1000);
+    for (int k = 0; k < 100 * per_sample; ++k) {
+      in.fresh = k % per_sample == 0;
+      in.age_s = in.elapsed_s * (k % per_sample);
+      const double force_N = guard.step(in).x();
+      guard.wrote({force_N, 0, 0});
+      if (k > 10 * per_sample) {
+        ASSERT_NEAR(force_N, -0.1, 1e-6) << rate << " Hz, tick " << k;
+      }
+    }
+  }
+}
+
+// A push of 0.5 N on a wall that moves by 5 mm or swings by nine tenths of its stiffness. The handle alone
+// would fall at 5 m/s.
+TEST(Passivity, a_handle_that_is_pushed_sinks_slowly_through_a_wall_that_is_lowered) {
+  for (const bool moving : {true, false}) {
+    for (const double Hz : {0.5, 2.0, 10.0}) {
+      for (const double K : {100.0, 1000.0}) {
+        constexpr int kTicks = 20000, kLast = 5000;
+        const HandDevice device;
+        PassivityGuard guard({}, device, {}, 1000);
+        double x = 0, v = 0, from = 0;
+        for (int k = 0; k < kTicks; ++k) {
+          const double swing = std::sin(2 * std::numbers::pi * Hz * 1e-3 * k);
+          const double wall = moving ? std::min(5e-3, 0.3 / (2 * std::numbers::pi * Hz)) * swing : 0;
+          const double stiffness = moving ? K : K * (1 + 0.9 * swing);
+          const double told = device.encoder_step_m * std::round(x / device.encoder_step_m);
+          const double inside = std::max(0.0, told - wall);
+          GuardInput in;
+          in.position_m = {told, 0, 0};
+          in.elapsed_s = 1e-3;
+          in.stiffness_N_m = inside > 0 ? stiffness : 0;
+          in.storing[0] = {{-stiffness * inside, 0, 0}, in.position_m};
+          in.stored_J = 0.5 * stiffness * inside * inside;
+          const hal::Vec3 force_N = guard.step(in);
+          guard.wrote(force_N);
+          for (int i = 0; i < 10; ++i) {
+            v += (force_N.x() + 0.5 - device.damping_Ns_m * v) / device.mass_kg * 1e-4;
+            x += v * 1e-4;
+          }
+          from = k == kTicks - kLast ? x : from;
+        }
+        EXPECT_LT((x - from) / (1e-3 * kLast), 1e-3) << moving << " " << Hz << " Hz, " << K << " N/m";
+      }
+    }
+  }
+}
+
 // Hannaford & Ryu's bookkeeping on paper: a spring K, two ticks, one step of 1 mm into it.
 TEST(Passivity, surplus_is_the_work_of_the_held_force_less_what_the_spring_took_up) {
   HandDevice device;

@@ -24,15 +24,6 @@ namespace {
 // As cases are printed.
 [[maybe_unused]] constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-// Invariants that the servo is not held to yet: the tests do not fail for them, a campaign reports them.
-constexpr Invariant kNotYet[] = {
-    Invariant::work_bounded,  // a handle let go while a stalled core or a silent hand keeps its force
-};
-
-bool held(Invariant what) {
-  return std::find(std::begin(kNotYet), std::end(kNotYet), what) == std::end(kNotYet);
-}
-
 struct Found {
   Schedule schedule;
   Broken broken;
@@ -211,9 +202,6 @@ const std::vector<Case>& found_cases() {
 TEST(Search, cases_that_once_broke_an_invariant_break_it_no_more) {
   Machines machines;
   for (const Case& c : found_cases()) {
-    if (!held(c.what)) {
-      continue;
-    }
     Search& machine = machines.of(c.schedule);
     const std::vector<Broken> all = machine.run(c.schedule);
     const Broken* b = machine.find(all, c.what);
@@ -227,11 +215,9 @@ TEST(Search, no_schedule_breaks_an_invariant) {
   const Outcome out = search(1, 0, PUNCTUM_SCHEDULES, 1);
   Machines machines;
   for (const auto& [what, f] : out.found) {
-    if (held(what)) {
-      ADD_FAILURE() << f.times << " of " << PUNCTUM_SCHEDULES << " schedules, for example number " << f.number
-                    << ", shrunk:\n"
-                    << describe(machines, what, f);
-    }
+    ADD_FAILURE() << f.times << " of " << PUNCTUM_SCHEDULES << " schedules, for example number " << f.number
+                  << ", shrunk:\n"
+                  << describe(machines, what, f);
   }
   print(out.coverage);
 }
@@ -259,9 +245,6 @@ TEST(Search, an_honest_run_breaks_nothing) {
     for (const double way_m : {-20e-3, 20e-3}) {
       for (const Broken& b :
            machine.run({static_cast<From>(from), 1500, {{100, 1000, Lie::moves, way_m, 0}}})) {
-        if (!held(b.what)) {
-          continue;
-        }
         ADD_FAILURE() << kFromNames[from] << ", hand by " << way_m << " m: " << name(b.what).number << " "
                       << name(b.what).name << ": " << b.found << ", at most " << b.allowed << ", tick "
                       << b.tick;
@@ -315,13 +298,13 @@ int campaign(int argc, char** argv) {
     if (!only.empty() && only != name(what).number) {
       continue;
     }
-    bad = bad || held(what);
+    bad = true;
     if (worst) {
       std::printf("\nworst, not shrunk: %s", print(f->worst_schedule).c_str());
     }
-    std::printf("\n%llu times, first seen shortest in number %llu%s\n%s",
+    std::printf("\n%llu times, first seen shortest in number %llu\n%s",
                 static_cast<unsigned long long>(f->times), static_cast<unsigned long long>(f->number),
-                held(what) ? "" : " (not held yet)", describe(machines, what, *f).c_str());
+                describe(machines, what, *f).c_str());
     std::fflush(stdout);
   }
   return bad ? 1 : 0;

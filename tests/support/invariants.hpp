@@ -182,7 +182,8 @@ struct Seen {
   hal::HandState hand;
   hal::Vec3 hand_true_m = hal::Vec3::Zero();
   double hand_false_m = 0;
-  double hand_work_J = 0;  // of the written force on the true handle, since the last tick
+  bool hand_hidden = false;  // its readings stand still, although they come, wherever the handle goes
+  double hand_work_J = 0;    // of the written force on the true handle, since the last tick
   int hand_writes = 0;
   hal::Vec3 force_N = hal::Vec3::Zero();  // that acts
   hal::Vec3 asked_N = hal::Vec3::Zero();  // the same, unless the device refused it
@@ -287,9 +288,11 @@ class Invariants {
   // ---- what was told ----
   void watch_inputs(const Seen& s) {
     const double dt = s.elapsed_s;
-    hand_silent_s_ += dt;
-    stage_silent_s_ += dt;
-    estop_silent_s_ += dt;
+    // A servo that is told too short a period counts no more than that; it takes a tenth of its own at least.
+    const double told_s = s.clock_true ? dt : std::min(dt, 0.1 * b_.nominal_s);
+    hand_silent_s_ += told_s;
+    stage_silent_s_ += told_s;
+    estop_silent_s_ += told_s;
     if (s.hand_status == hal::Status::ok && s.hand.sample_ns != hand_sample_ns_) {
       hand_sample_ns_ = s.hand.sample_ns;
       hand_silent_s_ =
@@ -396,7 +399,13 @@ class Invariants {
     if (b_.c.axis && outside_s_ > b_.c.axis->ramp_s + b_.brake_s) {
       at_most(I::fixtures_fade, t.effect_N[effect_axis], 1e-9);
     }
-    work_J_ += s.hand_work_J - b_.work_W * s.elapsed_s;
+    // A handle that is told to rest may rest under a steady force, and a device that refuses a force keeps
+    // the last one: what is given there, and until a ramp that follows has ended, no servo can know or
+    // prevent.
+    unknown_s_ = s.hand_hidden || refused_ ? b_.c.estop.hand_ramp_s : unknown_s_ - s.elapsed_s;
+    const bool beyond = unknown_s_ > 0;
+    work_J_ += (beyond ? std::min(s.hand_work_J, 0.0) : s.hand_work_J) - b_.work_W * s.elapsed_s;
+    refused_ = s.force_N != s.asked_N;
     stored_J_ = std::clamp(t.stored_energy_J, 0.0, 0.02);
     at_most(I::work_bounded, work_J_ - credit_J_, b_.work_J);
     credit_J_ = std::min(credit_J_, work_J_ + stored_J_);
@@ -737,6 +746,8 @@ class Invariants {
 
   double stop_s_ = 0, work_J_ = 0, credit_J_ = 0, stored_J_ = 0;
   bool stop_clock_true_ = true;
+  double unknown_s_ = 0;
+  bool refused_ = false;  // the force that acts is not the one that was written
   double outside_s_ = 0, faded_s_ = 0;
   int commanded_ticks_ = 0, since_stop_ = 0;
   bool quick_stopped_ = false;

@@ -247,6 +247,7 @@ class LyingStation {
   Invariants& checker() { return checker_; }
 
   static constexpr std::size_t kPast = 64;
+  static constexpr double kRelay_s = 0.05;  // without a heartbeat: the hand's amplifier is off
 
   // The truth, and what the devices remember. Plain data.
   struct Truth {
@@ -321,7 +322,15 @@ class LyingStation {
     truth.work_J = 0;
     for (int i = 0; i < periods; ++i) {
       truth.now += std::llround(1e9 * dt_s_);
+      const double before_J = truth.work_J;
+      // A core that does not run can take no force away: that is left to the relay.
+      if (i * dt_s_ > kRelay_s) {
+        truth.force.setZero();
+      }
       step_hand(k, events);
+      if (i >= 2) {
+        truth.work_J = std::min(truth.work_J, before_J);
+      }
       step_stage();
       look();
       deliver();
@@ -570,6 +579,7 @@ class LyingStation {
     seen_.stage_moves = w.speed.norm() > 5e-6;
     seen_.seen_ns = w.seen_ns;
     seen_.punctured_frames = std::exchange(punctured_frames_, 0);
+    seen_.hand_hidden = on(Lie::hand_stuck);
     seen_.hand_false_m = on(Lie::hand_glitch) ? std::abs(value(Lie::hand_glitch)) : 0;
     if (on(Lie::hand_absurd)) {
       seen_.hand_false_m = 1;

@@ -409,7 +409,7 @@ LoopCell moving_cell(std::uint64_t n, bool guarded) {
   c.frequency_Hz = one_of({0.5, 1, 2, 5, 10, 30});
   c.travel_m = std::min(c.travel_m, 0.3 / (2 * std::numbers::pi * c.frequency_Hz));  // no faster than a hand
   c.device.force_max_N = one_of({1, 3.3, 8.5});
-  c.slew_N_s = one_of({0, 0, 1000, 3000});
+  c.slew_N_s = one_of({0, 300, 1000, 3000});  // the core's own limit is 300
   return c;
 }
 

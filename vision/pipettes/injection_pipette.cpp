@@ -192,7 +192,8 @@ void InjectionPipette::learn(const GradientField& field, const NeedlePose& needl
   NeedlePose walls = needle;
   walls.tip -= end_offset_ * walls.axis;
   shape_.learn(field, walls);
-  end_offset_ = shape_.face().value_or(end_offset_);
+  constexpr double kFaceRate_px = 0.2;  // per frame: the face moves by no more as the shape is averaged
+  end_offset_ += std::clamp(shape_.face().value_or(end_offset_) - end_offset_, -kFaceRate_px, kFaceRate_px);
   cv::Mat here;
   cv::getRectSubPix(
       field.smooth, template_.size(),

@@ -106,11 +106,12 @@ std::optional<double> NeedleShape::face() const {
       }
     }
     const double here = strength(k, walls), before = strength(k - 1, walls);
-    if (here >= 0.5 && before < 0.5) {
-      return -(static_cast<double>(k) - (here - 0.5) / (here - before) - kAhead) * kStep_px;
+    if (before < 0.5) {
+      const double part = here > before ? std::clamp((0.5 - before) / (here - before), 0.0, 1.0) : 0.5;
+      return (kAhead - (static_cast<double>(k) - 1 + part)) * kStep_px;
     }
   }
-  return std::nullopt;
+  return kAhead * kStep_px;  // the needle goes on at least so far
 }
 
 std::optional<NeedleShape::End> NeedleShape::end(const GradientField& field, const NeedlePose& needle,

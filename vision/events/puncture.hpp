@@ -53,7 +53,7 @@ struct InnerOnNeedle {
 
 // The inner membrane, once the outer one is through. While it holds, its contour lies on the tip; when it has
 // given way, the contour crosses the needle behind the tip. Where it gives way with a small dimple, this is
-// told only after the needle has gone on by the rest of least_behind_px. In 16 simulated oocytes it was told
+// told only after the needle has gone on by the rest of twice least_behind_px. In 16 simulated oocytes it was told
 // 64 to 112 ms after it happened, but in one of them 151 ms before: the contour had lost the dimple.
 class InnerPuncture {
  public:

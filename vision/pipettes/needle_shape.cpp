@@ -65,13 +65,44 @@ void NeedleShape::learn(const GradientField& field, const NeedlePose& needle) {
     return;
   }
   frames_ = std::min(frames_ + 1, kMemory);
-  const std::size_t old = shape_.size();
-  shape_.resize(std::max(old, now.size()));
+  const std::size_t old = mean_.size();
+  mean_.resize(std::max(old, now.size()));
   for (std::size_t k = 0; k < now.size(); ++k) {
     const double part = k < old ? 1.0 / frames_ : 1;
     for (std::size_t i = 0; i < kLanes; ++i) {
-      shape_[k][i] += part * (now[k][i] - shape_[k][i]);
+      mean_[k][i] += part * (now[k][i] - mean_[k][i]);
     }
+  }
+  smooth_along_shaft();
+}
+
+// Behind its tip the needle looks the same everywhere, and ahead of it is nothing of it: what differs there is
+// a speck, and one that stands still while the needle moves must not hold the shape where it was.
+void NeedleShape::smooth_along_shaft() {
+  // Steps: up to here the shape is the tip's own. Over few frames a speck would weigh, so it is less then.
+  const std::size_t tip = kAhead + (frames_ < kMemory / 2 ? 8 : 16);
+  constexpr std::size_t kReach = 24, kStride = 4;  // steps: a speck is shorter
+  constexpr double kBlur_px = 4;                 // ahead of the face
+  shape_ = mean_;
+  std::vector<double> near;
+  for (std::size_t k = tip; k < mean_.size(); ++k) {
+    std::size_t from = std::max(tip, k - kReach), to = std::min(mean_.size() - 1, k + kReach);
+    if (frames_ >= kMemory / 2) {  // even, so that a needle that widens is not drawn to one side
+      const std::size_t reach = std::min({kReach, k - kAhead, mean_.size() - 1 - k}) / kStride * kStride;
+      from = k - reach;
+      to = k + reach;
+    }
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      near.clear();
+      for (std::size_t j = from; j <= to; j += kStride) {
+        near.push_back(mean_[j][i]);
+      }
+      shape_[k][i] = median_of(near);
+    }
+  }
+  const double front = kAhead - (face().value_or(0) + kBlur_px) / kStep_px;
+  for (std::size_t k = 0; k < kAhead && static_cast<double>(k) < front; ++k) {
+    shape_[k].fill(0);
   }
 }
 

@@ -42,8 +42,12 @@ class NeedleShape {
   [[nodiscard]] std::optional<Profile> profile(const GradientField& field, const NeedlePose& needle,
                                                double behind) const;
 
+  // The shape without what lay beside the needle in a few frames only.
+  void smooth_along_shaft();
+
   double reach_ = 0;            // to either side of the axis, px
-  std::vector<Profile> shape_;  // every half pixel, from a little ahead of the tip
+  std::vector<Profile> mean_;   // of the frames, every half pixel, from a little ahead of the tip
+  std::vector<Profile> shape_;  // likewise
   int frames_ = 0;
 };
 

@@ -283,9 +283,10 @@ TEST_P(EmbryoFrames, show_the_tip_in_the_yolk_where_it_is_or_not_at_all) {
     farthest_px = std::max(farthest_px, error_px);
     wrong += error_px > 9;  // the core of this scene takes 30 um for a disagreement
   }
-  std::printf("embryo %d: %d frames, tip unseen in %d, at most %.1f px off; punctures seen after %+.0f, %+.0f ms\n",
-              GetParam(), frames, unseen, farthest_px, 1e3 * (outer_seen_s - outer_s),
-              1e3 * (inner_seen_s - inner_s));
+  std::printf(
+      "embryo %d: %d frames, tip unseen in %d, at most %.1f px off; punctures seen after %+.0f, %+.0f ms\n",
+      GetParam(), frames, unseen, farthest_px, 1e3 * (outer_seen_s - outer_s),
+      1e3 * (inner_seen_s - inner_s));
   ASSERT_GT(inner_s, 0);
   EXPECT_EQ(wrong, 0);
   EXPECT_LE(unseen, frames / 10);

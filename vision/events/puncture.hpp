@@ -53,8 +53,8 @@ struct InnerOnNeedle {
 
 // The inner membrane, once the outer one is through. While it holds, its contour lies on the tip; when it has
 // given way, the contour crosses the needle behind the tip. Where it gives way with a small dimple, this is
-// told only after the needle has gone on by the rest of twice least_behind_px. In 16 simulated oocytes it was told
-// 64 to 112 ms after it happened, but in one of them 151 ms before: the contour had lost the dimple.
+// told only after the needle has gone on by the rest of twice least_behind_px. In 16 simulated oocytes it was
+// told 64 to 112 ms after it happened, but in one of them 151 ms before: the contour had lost the dimple.
 class InnerPuncture {
  public:
   // Distance behind the tip, px, from which the contour no longer lies on a tip of that radius.

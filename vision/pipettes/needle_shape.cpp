@@ -12,19 +12,19 @@ namespace punctum::vision {
 namespace {
 
 constexpr double kStep_px = 0.5;
-constexpr int kAhead = 20;     // steps that the shape begins ahead of the tip: as far as a start may err
-constexpr int kBehind = 160;   // steps behind the tip; further back the shaft tells nothing of the end
+constexpr int kAhead = 20;       // steps that the shape begins ahead of the tip: as far as a start may err
+constexpr int kBehind = 160;     // steps behind the tip; further back the shaft tells nothing of the end
 constexpr int kLeastShaft = 24;  // steps of the needle that must be seen
-constexpr int kMemory = 40;    // frames
+constexpr int kMemory = 40;      // frames
 // Neighbouring steps do not tell independent things: smoothing and granules join about this many.
 constexpr double kJoined = 8;
-constexpr double kClear = 6;   // log-likelihood by which a needle is told from none
-constexpr double kDoubt = 3;   // log-likelihood below the best; a Gaussian has fallen so far at 2.4 sigma
+constexpr double kClear = 6;  // log-likelihood by which a needle is told from none
+constexpr double kDoubt = 3;  // log-likelihood below the best; a Gaussian has fallen so far at 2.4 sigma
 
 }  // namespace
 
-std::optional<NeedleShape::Profile> NeedleShape::profile(const GradientField& field,
-                                                         const NeedlePose& needle, double behind) const {
+std::optional<NeedleShape::Profile> NeedleShape::profile(const GradientField& field, const NeedlePose& needle,
+                                                         double behind) const {
   const cv::Rect& a = field.area;
   Profile v{};
   double mean = 0, tilt = 0, xx = 0;
@@ -76,13 +76,13 @@ void NeedleShape::learn(const GradientField& field, const NeedlePose& needle) {
   smooth_along_shaft();
 }
 
-// Behind its tip the needle looks the same everywhere, and ahead of it is nothing of it: what differs there is
-// a speck, and one that stands still while the needle moves must not hold the shape where it was.
+// Behind its tip the needle looks the same everywhere, and ahead of it is nothing of it: what differs there
+// is a speck, and one that stands still while the needle moves must not hold the shape where it was.
 void NeedleShape::smooth_along_shaft() {
   // Steps: up to here the shape is the tip's own. Over few frames a speck would weigh, so it is less then.
   const std::size_t tip = kAhead + (frames_ < kMemory / 2 ? 8 : 16);
   constexpr std::size_t kReach = 24, kStride = 4;  // steps: a speck is shorter
-  constexpr double kBlur_px = 4;                 // ahead of the face
+  constexpr double kBlur_px = 4;                   // ahead of the face
   shape_ = mean_;
   std::vector<double> near;
   for (std::size_t k = tip; k < mean_.size(); ++k) {
@@ -117,7 +117,7 @@ double NeedleShape::square(const Profile& p) {
 // Blur does not move the middle of a step: there the walls have half of their strength. From the walls to
 // the front, so that a speck ahead of the tip does not count.
 std::optional<double> NeedleShape::face() const {
-  constexpr std::size_t kFrom = 6, kTo = 16;      // steps behind the face: the walls in full strength
+  constexpr std::size_t kFrom = 6, kTo = 16;    // steps behind the face: the walls in full strength
   constexpr std::size_t kSurely = kAhead + 30;  // steps: there the shape shows walls however wrong the start
   if (shape_.size() < kSurely + kTo) {
     return std::nullopt;
@@ -197,8 +197,7 @@ std::optional<NeedleShape::End> NeedleShape::end(const GradientField& field, con
   for (int j = 0; j < n; ++j) {
     const int k = j - best;
     for (std::size_t i = 0; i < kLanes; ++i) {
-      const double shape =
-          k < 0 ? 0 : shape_[static_cast<std::size_t>(std::min(k, last_shape))][i];
+      const double shape = k < 0 ? 0 : shape_[static_cast<std::size_t>(std::min(k, last_shape))][i];
       const double d = seen[static_cast<std::size_t>(j)][i] - shape;
       if (k < kLeastShaft) {
         squares.push_back(d * d);

@@ -83,7 +83,7 @@ struct Tracker::Impl {
   [[nodiscard]] int fit_undeformed_membrane();
   void measure_gap(int fitted_points);
   [[nodiscard]] std::optional<double> look_for_contact();
-  [[nodiscard]] std::optional<double> inner_behind_tip() const;
+  [[nodiscard]] std::optional<InnerOnNeedle> inner_on_needle() const;
   void classify_contact(const std::optional<double>& membrane_behind_tip);
   void decide_phase();
 };
@@ -149,7 +149,7 @@ const Result& Tracker::Impl::process(const hal::Frame& frame) {
     }
     classify_contact(membrane_behind_tip);
     if (result.needle.ok && !result.contact && (untouched || !result.gap_px)) {
-      needle.learn(picture.field, result.needle, picture.noise);
+      needle.learn(picture.field, result.needle);
     }
   } else {
     result.punctured = puncture.update({.t_ns = result.exposure_ns});
@@ -360,26 +360,27 @@ std::optional<double> Tracker::Impl::look_for_contact() {
   return on_needle.behind_tip;
 }
 
-// How far behind the tip the inner membrane's contour crosses the lines beside the needle's edges: the nearer
-// of the two.
-std::optional<double> Tracker::Impl::inner_behind_tip() const {
+// Where the inner membrane's contour crosses the lines beside the needle's edges.
+std::optional<InnerOnNeedle> Tracker::Impl::inner_on_needle() const {
   constexpr double kBesideEdge_px = 2.5;
   const NeedlePose& n = result.needle;
   if (!n.ok || !inner.known || !result.inner.ok) {
     return std::nullopt;
   }
   const Point across(-n.axis.y, n.axis.x);
-  std::optional<double> behind;
+  std::optional<InnerOnNeedle> nearer;
   for (const double side : {-1.0, 1.0}) {
     const double u = side * (n.half_width + kBesideEdge_px);
     const auto crossing = entry_point(result.inner.contour, n.tip + u * across, n.axis);
     if (!crossing) {
       return std::nullopt;
     }
-    const double at = -(*crossing - n.tip).dot(n.axis);
-    behind = std::min(behind.value_or(at), at);
+    const double behind = -(*crossing - n.tip).dot(n.axis);
+    if (!nearer || behind < nearer->behind_tip_px) {
+      nearer = {behind, crossing->dot(n.axis)};
+    }
   }
-  return behind;
+  return nearer;
 }
 
 void Tracker::Impl::classify_contact(const std::optional<double>& membrane_behind_tip) {
@@ -396,7 +397,7 @@ void Tracker::Impl::classify_contact(const std::optional<double>& membrane_behin
   }
   result.punctured = puncture.update(in);
   result.inner_punctured =
-      inner_puncture.update(result.punctured, inner_behind_tip(), result.needle.half_width);
+      inner_puncture.update(result.punctured, inner_on_needle(), result.needle.half_width);
   result.membrane_velocity_px_s = puncture.membrane_velocity_px_s();
   was_contact = result.contact;
   if (!result.gap_px) {

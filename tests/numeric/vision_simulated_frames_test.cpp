@@ -31,6 +31,38 @@ struct Case {
   double wd_um = 0.9;     // rms allowed
 };
 
+// The scene zebrafish: a needle whose walls at the tip are thinner than the blur, in a granular yolk.
+struct Embryo {
+  sim::MicroscopeParams lens;
+  sim::NeedleParams needle;
+  sim::CellParams cell;
+  sim::HolderParams holder;
+  VisionConfig vision;
+
+  Embryo() {
+    lens.pixel_m = 3.25e-6;
+    needle.radius_m = 7.5e-6;
+    needle.shaft_radius_m = 25e-6;
+    needle.taper_m = 500e-6;
+    cell.centre_m = sim::Vec3(-150e-6, 0, 0);
+    cell.R_m = 600e-6;
+    cell.zona_h_m = 4e-6;
+    cell.zona_E_Pa = 1.5e6;
+    cell.spread = 0.04;
+    cell.recoil_s = 0.06;
+    cell.inner_gap_m = 80e-6;
+    cell.inner_h_m = 2e-6;
+    cell.inner_E_Pa = 100e3;
+    holder.outer_radius_m = 350e-6;
+    holder.inner_radius_m = 120e-6;
+    vision.pixel_m = lens.pixel_m;
+    vision.R_min_m = 400e-6;
+    vision.R_max_m = 800e-6;
+    vision.c_m = needle.radius_m;
+    vision.h_m = cell.zona_h_m;
+  }
+};
+
 std::string label(const testing::TestParamInfo<Case>& info) { return info.param.name; }
 
 double rms_distance(const Contour& seen, const Polyline& truth) {
@@ -185,5 +217,85 @@ INSTANTIATE_TEST_SUITE_P(Cases, SimulatedFrames,
                                          Case{"no_holder", 3, 2, 3, 0.03, true, false},
                                          Case{"another_cell", 9, 3, -2, 0.0}),
                          label);
+
+class EmbryoFrames : public testing::TestWithParam<int> {};
+
+TEST_P(EmbryoFrames, show_the_tip_in_the_yolk_where_it_is_or_not_at_all) {
+  const Embryo e;
+  const auto seed = static_cast<std::uint64_t>(GetParam());
+  sim::Microscope microscope(e.lens, e.needle, e.holder, seed);
+  const sim::Cell cell(e.cell, e.needle, e.holder, seed, 0);
+  sim::CellState state;
+  Tracker tracker(e.vision, e.lens.width, e.lens.height);
+  std::vector<std::uint8_t> pixels(static_cast<std::size_t>(e.lens.width * e.lens.height));
+  std::vector<std::array<double, 2>> outer(sim::Cell::kContour), inner(sim::Cell::kContour);
+  const sim::Vec3 axis(-1, 0, 0);
+  sim::Vec3 tip(640e-6, 15e-6, 0);
+  double outer_s = -1, inner_s = -1, outer_seen_s = -1, inner_seen_s = -1, beyond_m = 0;
+  int frames = 0, unseen = 0, wrong = 0;
+  double farthest_px = 0;
+  for (int tick = 0; tick < 10'000 && beyond_m < 60e-6; ++tick) {
+    const double t = tick * 1e-3;
+    const double gap = (cell.centre_m(state) - tip).dot(axis) - cell.R_m();
+    const bool through = state.outer.punctured && state.inner.punctured;
+    const double step = (gap > 10e-6 ? 150e-9 : through ? 60e-9 : 40e-9);
+    beyond_m += through ? step : 0;
+    sim::TipMotion motion;
+    motion.tip_begin_m = tip;
+    tip += axis * step;
+    motion.tip_end_m = tip;
+    motion.axis_begin = motion.axis_end = axis;
+    (void)cell.step(state, motion, 1e-3);
+    outer_s = outer_s < 0 && state.outer.punctured ? t : outer_s;
+    inner_s = inner_s < 0 && state.inner.punctured ? t : inner_s;
+    if (tick % 40 != 0) {
+      continue;
+    }
+    const auto no = static_cast<std::size_t>(cell.contour(state, sim::Membrane::outer, outer));
+    const auto ni = static_cast<std::size_t>(cell.contour(state, sim::Membrane::inner, inner));
+    sim::PictureScene scene;
+    scene.needle = sim::NeedleInPicture{tip, axis};
+    scene.holder_mouth_m = cell.holder_mouth_m();
+    sim::CellInPicture shown;
+    shown.outer = std::span<const std::array<double, 2>>(outer.data(), no);
+    shown.inner = std::span<const std::array<double, 2>>(inner.data(), ni);
+    shown.centre_m = cell.centre_m(state);
+    shown.zona_h_m = e.cell.zona_h_m;
+    scene.cell = shown;
+    microscope.render(scene, static_cast<std::uint64_t>(frames), pixels);
+    hal::Frame frame;
+    frame.pixels = pixels.data();
+    frame.width = e.lens.width;
+    frame.height = e.lens.height;
+    frame.stride = e.lens.width;
+    frame.sequence = static_cast<std::uint64_t>(frames++);
+    frame.exposure_ns = static_cast<std::int64_t>(tick) * 1'000'000;
+    const Result& r = tracker.process(frame);
+    outer_seen_s = outer_seen_s < 0 && r.punctured ? t : outer_seen_s;
+    inner_seen_s = inner_seen_s < 0 && r.inner_punctured ? t : inner_seen_s;
+    if (!r.needle.ok) {
+      ++unseen;
+      continue;
+    }
+    const Point true_tip(tip.x() / e.lens.pixel_m + (e.lens.width - 1) / 2.0,
+                         tip.y() / e.lens.pixel_m + (e.lens.height - 1) / 2.0);
+    const double error_px = cv::norm(r.needle.tip - true_tip);
+    farthest_px = std::max(farthest_px, error_px);
+    wrong += error_px > 9;  // the core of this scene takes 30 um for a disagreement
+  }
+  std::printf(
+      "embryo %d: %d frames, tip unseen in %d, at most %.1f px off; punctures seen after %+.0f, %+.0f ms\n",
+      GetParam(), frames, unseen, farthest_px, 1e3 * (outer_seen_s - outer_s),
+      1e3 * (inner_seen_s - inner_s));
+  ASSERT_GT(inner_s, 0);
+  EXPECT_EQ(wrong, 0);
+  EXPECT_LE(unseen, frames / 10);
+  EXPECT_GT(outer_seen_s, outer_s);
+  EXPECT_LT(outer_seen_s, outer_s + 0.25);
+  EXPECT_GT(inner_seen_s, inner_s);
+  EXPECT_LT(inner_seen_s, inner_s + 0.25);
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, EmbryoFrames, testing::Values(1, 3, 4));
 
 }  // namespace

@@ -70,14 +70,29 @@ bool Puncture::is_through_undented_membrane(const PunctureInput& in) {
   return inside_frames_ >= (frames_ < 3 ? 1 : 3);
 }
 
+namespace {
+constexpr double kInnerRecoil_px = 3;  // the contour of a membrane that holds moves back by less
+}
+
 // While the membrane holds, its contour scatters by up to 5 px about the tip.
 double InnerPuncture::least_behind_px(double radius_px) { return std::max(2 * radius_px, 6.0); }
 
-bool InnerPuncture::update(bool outer_punctured, const std::optional<double>& behind_tip_px,
-                           double radius_px) {
-  const bool behind = behind_tip_px && *behind_tip_px > least_behind_px(radius_px);
-  frames_ = outer_punctured && behind ? frames_ + 1 : 0;
-  punctured_ = outer_punctured && (punctured_ || frames_ >= 2);
+bool InnerPuncture::update(bool outer_punctured, const std::optional<InnerOnNeedle>& seen, double radius_px) {
+  if (!outer_punctured) {
+    *this = {};
+    return false;
+  }
+  bool gave_way = false;
+  if (seen) {
+    const double least = least_behind_px(radius_px);
+    deepest_ = std::max(deepest_.value_or(seen->place_px), seen->place_px);
+    // A tip that is seen too far ahead moves no membrane: it must have recoiled as well, or lie further back
+    // than a tip is seen wrongly.
+    const bool recoiled = *deepest_ - seen->place_px > kInnerRecoil_px;
+    gave_way = seen->behind_tip_px > least && (recoiled || seen->behind_tip_px > 2 * least);
+  }
+  frames_ = gave_way ? frames_ + 1 : 0;
+  punctured_ = punctured_ || frames_ >= 2;
   return punctured_;
 }
 

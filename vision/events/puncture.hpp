@@ -45,22 +45,29 @@ class Puncture {
   std::int64_t frames_ = 0;  // since the start or the last reset
 };
 
+// Where the inner membrane's contour crosses the needle.
+struct InnerOnNeedle {
+  double behind_tip_px = 0;  // the nearer of the two sides
+  double place_px = 0;       // along the needle's axis in the picture, > 0 into the cell
+};
+
 // The inner membrane, once the outer one is through. While it holds, its contour lies on the tip; when it has
 // given way, the contour crosses the needle behind the tip. Where it gives way with a small dimple, this is
-// told only after the needle has gone on by the rest of least_behind_px. In 16 simulated oocytes it was told
-// 64 to 112 ms after it happened, but in one of them 151 ms before: the contour had lost the dimple.
+// told only after the needle has gone on by the rest of twice least_behind_px. In 16 simulated oocytes it was
+// told 64 to 112 ms after it happened, but in one of them 151 ms before: the contour had lost the dimple.
 class InnerPuncture {
  public:
   // Distance behind the tip, px, from which the contour no longer lies on a tip of that radius.
   [[nodiscard]] static double least_behind_px(double radius_px);
 
-  // behind_tip_px: where the followed contour crosses the needle's edges; empty if it is not followed or does
-  // not cross them. True until the outer membrane is no longer punctured.
-  bool update(bool outer_punctured, const std::optional<double>& behind_tip_px, double radius_px);
+  // seen: empty if the contour is not followed or does not cross the needle's edges. True until the outer
+  // membrane is no longer punctured.
+  bool update(bool outer_punctured, const std::optional<InnerOnNeedle>& seen, double radius_px);
 
  private:
   bool punctured_ = false;
-  int frames_ = 0;  // in a row
+  int frames_ = 0;                 // in a row
+  std::optional<double> deepest_;  // place of the contour since the outer membrane is through
 };
 
 }  // namespace punctum::vision

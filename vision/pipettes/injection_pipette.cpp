@@ -16,6 +16,7 @@ namespace {
 constexpr double kLeastScore = 0.3;  // of the centred correlation
 constexpr double kJump_px = 4;       // along the axis, from what motion and correlation predict
 constexpr int kJumpsMax = 3;         // frames in a row; then it is where it is seen
+constexpr double kDoubtMax_px = 5;   // an end that is less certain is not seen
 constexpr int kLostMax = 3;          // frames in a row; then it is looked for from the border
 
 // The best narrow tube of both borders, or of the one that is known.
@@ -73,11 +74,7 @@ bool InjectionPipette::start(const GradientField& field, double noise) {
       last_.tip += *s * last_.axis;
     }
   }
-  step_sign_ = 0;
-  end_offset_ = 0.15 * last_.half_width;
-  offset_frames_ = 0;
-  calibrate_end(field, last_, noise);
-  last_.tip += end_offset_ * last_.axis;
+  learn_shape_anew(field);
   if (straight < 0.65 || last_.half_width > 2 * radius_px_ + 1) {
     reason_ = "what enters through the border is not a straight needle";
     return false;
@@ -162,44 +159,41 @@ bool InjectionPipette::find_end(const GradientField& field, double noise, Needle
                                 bool& near) const {
   (void)fit_walls(field, noise, radius_px_, needle);
   // First near where the motion predicts it: what lies further ahead cannot be mistaken for it then.
-  auto end = end_of_profile(field, needle, 18, 18, noise);
+  auto end = shape_.end(field, needle, 18, 18);
   near = end.has_value();
   if (!near) {
-    end = end_of_profile(field, needle, 36, 44, noise);
+    end = shape_.end(field, needle, 36, 44);
   }
-  if (!end) {
+  if (!end || end->doubt > kDoubtMax_px) {
     return false;
   }
-  needle.tip += *end * needle.axis;
+  needle.tip += end->ahead * needle.axis;
   (void)fit_walls(field, noise, radius_px_, needle);
-  if (const auto again = end_of_profile(field, needle, 16, 16, noise)) {
-    needle.tip += *again * needle.axis;
+  if (const auto again = shape_.end(field, needle, 16, 16)) {
+    needle.tip += again->ahead * needle.axis;
   }
   return true;
 }
 
-// The profile of the walls ends a little before the end face. How far, the steepest change of grey along the
-// walls tells, averaged over 30 frames.
-void InjectionPipette::calibrate_end(const GradientField& field, const NeedlePose& walls, double noise) {
-  const auto step = steepest_wall_step(field, walls, 3.5, 3 * field.noise_of_gradient(noise), step_sign_);
-  if (!step) {
-    return;
+// The profile tells only roughly where the needle ends: its walls are thin there.
+void InjectionPipette::learn_shape_anew(const GradientField& field) {
+  for (int round = 0; round < 3; ++round) {
+    shape_.forget();
+    shape_.learn(field, last_);
+    last_.tip += shape_.face().value_or(0) * last_.axis;
   }
-  if (step_sign_ == 0) {
-    const double e = field.gradient(walls.at(-*step, 0.8 * walls.half_width)).dot(walls.axis) +
-                     field.gradient(walls.at(-*step, -0.8 * walls.half_width)).dot(walls.axis);
-    step_sign_ = e > 0 ? 1 : -1;
-  }
-  end_offset_ += (*step - end_offset_) / std::min(++offset_frames_, 30);
+  end_offset_ = 0;
 }
 
-void InjectionPipette::learn(const GradientField& field, const NeedlePose& needle, double noise) {
+void InjectionPipette::learn(const GradientField& field, const NeedlePose& needle) {
   if (!needle.ok || template_.empty()) {
     return;
   }
   NeedlePose walls = needle;
   walls.tip -= end_offset_ * walls.axis;
-  calibrate_end(field, walls, noise);
+  shape_.learn(field, walls);
+  constexpr double kFaceRate_px = 0.2;  // per frame: the face moves by no more as the shape is averaged
+  end_offset_ += std::clamp(shape_.face().value_or(end_offset_) - end_offset_, -kFaceRate_px, kFaceRate_px);
   cv::Mat here;
   cv::getRectSubPix(
       field.smooth, template_.size(),

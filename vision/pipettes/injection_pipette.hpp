@@ -8,6 +8,7 @@
 #include "vision/config.hpp"
 #include "vision/image/gradient.hpp"
 #include "vision/pipettes/needle_pose.hpp"
+#include "vision/pipettes/needle_shape.hpp"
 
 namespace punctum::vision {
 
@@ -20,7 +21,7 @@ class InjectionPipette {
   [[nodiscard]] bool start(const GradientField& field, double noise);
   [[nodiscard]] NeedlePose find(const GradientField& field, double noise);
   // Lets the template of the tip follow slow changes of focus and light. Only while nothing touches the tip.
-  void learn(const GradientField& field, const NeedlePose& needle, double noise);
+  void learn(const GradientField& field, const NeedlePose& needle);
 
   [[nodiscard]] bool started() const noexcept { return started_; }
   [[nodiscard]] Side side() const noexcept { return found_side_; }
@@ -30,7 +31,7 @@ class InjectionPipette {
   // Along the needle its shaft looks the same everywhere, so there the end of its walls tells its place.
   // `near`: it was found near where the motion predicts it.
   [[nodiscard]] bool find_end(const GradientField& field, double noise, NeedlePose& needle, bool& near) const;
-  void calibrate_end(const GradientField& field, const NeedlePose& walls, double noise);
+  void learn_shape_anew(const GradientField& field);
   [[nodiscard]] NeedlePose not_recognised(const GradientField& field, double noise, NeedlePose needle);
 
   Side side_;
@@ -40,14 +41,13 @@ class InjectionPipette {
   std::string reason_;  // why it was not started
   cv::Mat template_;
   Point tip_in_template_;
+  NeedleShape shape_;
   NeedlePose last_;
   Point velocity_;  // px per frame
   int lost_ = 0;    // frames in a row without the tip
   int jumps_ = 0;   // frames in a row in which the end lay somewhere else
 
-  double end_offset_ = 0;  // from where the profile of the walls ends to the end face, px
-  int offset_frames_ = 0;  // that end_offset_ was learnt from
-  double step_sign_ = 0;   // +1: it is brighter ahead of the walls, -1: darker, 0: not known yet
+  double end_offset_ = 0;  // from where the learnt shape has its origin to the end face, px
 };
 
 }  // namespace punctum::vision

@@ -160,23 +160,40 @@ TEST(Puncture, is_also_a_tip_deep_inside_an_undented_membrane) {
   EXPECT_TRUE(late.step(40, 2));
 }
 
-TEST(InnerPuncture, is_a_contour_far_behind_the_tip_in_two_frames_of_a_punctured_cell) {
+TEST(InnerPuncture, is_a_contour_that_recoiled_far_behind_the_tip_in_two_frames_of_a_punctured_cell) {
   InnerPuncture inner;
   const double radius = 4.6;
-  const double far = InnerPuncture::least_behind_px(radius) + 1;
-  EXPECT_FALSE(inner.update(false, far, radius));  // the outer membrane holds
-  EXPECT_FALSE(inner.update(false, far, radius));
+  const InnerOnNeedle pushed{2, 50}, behind{-6, 50};
+  const InnerOnNeedle recoiled{InnerPuncture::least_behind_px(radius) + 1, 40};
+  EXPECT_FALSE(inner.update(false, recoiled, radius));  // the outer membrane holds
+  EXPECT_FALSE(inner.update(false, recoiled, radius));
   for (int k = 0; k < 10; ++k) {  // it lies on the tip, or is not followed
-    EXPECT_FALSE(inner.update(true, k % 2 == 0 ? 5.0 : -6.0, radius));
+    EXPECT_FALSE(inner.update(true, k % 2 == 0 ? pushed : behind, radius));
     EXPECT_FALSE(inner.update(true, std::nullopt, radius));
   }
-  EXPECT_FALSE(inner.update(true, far, radius));  // one frame may be mistaken
-  EXPECT_FALSE(inner.update(true, 2.0, radius));
-  EXPECT_FALSE(inner.update(true, far, radius));
-  EXPECT_TRUE(inner.update(true, far, radius));
+  EXPECT_FALSE(inner.update(true, recoiled, radius));  // one frame may be mistaken
+  EXPECT_FALSE(inner.update(true, pushed, radius));
+  EXPECT_FALSE(inner.update(true, recoiled, radius));
+  EXPECT_TRUE(inner.update(true, recoiled, radius));
   EXPECT_TRUE(inner.update(true, std::nullopt, radius));  // stays
-  EXPECT_FALSE(inner.update(false, far, radius));         // the needle is clear of the cell
-  EXPECT_FALSE(inner.update(true, far, radius));
+  EXPECT_FALSE(inner.update(false, recoiled, radius));    // the needle is clear of the cell
+  EXPECT_FALSE(inner.update(true, recoiled, radius));
+}
+
+TEST(InnerPuncture, is_not_a_tip_that_is_seen_too_far_ahead_of_a_membrane_it_still_pushes) {
+  InnerPuncture inner;
+  const double radius = 4.6, least = InnerPuncture::least_behind_px(radius);
+  for (int k = 0; k < 30; ++k) {
+    EXPECT_FALSE(inner.update(true, InnerOnNeedle{least + 1, 50.0 + 0.5 * k}, radius)) << k;
+  }
+}
+
+TEST(InnerPuncture, of_a_membrane_that_gave_way_undented_is_told_when_the_tip_is_twice_as_far_past_it) {
+  InnerPuncture inner;
+  const double radius = 4.6, least = InnerPuncture::least_behind_px(radius);
+  EXPECT_FALSE(inner.update(true, InnerOnNeedle{2 * least - 0.1, 50}, radius));
+  EXPECT_FALSE(inner.update(true, InnerOnNeedle{2 * least + 0.1, 50}, radius));
+  EXPECT_TRUE(inner.update(true, InnerOnNeedle{2 * least + 0.1, 50}, radius));
 }
 
 }  // namespace

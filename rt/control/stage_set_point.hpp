@@ -20,6 +20,8 @@ struct FollowInput {
   bool may_tilt = true;   // the handle's orientation turns the approach axis
   StageConstraint constraint;
   double elapsed_s = 0;  // since the last tick
+  double position_scale = 500;  // as commanded
+  bool nothing_felt = false;    // of what stands at the needle, on the last tick
 };
 
 class StageSetPoint {
@@ -40,6 +42,7 @@ class StageSetPoint {
     return uncoupled_;
   }  // on this tick, by a stop or no power
   [[nodiscard]] const hal::Vec3& hand_point_m() const NONBLOCKING { return mapping_.hand_point(); }
+  [[nodiscard]] double position_scale() const NONBLOCKING { return mapping_.position_scale(); }
   // For the stage; null until hand and needle are coupled.
   [[nodiscard]] const hal::StageCommand* command() const NONBLOCKING {
     return anchored() ? &limits_.set_point() : nullptr;
@@ -52,7 +55,6 @@ class StageSetPoint {
   MasterToStage mapping_;
   StageLimits limits_;
   double lag_s_;    // of the whole way from the hand to the set-point
-  double slack_m_;  // at needle scale
   bool uncoupled_ = false;
   bool last_withdrawal_only_ = false;
   bool last_hand_stuck_ = false;

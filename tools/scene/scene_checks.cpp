@@ -239,6 +239,8 @@ SpringWords words_of(rt::Spring::Of spring) {
       return {"repulsive.K_N_m", "repulsive"};
     case rt::Spring::Of::friction:
       return {"friction.K_N_m", "friction"};
+    case rt::Spring::Of::forbidden:
+      return {"forbidden.K_N_m", "forbidden"};
   }
   return {"servo", "?"};
 }

@@ -12,7 +12,7 @@ namespace {
 
 using hal::Vec3;
 constexpr double kScale = 500;
-constexpr EffectSetup kSetup{.position_scale = kScale};
+constexpr EffectSetup kSetup;
 
 FixtureFrame tilted_frame() { return {Vec3(21e-6, -4e-6, 2e-6), Vec3(-0.97, 0.15, -0.2).normalized()}; }
 

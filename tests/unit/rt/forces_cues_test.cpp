@@ -18,7 +18,7 @@ namespace {
 
 using hal::Vec3;
 constexpr double kScale = 500;
-constexpr EffectSetup kSetup{.position_scale = kScale};
+constexpr EffectSetup kSetup;
 const Vec3 kCentre(3e-6, -37e-6, 1e-6);
 
 EffectInput in_cell(const Vec3& tip, const Vec3& cell_centre, bool known, double dt) {

@@ -13,7 +13,7 @@ namespace {
 
 using hal::Vec3;
 constexpr double kScale = 500;
-constexpr EffectSetup kSetup{.position_scale = kScale};
+constexpr EffectSetup kSetup;
 const FixtureFrame kLine{Vec3(15e-6, 3e-6, -1e-6), Vec3(-0.98, 0.1, 0.17).normalized()};
 
 // Inside a known cell, on the line kLine.

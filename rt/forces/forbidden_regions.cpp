@@ -14,6 +14,7 @@ constexpr int kSections = 30;
 constexpr double kGolden = 0.6180339887498949;
 // On the axis of the holder every direction across it is as good as another.
 constexpr double kOnAxis_m = 1e-12;
+constexpr double kParallel = 1e-9;
 // A direction with more of the holder's axis in it than rounding leaves is not apart from a body without end.
 constexpr double kBackwards = 1e-9;
 
@@ -39,6 +40,30 @@ FromHolder from_holder(const HolderBodyParams& holder, const hal::Vec3& point_m)
     return {0, -holder.axis};
   }
   return {distance_m, (sideways_m * outwards - before_m * holder.axis) / distance_m};
+}
+
+// The unit vector next to `direction` across a needle that grows thicker with this slope from its tip backwards.
+hal::Vec3 across(const hal::Vec3& direction, const hal::Vec3& axis, double slope) NONBLOCKING {
+  const hal::Vec3 aside = direction - axis.dot(direction) * axis;
+  const double length = aside.norm();
+  if (!(length > kParallel) || slope >= 1) {
+    return direction;
+  }
+  return std::sqrt(1 - slope * slope) / length * aside - slope * axis;
+}
+
+// The same, and across the holder's axis.
+hal::Vec3 across_both(const hal::Vec3& direction, const hal::Vec3& axis, double slope,
+                      const hal::Vec3& holder_axis) NONBLOCKING {
+  const hal::Vec3 normal = axis.cross(holder_axis);
+  const double sine = normal.norm();
+  if (!(sine > kParallel) || slope >= sine) {
+    return direction;
+  }
+  const double part = slope / sine;
+  const double side = direction.dot(normal) < 0 ? -1 : 1;
+  const hal::Vec3 aside = axis - axis.dot(holder_axis) * holder_axis;
+  return side * std::sqrt(1 - part * part) / sine * normal - part / sine * aside;
 }
 
 }  // namespace
@@ -82,9 +107,28 @@ hal::Vec3 ForbiddenRegions::away_from_holder(const NeedlePose& needle) const NON
       far_gap_m = gap_m(far_m);
     }
   }
-  // The tip itself where it is nearest: most of the time.
-  const double nearest_m = gap_m(0) <= std::min(near_gap_m, far_gap_m) ? 0 : 0.5 * (from_m + to_m);
-  return from_holder(holder, needle.tip_m - nearest_m * needle.axis).away;
+  // Where a straight part of the needle is nearest, its slope and not the search fixes the direction; where its side
+  // meets the holder's, both do. Of directions that may be it, the best is it.
+  const auto at = [&](double behind_m) {
+    return from_holder(holder, needle.tip_m - behind_m * needle.axis).away;
+  };
+  hal::Vec3 best = at(0);
+  double best_m = apart_m(Region::holder, best, needle);
+  const auto consider = [&](const hal::Vec3& direction) {
+    const double found_m = apart_m(Region::holder, direction, needle);
+    if (found_m > best_m) {
+      best_m = found_m;
+      best = direction;
+    }
+  };
+  const hal::Vec3 found = at(0.5 * (from_m + to_m));
+  consider(found);
+  consider(at(params_.taper_m));
+  for (const double slope : {(params_.shaft_radius_m - params_.tip_radius_m) / params_.taper_m, 0.0}) {
+    consider(across(found, needle.axis, slope));
+    consider(across_both(found, needle.axis, slope, holder.axis));
+  }
+  return best;
 }
 
 double ForbiddenRegions::apart_m(Region region, const hal::Vec3& direction, const NeedlePose& needle) const

@@ -150,23 +150,24 @@ template <class Limits>
 // How far the needle's glass, its tip there, is from the floor and from the holder of a scene, less the clearance:
 // ball by ball along the shaft.
 [[nodiscard]] inline double to_regions_m(const ForbiddenParams& regions, const hal::Vec3& tip_m,
-                                         const hal::Vec3& axis) {
+                                         const hal::Vec3& axis, int balls = 400, double shaft_m = 2e-3) {
   double least_m = std::numeric_limits<double>::infinity();
   if (regions.floor) {
     const double z_m = regions.floor->z_m;
     least_m = (z_m > 0 ? z_m - tip_m.z() : tip_m.z() - z_m) - regions.tip_radius_m;
   }
-  constexpr int kBalls = 400;
-  for (int i = 0; regions.holder && i <= kBalls; ++i) {
-    const double behind_m = 2e-3 * std::pow(i / static_cast<double>(kBalls), 2);
+  for (int i = 0; regions.holder && i <= balls; ++i) {
+    const double part = i / static_cast<double>(balls);
+    const double behind_m = shaft_m * part * part;
     const double radius_m =
         regions.tip_radius_m +
         std::min(behind_m / regions.taper_m, 1.0) * (regions.shaft_radius_m - regions.tip_radius_m);
     const hal::Vec3 V = tip_m - behind_m * axis - regions.holder->mouth_m;
     const double depth_m = V.dot(regions.holder->axis);
     const double beside_m = V.cross(regions.holder->axis).norm() - regions.holder->radius_m;
+    const double aside_m = std::max(beside_m, 0.0), before_m = std::max(-depth_m, 0.0);
     const double to_m = beside_m <= 0 && depth_m >= 0 ? std::max(beside_m, -depth_m)
-                                                      : std::hypot(std::max(beside_m, 0.0), std::max(-depth_m, 0.0));
+                                                      : std::sqrt(aside_m * aside_m + before_m * before_m);
     least_m = std::min(least_m, to_m - radius_m);
   }
   return least_m - regions.clearance_m;

@@ -47,14 +47,14 @@ TEST(ForbiddenRegions, are_as_far_as_the_nearest_of_the_needles_balls) {
   ForbiddenParams p = both();
   p.floor.reset();
   int near = 0;
-  for (int i = 0; i < 20'000; ++i) {
+  for (int i = 0; i < 6000; ++i) {
     p.holder->mouth_m = Vec3(within(-1, 1), within(-1, 1), within(-1, 1)) * 100e-6;
     p.holder->axis = Vec3(within(-1, 1), within(-1, 1), within(-1, 1)).normalized();
     const NeedlePose needle{Vec3(within(-1, 1), within(-1, 1), within(-1, 1)) * 200e-6,
                             Vec3(-1, within(-0.3, 0.3), within(-0.3, 0.3)).normalized()};
     const double found_m = apart_m(p, Region::holder, needle);
-    const double balls_m = test::to_regions_m(p, needle.tip_m, needle.axis);
-    if (balls_m > 0 && balls_m < 1e-3) {  // of the 2 mm that the balls reach
+    const double balls_m = test::to_regions_m(p, needle.tip_m, needle.axis, 4000, 10e-3);
+    if (balls_m > 0) {
       ++near;
       ASSERT_NEAR(found_m, balls_m, 0.2e-6) << i;
     } else {
@@ -62,7 +62,7 @@ TEST(ForbiddenRegions, are_as_far_as_the_nearest_of_the_needles_balls) {
     }
     ASSERT_LT(found_m, std::max(balls_m, 0.0) + 1e-9) << i;  // never further than in truth
   }
-  EXPECT_GT(near, 5000);
+  EXPECT_GT(near, 2000);
 }
 
 EffectInput at(const Vec3& point_m) {

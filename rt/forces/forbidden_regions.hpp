@@ -43,7 +43,7 @@ constexpr auto keys_of(const HolderBodyParams*) {
 
 struct ForbiddenParams {
   double clearance_m = 5e-6;  // between glass and glass that the set-point keeps
-  double felt_m = 10e-6;      // the wall is felt from this much before it
+  double felt_m = 8e-6;       // the wall is felt from this much before it
   double K_N_m = 100;         // of the wall, at the hand
   // The needle.
   double tip_radius_m = 3.8e-6;

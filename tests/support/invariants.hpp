@@ -522,7 +522,8 @@ class Invariants {
     const auto enable = [](std::uint32_t buttons) { return (buttons & hal::kButtonEnable) != 0; };
     const bool held = enable(buttons_) && !squeezed(buttons_);
     const bool press = held && !enable(buttons_were_) && !squeezed(buttons_were_);
-    pressed_ = running && ((pressed_ && was_running_) || press);
+    // A press that began in the stop counts as soon as its sample is believed.
+    pressed_ = running && (press || (was_running_ ? pressed_ : press_edge_));
     if (running && !pressed_) {
       must(I::waits_for_enabling, !s.power && s.commands == 0 && s.asked_N.norm() == 0);
     }

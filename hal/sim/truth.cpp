@@ -43,7 +43,8 @@ GlassClearance glass_clearance(const SimConfig& config, const Snapshot& s) noexc
     // The holder leads from its mouth to -x.
     const Vec3 at_m = tip_m - behind_m * axis - *mouth_m;
     const double before_m = at_m.x();
-    const double beside_m = std::sqrt(at_m.y() * at_m.y() + at_m.z() * at_m.z()) - config.holder->outer_radius_m;
+    const double beside_m =
+        std::sqrt(at_m.y() * at_m.y() + at_m.z() * at_m.z()) - config.holder->outer_radius_m;
     const double out_m = before_m > 0 && beside_m > 0 ? std::sqrt(before_m * before_m + beside_m * beside_m)
                                                       : std::max(before_m, beside_m);
     least_m = std::min(least_m, out_m - radius_m);

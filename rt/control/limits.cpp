@@ -15,7 +15,8 @@ constexpr double kRounding_m = 1e-15;
 constexpr double kPlanned = 0.8;
 constexpr double kFinestPart = 1e-3;
 constexpr double kSurface_m = 1e-9;  // of a region: the needle is at it when nearer
-// Newton's steps double the digits; more are needed only where a way grazes an edge, and it may end early there.
+// Newton's steps double the digits; more are needed only where a way grazes an edge, and it may end early
+// there.
 constexpr int kSurfaceSteps = 12;
 // Of a place where a region meets another one or another limit.
 constexpr int kCornerRounds = 3;
@@ -178,9 +179,9 @@ StageLimits::Checked StageLimits::check_cell(const hal::Vec3& wanted_m, const St
   return out;
 }
 
-// A convex body lies wholly behind a plane across any direction in which the needle is apart from it. Newton's
-// steps along the way come to its surface from outside and never pass it: no plane that they use lets the needle
-// through, and none takes away more than the last.
+// A convex body lies wholly behind a plane across any direction in which the needle is apart from it.
+// Newton's steps along the way come to its surface from outside and never pass it: no plane that they use
+// lets the needle through, and none takes away more than the last.
 StageLimits::FreeWay StageLimits::free_way(Region region, const hal::Vec3& to_m) const NONBLOCKING {
   const hal::Vec3& from_m = set_point_.tip_m;
   const hal::Vec3 way = to_m - from_m;

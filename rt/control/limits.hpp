@@ -112,13 +112,12 @@ class StageLimits {
   [[nodiscard]] std::uint32_t alarms() const NONBLOCKING { return alarms_; }  // of the last step
   [[nodiscard]] bool finite() const NONBLOCKING { return finite_; }           // the last target was
 
-
  private:
   // Workspace, cell and line of insertion.
   [[nodiscard]] Checked check_cell(const hal::Vec3& wanted_m, const StageConstraint& c) const NONBLOCKING;
   void keep_out(Checked& out, const StageConstraint& c) const NONBLOCKING;
-  // A way of the tip that begins at the set-point: how much of it keeps out of the region, and what lies beyond
-  // the plane before which the region ends it.
+  // A way of the tip that begins at the set-point: how much of it keeps out of the region, and what lies
+  // beyond the plane before which the region ends it.
   struct FreeWay {
     double part = 1;
     double beyond_m = 0;  // of the whole way

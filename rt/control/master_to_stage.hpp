@@ -55,8 +55,8 @@ class MasterToStage {
   // stays.
   void step(const hal::HandState& hand, bool coupled, bool tilting) NONBLOCKING;
 
-  // Hand metres per needle metre from here on. While hand and needle are uncoupled: the hand's way so far would
-  // move the needle otherwise.
+  // Hand metres per needle metre from here on. While hand and needle are uncoupled: the hand's way so far
+  // would move the needle otherwise.
   void set_position_scale(double scale) NONBLOCKING { params_.position_scale = scale; }
   [[nodiscard]] double position_scale() const NONBLOCKING { return params_.position_scale; }
 

@@ -10,8 +10,7 @@ constexpr double kFadeOut_s = 0.05;     // when the clutch is pressed or the run
 constexpr double kStiffnessKept = 0.9;  // of the commanded one; less raises an alarm
 
 [[nodiscard]] EffectSetup setup_of(const ServoConfig& config) NONBLOCKING {
-  return {.force_scale = config.mapping.force_scale,
-          .force_delay_ticks = config.device.delay_ticks};
+  return {.force_scale = config.mapping.force_scale, .force_delay_ticks = config.device.delay_ticks};
 }
 
 }  // namespace

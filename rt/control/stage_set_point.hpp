@@ -19,7 +19,7 @@ struct FollowInput {
   bool clutched = false;  // the operator or the end of the run has uncoupled hand and needle
   bool may_tilt = true;   // the handle's orientation turns the approach axis
   StageConstraint constraint;
-  double elapsed_s = 0;  // since the last tick
+  double elapsed_s = 0;         // since the last tick
   double position_scale = 500;  // as commanded
   bool nothing_felt = false;    // of what stands at the needle, on the last tick
 };
@@ -54,7 +54,7 @@ class StageSetPoint {
 
   MasterToStage mapping_;
   StageLimits limits_;
-  double lag_s_;    // of the whole way from the hand to the set-point
+  double lag_s_;  // of the whole way from the hand to the set-point
   bool uncoupled_ = false;
   bool last_withdrawal_only_ = false;
   bool last_hand_stuck_ = false;

@@ -42,7 +42,8 @@ FromHolder from_holder(const HolderBodyParams& holder, const hal::Vec3& point_m)
   return {distance_m, (sideways_m * outwards - before_m * holder.axis) / distance_m};
 }
 
-// The unit vector next to `direction` across a needle that grows thicker with this slope from its tip backwards.
+// The unit vector next to `direction` across a needle that grows thicker with this slope from its tip
+// backwards.
 hal::Vec3 across(const hal::Vec3& direction, const hal::Vec3& axis, double slope) NONBLOCKING {
   const hal::Vec3 aside = direction - axis.dot(direction) * axis;
   const double length = aside.norm();
@@ -107,8 +108,8 @@ hal::Vec3 ForbiddenRegions::away_from_holder(const NeedlePose& needle) const NON
       far_gap_m = gap_m(far_m);
     }
   }
-  // Where a straight part of the needle is nearest, its slope and not the search fixes the direction; where its side
-  // meets the holder's, both do. Of directions that may be it, the best is it.
+  // Where a straight part of the needle is nearest, its slope and not the search fixes the direction; where
+  // its side meets the holder's, both do. Of directions that may be it, the best is it.
   const auto at = [&](double behind_m) {
     return from_holder(holder, needle.tip_m - behind_m * needle.axis).away;
   };
@@ -145,9 +146,8 @@ double ForbiddenRegions::apart_m(Region region, const hal::Vec3& direction, cons
   }
   const double along = direction.dot(needle.axis);
   const double of_holder_m = holder.radius_m * std::sqrt(std::max(1 - backwards * backwards, 0.0));
-  const double of_needle_m =
-      std::max({params_.tip_radius_m, params_.taper_m * along + params_.shaft_radius_m,
-                kShaft_m * along + params_.shaft_radius_m});
+  const double of_needle_m = std::max({params_.tip_radius_m, params_.taper_m * along + params_.shaft_radius_m,
+                                       kShaft_m * along + params_.shaft_radius_m});
   return direction.dot(needle.tip_m - holder.mouth_m) - of_holder_m - of_needle_m - params_.clearance_m;
 }
 

@@ -1,15 +1,16 @@
 // Where the needle's glass must not be: in the dish floor, and in the holding pipette.
 //
-// The needle is a row of balls along its axis, from the tip backwards, as thick as its taper and its shaft; the
-// floor is a plane, the holder a cylinder with a flat mouth, without an end. So what the tip must keep out of is
-// convex for each of the two, and every direction in which needle and region lie apart gives a plane that the
-// region is wholly behind, exactly:
+// The needle is a row of balls along its axis, from the tip backwards, as thick as its taper and its shaft;
+// the floor is a plane, the holder a cylinder with a flat mouth, without an end. So what the tip must keep
+// out of is convex for each of the two, and every direction in which needle and region lie apart gives a
+// plane that the region is wholly behind, exactly:
 //
 //   n . (p - m) > R sqrt(1 - (n.b)^2) + max_s (s n.a + r(s))      for n.b <= 0
 //
-// p tip, a axis of the needle (out of its tip), r(s) its radius s behind the tip; m mouth, b axis of the holder
-// (backwards from its mouth), R its radius. How good the direction is decides only how much room is given away.
-// Everything stands in the stage's frame, as the workspace does, and includes the clearance. Real-time safe.
+// p tip, a axis of the needle (out of its tip), r(s) its radius s behind the tip; m mouth, b axis of the
+// holder (backwards from its mouth), R its radius. How good the direction is decides only how much room is
+// given away. Everything stands in the stage's frame, as the workspace does, and includes the clearance.
+// Real-time safe.
 #pragma once
 
 #include <cstdint>

@@ -4,10 +4,11 @@
 //
 //   U = K k_p^2 Psi(delta),   F = K k_p psi(delta) n     (Psi, psi of ramp.hpp; n away from the region)
 //
-// The hand's point goes no further than d = 0 (rt/control/limits), so the push ends at K k_p felt: from there on
-// the hand slips. The regions are where the scene says, whatever vision sees, so the walls do not fade with it;
-// with the clutch they do. Tilting the needle moves the walls; what that does to U is counted. No eigenvalue of
-// the Hessian exceeds K where felt <= tip_radius + clearance, or the walls are flat. Real-time safe.
+// The hand's point goes no further than d = 0 (rt/control/limits), so the push ends at K k_p felt: from there
+// on the hand slips. The regions are where the scene says, whatever vision sees, so the walls do not fade
+// with it; with the clutch they do. Tilting the needle moves the walls; what that does to U is counted. No
+// eigenvalue of the Hessian exceeds K where felt <= tip_radius + clearance, or the walls are flat. Real-time
+// safe.
 #pragma once
 
 #include <array>
@@ -22,9 +23,9 @@ class ForbiddenWalls {
  public:
   using Params = ForbiddenParams;
 
-  ForbiddenWalls(const ForbiddenParams& params, const EffectSetup& /*setup*/) NONBLOCKING
-      : params_(params),
-        regions_(params) {}
+  ForbiddenWalls(const ForbiddenParams& params, const EffectSetup& /*setup*/) NONBLOCKING : params_(params),
+                                                                                            regions_(params) {
+  }
 
   [[nodiscard]] EffectOutput step(const EffectInput& in) NONBLOCKING;
 

@@ -32,7 +32,8 @@ EffectOutput RepulsiveRegion::step(const EffectInput& in) NONBLOCKING {
   if (last_gain == 0) {
     centre_m_ = target;
   } else {
-    last_energy_J = last_gain * repulsive_push(params_, in.position_scale, centre_m_, in.fixture_point_m).energy_J;
+    last_energy_J =
+        last_gain * repulsive_push(params_, in.position_scale, centre_m_, in.fixture_point_m).energy_J;
     centre_m_ += low_pass_part(in.dt_s, params_.ramp_s / 4) * (target - centre_m_);
   }
   ramp_.step(in.cell_known, params_.ramp_s, params_.ramp_s, in.dt_s);

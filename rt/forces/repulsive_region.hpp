@@ -40,8 +40,8 @@ class RepulsiveRegion {
  public:
   using Params = RepulsiveParams;
 
-  RepulsiveRegion(const RepulsiveParams& params, const EffectSetup& /*setup*/) NONBLOCKING
-      : params_(params) {}
+  RepulsiveRegion(const RepulsiveParams& params, const EffectSetup& /*setup*/) NONBLOCKING : params_(params) {
+  }
 
   // On while the cell is known: the region follows its place in the cell and its gain rises or falls, both
   // over ramp_s.

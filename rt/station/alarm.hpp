@@ -25,9 +25,9 @@ enum Alarm : std::uint32_t {
   alarm_forbidden_region = 1U << 15,    // dish floor or holding pipette hold the needle
 };
 inline constexpr const char* kAlarmNames[] = {  // by bit
-    "vision_stale",      "force_limited",      "depth_limited",   "travel_limited", "tip_force",
-    "model_invalid",     "phase_timeout",      "overrun",         "sensor",         "degraded",
-    "stiffness_reduced", "vision_implausible", "lateral_limited", "not_enabled",    "injection_refused",
-    "forbidden_region"};
+    "vision_stale",    "force_limited", "depth_limited",     "travel_limited",
+    "tip_force",       "model_invalid", "phase_timeout",     "overrun",
+    "sensor",          "degraded",      "stiffness_reduced", "vision_implausible",
+    "lateral_limited", "not_enabled",   "injection_refused", "forbidden_region"};
 
 }  // namespace punctum::rt

@@ -30,9 +30,8 @@ inline constexpr int kCommandKinds = 7;
 
 // As report.json has it.
 [[nodiscard]] constexpr const char* name(Command::Kind kind) NONBLOCKING {
-  constexpr const char* names[] = {"none",        "stop",        "end",
-                                   "force_scale", "effect_gain", "hand_force_limit",
-                                   "position_scale"};
+  constexpr const char* names[] = {
+      "none", "stop", "end", "force_scale", "effect_gain", "hand_force_limit", "position_scale"};
   static_assert(sizeof names == kCommandKinds * sizeof names[0]);
   return names[static_cast<int>(kind)];
 }
@@ -55,9 +54,9 @@ struct CommandWriter {
 };
 inline constexpr CommandWriter kParent = {"parent", kinds(Command::stop, Command::end, Command::force_scale)};
 // Whoever operates the running station from outside.
-inline constexpr CommandWriter kConsole = {"console", kinds(Command::stop, Command::end, Command::force_scale,
-                                                            Command::effect_gain, Command::hand_force_limit,
-                                                            Command::position_scale)};
+inline constexpr CommandWriter kConsole = {
+    "console", kinds(Command::stop, Command::end, Command::force_scale, Command::effect_gain,
+                     Command::hand_force_limit, Command::position_scale)};
 
 // Everybody who may ask, in the order in which the core takes their commands. The place in this table is the
 // writer's number in an event.

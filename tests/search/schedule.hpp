@@ -226,7 +226,8 @@ inline Schedule random_schedule(std::uint64_t seed, std::uint64_t number) {
       const int at = random.below(s.ticks);
       s.events.push_back({at, 1, Lie::command_position_scale, random.log_uniform(200, 1200), 0});
       if (random.chance(0.7)) {
-        s.events.push_back({std::max(at - 50, 0) + random.below(200), random.duration(20, 400), Lie::clutches, 1, 0});
+        s.events.push_back(
+            {std::max(at - 50, 0) + random.below(200), random.duration(20, 400), Lie::clutches, 1, 0});
       }
     }
   }

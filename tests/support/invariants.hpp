@@ -147,8 +147,8 @@ template <class Limits>
   return std::numeric_limits<double>::infinity();
 }
 
-// How far the needle's glass, its tip there, is from the floor and from the holder of a scene, less the clearance:
-// ball by ball along the shaft.
+// How far the needle's glass, its tip there, is from the floor and from the holder of a scene, less the
+// clearance: ball by ball along the shaft.
 [[nodiscard]] inline double to_regions_m(const ForbiddenParams& regions, const hal::Vec3& tip_m,
                                          const hal::Vec3& axis, int balls = 400, double shaft_m = 2e-3) {
   double least_m = std::numeric_limits<double>::infinity();
@@ -159,9 +159,8 @@ template <class Limits>
   for (int i = 0; regions.holder && i <= balls; ++i) {
     const double part = i / static_cast<double>(balls);
     const double behind_m = shaft_m * part * part;
-    const double radius_m =
-        regions.tip_radius_m +
-        std::min(behind_m / regions.taper_m, 1.0) * (regions.shaft_radius_m - regions.tip_radius_m);
+    const double radius_m = regions.tip_radius_m + std::min(behind_m / regions.taper_m, 1.0) *
+                                                       (regions.shaft_radius_m - regions.tip_radius_m);
     const hal::Vec3 V = tip_m - behind_m * axis - regions.holder->mouth_m;
     const double depth_m = V.dot(regions.holder->axis);
     const double beside_m = V.cross(regions.holder->axis).norm() - regions.holder->radius_m;
@@ -198,8 +197,8 @@ struct Bounds {
   double lateral_m = lateral_limit_m(c.limits) + 2e-6;  // the tip follows the set-point late
   double jerk_m_s3 = jerk_limit_m_s3(c.limits);
   double shortest_opening_s = 0.02;
-  double brake_s = 0.03;  // v/a, and two periods of the slowest check
-  double relay_s = 0.02;  // beyond the stop's own time
+  double brake_s = 0.03;      // v/a, and two periods of the slowest check
+  double relay_s = 0.02;      // beyond the stop's own time
   double region_m = 0.05e-6;  // the checker's balls are up to 10 um apart
   double nearer_m = 3e-6;     // a needle comes to a region per tick, by its way and its tilt
   int punctured_frames = 2;

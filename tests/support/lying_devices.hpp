@@ -200,8 +200,8 @@ struct Event {
 };
 
 // Icsi with everything that has a place in the servo, and cells without end. Set-up 1: twice as fast, with
-// real actuators, an enabling device and a force sensor. Set-up 2: a dish floor and a holding pipette that the
-// hand reaches, beside the way to the cell, and a position scale that commands may change.
+// real actuators, an enabling device and a force sensor. Set-up 2: a dish floor and a holding pipette that
+// the hand reaches, beside the way to the cell, and a position scale that commands may change.
 inline ServoConfig searched_config(int setup = 0) {
   ServoConfig c;
   c.membrane.emplace();

@@ -10,7 +10,7 @@
 namespace punctum::report {
 namespace {
 
-const std::set<std::string> kEffects = {"membrane",  "cone",     "axis",     "damping",
+const std::set<std::string> kEffects = {"membrane",  "cone",     "axis",      "damping",
                                         "repulsive", "friction", "vibration", "forbidden"};
 
 std::vector<std::string> effects_of(const tools::Scene& scene) {

@@ -359,10 +359,11 @@ Found check_forbidden(const rt::ForbiddenParams& forbidden, const sim::StagePara
   }
   const double kept_m = forbidden.clearance_m + forbidden.tip_radius_m;
   if (forbidden.holder && forbidden.felt_m > kept_m) {
-    return Problem{"forbidden.felt_um",
-                   fmt::format("the holder's edge would be stiffer than K_N_m, allowed: at most clearance_um + "
-                               "tip_radius_um = {:g}",
-                               um(kept_m))};
+    return Problem{
+        "forbidden.felt_um",
+        fmt::format("the holder's edge would be stiffer than K_N_m, allowed: at most clearance_um + "
+                    "tip_radius_um = {:g}",
+                    um(kept_m))};
   }
   if (forbidden.floor && std::abs(forbidden.floor->z_m) <= kept_m) {
     return Problem{"forbidden.floor.z_um",
@@ -387,14 +388,16 @@ Found check_forbidden(const rt::ForbiddenParams& forbidden, const sim::StagePara
 
 Found check_position_scale(const rt::MappingParams& m) {
   if (m.position_scale_min != 0 && (m.position_scale_min < 1 || m.position_scale_min > m.position_scale)) {
-    return Problem{"mapping.position_scale_min",
-                   fmt::format("{:g} is no lower bound, allowed: 0 (no less), or from 1 to position_scale = {:g}",
-                               m.position_scale_min, m.position_scale)};
+    return Problem{
+        "mapping.position_scale_min",
+        fmt::format("{:g} is no lower bound, allowed: 0 (no less), or from 1 to position_scale = {:g}",
+                    m.position_scale_min, m.position_scale)};
   }
   if (m.position_scale_max != 0 && m.position_scale_max < m.position_scale) {
-    return Problem{"mapping.position_scale_max",
-                   fmt::format("{:g} is no upper bound, allowed: 0 (no more), or from position_scale = {:g} on",
-                               m.position_scale_max, m.position_scale)};
+    return Problem{
+        "mapping.position_scale_max",
+        fmt::format("{:g} is no upper bound, allowed: 0 (no more), or from position_scale = {:g} on",
+                    m.position_scale_max, m.position_scale)};
   }
   return std::nullopt;
 }

@@ -1,4 +1,5 @@
-// No set-point enters a forbidden region, whatever the targets are. Distances are the test's own, ball by ball.
+// No set-point enters a forbidden region, whatever the targets are. Distances are the test's own, ball by
+// ball.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -28,7 +29,9 @@ struct Driven {
       : regions(p), limits(LimitParams{}, MappingParams{}, rate_Hz, p) {
     limits.restart(from, -Vec3::UnitX());
   }
-  double to_regions() const { return to_regions_m(regions, limits.set_point().tip_m, limits.set_point().axis); }
+  double to_regions() const {
+    return to_regions_m(regions, limits.set_point().tip_m, limits.set_point().axis);
+  }
   void go(const Vec3& to, int ticks, const StageConstraint& c = {}, const Vec3& axis = -Vec3::UnitX()) {
     for (int k = 0; k < ticks; ++k) {
       limits.step({to, axis}, c);

@@ -96,7 +96,8 @@ TEST(ForbiddenWalls, push_away_with_the_force_of_their_energy) {
     const double h = 1e-8;
     Vec3 slope;
     for (int k = 0; k < 3; ++k) {
-      slope[k] = (energy_J(tip + h * Vec3::Unit(k)) - energy_J(tip - h * Vec3::Unit(k))) / (2 * h) / in.position_scale;
+      slope[k] = (energy_J(tip + h * Vec3::Unit(k)) - energy_J(tip - h * Vec3::Unit(k))) / (2 * h) /
+                 in.position_scale;
     }
     EXPECT_LT((out.storing_N + slope).norm(), 2e-3) << i;
     felt += out.storing_N.norm() > 0.01 ? 1 : 0;
@@ -124,7 +125,8 @@ TEST(ForbiddenWalls, give_back_no_more_than_was_put_in_but_what_they_count) {
   Vec3 last_handle_m = Vec3::Zero(), last_N = Vec3::Zero();
   for (int k = 0; k < 5000; ++k) {
     const double t = k * 1e-3;
-    EffectInput in = at(Vec3(-75e-6 - 12e-6 * std::sin(6 * t), 20e-6 * std::sin(5 * t), 45e-6 + 11e-6 * std::sin(4 * t)));
+    EffectInput in =
+        at(Vec3(-75e-6 - 12e-6 * std::sin(6 * t), 20e-6 * std::sin(5 * t), 45e-6 + 11e-6 * std::sin(4 * t)));
     in.needle_axis = Vec3(-1, 0.1 * std::sin(3 * t), 0).normalized();
     in.coupling_gain = 0.5 + 0.5 * std::cos(2 * t);
     const EffectOutput out = walls.step(in);

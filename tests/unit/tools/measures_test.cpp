@@ -72,7 +72,8 @@ TEST(Measures, the_least_clearance_is_that_of_tip_and_shaft_from_floor_and_holde
     world.stage.axis = hal::Vec3(-1, 0, 0);
     m.tick(s, &world);
   };
-  // The needle's tip is 3.8 um thick, its shaft 9 um 160 um behind it; the mouth is at x = -100, 45 um in radius.
+  // The needle's tip is 3.8 um thick, its shaft 9 um 160 um behind it; the mouth is at x = -100, 45 um in
+  // radius.
   at(0, 0, 20);
   EXPECT_NEAR(*m.least_floor_m, (65 - 20 - 3.8) * 1e-6, 1e-12);
   EXPECT_NEAR(*m.least_holder_m, (100 - 3.8) * 1e-6, 1e-12);

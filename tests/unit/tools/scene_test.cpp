@@ -63,7 +63,8 @@ const std::vector<Broken>& broken() {
       "enabling, "
       "sim";
   static const std::string sim_tables =
-      "sim.operator, sim.haptic, sim.stage, sim.needle, sim.estop, sim.cell, sim.holder, sim.dish, sim.injector, "
+      "sim.operator, sim.haptic, sim.stage, sim.needle, sim.estop, sim.cell, sim.holder, sim.dish, "
+      "sim.injector, "
       "sim.force_sensor, sim.camera, sim.failure, sim.estop_press";
   static const std::vector<Broken> list = {
       {"nothing at all", "",

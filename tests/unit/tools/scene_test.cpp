@@ -568,19 +568,21 @@ TEST(Scene, overrides_are_read_and_checked_as_the_file_is) {
        "--set: operator.depth_um: unknown key (did you mean sim.operator.depth_um?), allowed: tables scene, "
        "servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, velocity, mapping, limits, "
        "vision, "
-       "phases, local_model, membrane, cone, axis, damping, repulsive, friction, vibration, guard, enabling, "
+       "phases, local_model, membrane, cone, axis, damping, repulsive, friction, vibration, forbidden, "
+       "guard, enabling, "
        "sim"},
       {"cell.inner.gap_um=4",
        "--set: cell.inner.gap_um: unknown key (did you mean sim.cell.inner.gap_um?), allowed: tables scene, "
        "servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, velocity, mapping, limits, "
        "vision, "
-       "phases, local_model, membrane, cone, axis, damping, repulsive, friction, vibration, guard, enabling, "
+       "phases, local_model, membrane, cone, axis, damping, repulsive, friction, vibration, forbidden, "
+       "guard, enabling, "
        "sim"},
       {"cell=off",
        "--set: cell: unknown table (did you mean sim.cell?), allowed: scene, servo, haptic, stage, estop, "
        "vacuum, injector, force_sensor, camera, velocity, mapping, limits, vision, phases, local_model, "
        "membrane, "
-       "cone, axis, damping, repulsive, friction, vibration, guard, enabling, sim"},
+       "cone, axis, damping, repulsive, friction, vibration, forbidden, guard, enabling, sim"},
       {"damping.B2_Ns_m=0.5",
        "--set: damping.B2_Ns_m: is below the damping outside, allowed: at least B1_Ns_m = 1"},
       {"damping.B2_Ns_m=", "--set: damping.B2_Ns_m: not valid TOML: expected value, saw '\\n'"},

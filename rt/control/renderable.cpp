@@ -12,7 +12,7 @@ namespace punctum::rt {
 namespace {
 
 using What = NotRenderable::What;
-using Springs = std::array<Spring, 5>;
+using Springs = std::array<Spring, 4>;
 
 // Damping that would make the handle itself swing.
 std::optional<NotRenderable> find_damping(const ServoConfig& config) NONBLOCKING {
@@ -128,13 +128,19 @@ std::optional<NotRenderable> find_stiffness(const ServoConfig& config) NONBLOCKI
   const Spring wall{forbidden, config.forbidden ? config.forbidden->K_N_m : 0};
   const double B1 = config.damping ? config.damping->B1_Ns_m : 0;
   const double B2 = config.damping ? config.damping->B2_Ns_m : 0;
-  const Springs outside{Spring{cone, cone_N_m}, membrane_spring, repulsive_spring, friction_spring, wall};
+  const Springs outside{Spring{cone, cone_N_m}, membrane_spring, repulsive_spring, friction_spring};
   if (const auto found = find_springs(config, outside, B1)) {
+    return found;
+  }
+  // Glass stands beside the cell, where its cone, membrane and axis have ended. Where they overlap all the
+  // same, the guard takes the sum.
+  const Springs at_glass{wall, repulsive_spring, friction_spring};
+  if (const auto found = find_springs(config, at_glass, B1)) {
     return found;
   }
   const Crossing crossing = stiffest_crossing(config, cone_N_m);
   const Springs inside{Spring{axis, crossing.axis_N_m}, Spring{cone, crossing.cone_N_m}, repulsive_spring,
-                       friction_spring, wall};
+                       friction_spring};
   const double inward = config.axis ? config.axis->B_inward_Ns_m : 0;
   for (const double B : {B1, B2, B2 + inward}) {
     if (const auto found = find_springs(config, inside, B)) {

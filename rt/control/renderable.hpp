@@ -32,7 +32,7 @@ struct NotRenderable {
   double asked = 0;
   double most = 0;
   double beside_Ns_m = 0;
-  std::array<Spring, 5> springs{};  // that act at once
+  std::array<Spring, 4> springs{};  // that act at once
   int spring_count = 0;
   Spring::Of stiffest{};
 };

@@ -139,6 +139,13 @@ constexpr auto keys_of(const HolderParams*) {
                    hal::micro("drop_um", &HolderParams::drop_m, -500, 500));
 }
 
+struct DishParams {
+  double floor_m = 65e-6;  // its height along the optical axis; the picture's plane, z = 0, is above it
+};
+constexpr auto keys_of(const DishParams*) {
+  return hal::keys(hal::micro("floor_um", &DishParams::floor_m, -1e5, 1e5));
+}
+
 struct NeedleParams {
   double radius_m = 3.8e-6;      // c
   double shaft_radius_m = 9e-6;  // far from the tip
@@ -319,6 +326,7 @@ struct SimConfig {
   NeedleParams needle;
   std::optional<CellParams> cell;
   std::optional<HolderParams> holder;
+  std::optional<DishParams> dish;
   std::optional<InjectorParams> injector;
   std::optional<ForceSensorParams> force_sensor;
   std::optional<MicroscopeParams> microscope;

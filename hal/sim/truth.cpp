@@ -1,6 +1,8 @@
 #include "hal/sim/truth.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace punctum::sim {
 namespace {
@@ -15,6 +17,40 @@ std::optional<Vec3> holder_mouth(const SimConfig& config) noexcept {
     return Vec3(kBareMouth_m, config.holder->drop_m, 0);
   }
   return Vec3(config.cell->centre_m + Vec3(-config.cell->R_m, config.holder->drop_m, 0));
+}
+
+// The needle is taken as balls on its axis, closer together near the tip.
+GlassClearance glass_clearance(const SimConfig& config, const Snapshot& s) noexcept {
+  GlassClearance out;
+  const Vec3 tip_m = s.stage.tip_m, axis = s.stage.axis;
+  const NeedleParams& needle = config.needle;
+  if (config.dish) {
+    const double below_m = config.dish->floor_m - tip_m.z();
+    out.floor_m = (config.dish->floor_m > 0 ? below_m : -below_m) - needle.radius_m;
+  }
+  const std::optional<Vec3> mouth_m = holder_mouth(config);
+  if (!mouth_m) {
+    return out;
+  }
+  constexpr int kBalls = 200;
+  constexpr double kShaft_m = 5e-3;
+  double least_m = std::numeric_limits<double>::max();
+  for (int i = 0; i <= kBalls; ++i) {
+    const double part = static_cast<double>(i) / kBalls;
+    const double behind_m = part * part * kShaft_m;
+    const double grown = behind_m < needle.taper_m ? behind_m / needle.taper_m : 1;
+    const double radius_m = needle.radius_m + grown * (needle.shaft_radius_m - needle.radius_m);
+    // The holder leads from its mouth to -x.
+    const Vec3 at_m = tip_m - behind_m * axis - *mouth_m;
+    const double before_m = at_m.x();
+    const double beside_m =
+        std::sqrt(at_m.y() * at_m.y() + at_m.z() * at_m.z()) - config.holder->outer_radius_m;
+    const double out_m = before_m > 0 && beside_m > 0 ? std::sqrt(before_m * before_m + beside_m * beside_m)
+                                                      : std::max(before_m, beside_m);
+    least_m = std::min(least_m, out_m - radius_m);
+  }
+  out.holder_m = least_m;
+  return out;
 }
 
 Truth truth_of(const SimConfig& config, const Snapshot& s) noexcept {

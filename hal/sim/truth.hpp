@@ -41,6 +41,14 @@ struct Truth {
   std::optional<Vec3> holder_mouth_m;
 };
 
+// The shortest way from the needle's glass, tip and shaft, to other glass; < 0: they touch. The simulated
+// plant feels nothing of it: the needle goes through.
+struct GlassClearance {
+  std::optional<double> floor_m;   // of the tip, from the dish floor
+  std::optional<double> holder_m;  // of tip and shaft, from the holding pipette
+};
+[[nodiscard]] GlassClearance glass_clearance(const SimConfig& config, const Snapshot& snapshot) noexcept;
+
 // Contours need the cell's tables: keep a Cell(params, needle, holder, seed, cell_index), renew() it when
 // snapshot.cell_index changes, and call its contour(snapshot.cell, ...).
 [[nodiscard]] Truth truth_of(const SimConfig& config, const Snapshot& snapshot) noexcept;

@@ -14,6 +14,14 @@ constexpr double kRounding_m = 1e-15;
 // Part of the acceleration that the approach to a target plans with; the rest is for what it did not foresee.
 constexpr double kPlanned = 0.8;
 constexpr double kFinestPart = 1e-3;
+constexpr double kSurface_m = 1e-9;  // of a region: the needle is at it when nearer
+// Newton's steps double the digits; more are needed only where a way grazes an edge, and it may end early
+// there.
+constexpr int kSurfaceSteps = 12;
+// Of a place where a region meets another one or another limit.
+constexpr int kCornerRounds = 3;
+// Nearer to a region than this, the direction away from it is found anew on every tick.
+constexpr double kNear_m = 20e-6;
 
 [[nodiscard]] bool is_finite(const hal::Vec3& v) NONBLOCKING {
   return std::isfinite(v.x()) && std::isfinite(v.y()) && std::isfinite(v.z());
@@ -46,7 +54,8 @@ double Membrane3D::chord_m(const hal::Vec3& p) const NONBLOCKING {
   return 2 * std::sqrt(std::max(R_m * R_m - r2, 0.0));
 }
 
-StageLimits::StageLimits(const LimitParams& limits, const MappingParams& mapping, double rate_Hz) NONBLOCKING
+StageLimits::StageLimits(const LimitParams& limits, const MappingParams& mapping, double rate_Hz,
+                         const std::optional<ForbiddenParams>& forbidden) NONBLOCKING
     : limits_(limits),
       low_m_(mapping.workspace_min_m),
       high_m_(mapping.workspace_max_m),
@@ -59,6 +68,9 @@ StageLimits::StageLimits(const LimitParams& limits, const MappingParams& mapping
   // A speed turns into any other within 2 v/a.
   reach_m_ = limits.stage_velocity_m_s * (2 * limits.stage_velocity_m_s / hardest_m_s2_ + window_s);
   lag_s_ = window_s / 2;
+  if (forbidden) {
+    regions_.emplace(*forbidden);
+  }
 }
 
 void StageLimits::restart(const hal::Vec3& tip_m, const hal::Vec3& axis) NONBLOCKING {
@@ -70,6 +82,15 @@ void StageLimits::restart(const hal::Vec3& tip_m, const hal::Vec3& axis) NONBLOC
 }
 
 StageLimits::Checked StageLimits::check(const hal::Vec3& wanted_m, const StageConstraint& c) const
+    NONBLOCKING {
+  Checked out = check_cell(wanted_m, c);
+  if (regions_) {
+    keep_out(out, c);
+  }
+  return out;
+}
+
+StageLimits::Checked StageLimits::check_cell(const hal::Vec3& wanted_m, const StageConstraint& c) const
     NONBLOCKING {
   const hal::Vec3& here = set_point_.tip_m;
   Checked out{wanted_m, 0};
@@ -156,6 +177,96 @@ StageLimits::Checked StageLimits::check(const hal::Vec3& wanted_m, const StageCo
     }
   }
   return out;
+}
+
+// A convex body lies wholly behind a plane across any direction in which the needle is apart from it.
+// Newton's steps along the way come to its surface from outside and never pass it: no plane that they use
+// lets the needle through, and none takes away more than the last.
+StageLimits::FreeWay StageLimits::free_way(Region region, const hal::Vec3& to_m) const NONBLOCKING {
+  const hal::Vec3& from_m = set_point_.tip_m;
+  const hal::Vec3 way = to_m - from_m;
+  const auto apart_m = [&](const hal::Vec3& direction, const hal::Vec3& tip_m) {
+    return regions_->apart_m(region, direction, {tip_m, set_point_.axis});
+  };
+  FreeWay free;
+  free.away = away_[static_cast<std::size_t>(region)];
+  if (apart_m(free.away, from_m) >= 0 && apart_m(free.away, to_m) >= 0) {
+    return free;
+  }
+  double at = 0;
+  double level_m = 0;
+  for (int i = 0; i < kSurfaceSteps; ++i) {
+    const hal::Vec3 tip_m = from_m + at * way;
+    free.away = regions_->away(region, {tip_m, set_point_.axis});
+    const double here_m = apart_m(free.away, tip_m);
+    const double along_m = free.away.dot(way);
+    if (i == 0 && here_m < -2 * kSurface_m) {
+      level_m = here_m;  // inside already: no further in
+    }
+    free.beyond_m = level_m - (here_m + (1 - at) * along_m);
+    if (free.beyond_m <= (level_m < 0 ? 0 : kSurface_m)) {
+      return {};
+    }
+    free.part = at;
+    if (here_m - level_m < kSurface_m) {
+      break;
+    }
+    at += (here_m - level_m) / -along_m;
+  }
+  return free;
+}
+
+void StageLimits::keep_out(Checked& out, const StageConstraint& c) const NONBLOCKING {
+  const hal::Vec3& here = set_point_.tip_m;
+  for (int round = 0; round < kCornerRounds; ++round) {
+    bool held = false;
+    for (const Region region : kRegions) {
+      if (!regions_->has(region)) {
+        continue;
+      }
+      const FreeWay free = free_way(region, out.point_m);
+      if (free.part >= 1) {
+        continue;
+      }
+      held = true;
+      out.alarms |= alarm_forbidden_region;
+      if (c.withdrawal_only || round + 1 == kCornerRounds) {
+        // The way back leads along its line alone; and where limits meet, the needle stops.
+        out.point_m = here + free.part * (out.point_m - here);
+      } else {
+        out.point_m += free.beyond_m * free.away;
+      }
+    }
+    if (!held || c.withdrawal_only) {
+      return;
+    }
+    if (round + 1 < kCornerRounds) {
+      const Checked again = check_cell(out.point_m, c);
+      out.point_m = again.point_m;
+      out.alarms |= again.alarms;
+    }
+  }
+}
+
+// Whether the needle may be turned to this axis where it is: not into a region, nor further into one.
+bool StageLimits::may_point(const hal::Vec3& axis) const NONBLOCKING {
+  for (const Region region : kRegions) {
+    if (!regions_->has(region)) {
+      continue;
+    }
+    const hal::Vec3& tip_m = set_point_.tip_m;
+    const NeedlePose turned{tip_m, axis};
+    if (regions_->apart_m(region, away_[static_cast<std::size_t>(region)], turned) >= 0) {
+      continue;
+    }
+    const NeedlePose now{tip_m, set_point_.axis};
+    const double now_m = regions_->apart_m(region, regions_->away(region, now), now);
+    const double turned_m = regions_->apart_m(region, regions_->away(region, turned), turned);
+    if (turned_m < std::min(now_m, 0.0)) {
+      return false;
+    }
+  }
+  return true;
 }
 
 std::uint32_t StageLimits::keep_to_line(hal::Vec3& point_m, const FixtureFrame& line) const NONBLOCKING {
@@ -255,6 +366,15 @@ void StageLimits::settle(const hal::Vec3& wanted_m, const hal::Vec3& held_m) NON
 const hal::StageCommand& StageLimits::step(const hal::StageCommand& target, const StageConstraint& c)
     NONBLOCKING {
   alarms_ = 0;
+  for (const Region region : kRegions) {
+    if (regions_ && regions_->has(region)) {
+      hal::Vec3& away = away_[static_cast<std::size_t>(region)];
+      const NeedlePose needle{set_point_.tip_m, set_point_.axis};
+      if (regions_->apart_m(region, away, needle) < kNear_m) {
+        away = regions_->away(region, needle);
+      }
+    }
+  }
   finite_ = is_finite(target.tip_m) && is_finite(target.axis);
   if (c.frozen) {
     restart(set_point_.tip_m, set_point_.axis);
@@ -286,7 +406,7 @@ const hal::StageCommand& StageLimits::step(const hal::StageCommand& target, cons
   const hal::Vec3 turn = shortened(target.axis - set_point_.axis, kTiltSpeed_rad_s * dt_s_);
   const hal::Vec3 axis = set_point_.axis + turn;
   const double length = axis.norm();
-  if (length > 0.5) {
+  if (length > 0.5 && (!regions_ || may_point(axis / length))) {
     set_point_.axis = axis / length;
   }
   return set_point_;

@@ -1,7 +1,9 @@
 // What the needle and the hand may do. Checked on every set-point and on every force, after everything else.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <iterator>
 #include <limits>
 #include <optional>
 
@@ -11,6 +13,7 @@
 #include "rt/control/master_to_stage.hpp"
 #include "rt/control/moving_average.hpp"
 #include "rt/forces/fixture.hpp"
+#include "rt/forces/forbidden_regions.hpp"
 
 namespace punctum::rt {
 
@@ -81,7 +84,8 @@ struct StageConstraint {
 // another.
 class StageLimits {
  public:
-  StageLimits(const LimitParams& limits, const MappingParams& mapping, double rate_Hz) NONBLOCKING;
+  StageLimits(const LimitParams& limits, const MappingParams& mapping, double rate_Hz,
+              const std::optional<ForbiddenParams>& forbidden = std::nullopt) NONBLOCKING;
 
   void restart(const hal::Vec3& tip_m, const hal::Vec3& axis) NONBLOCKING;  // at rest there
 
@@ -109,6 +113,18 @@ class StageLimits {
   [[nodiscard]] bool finite() const NONBLOCKING { return finite_; }           // the last target was
 
  private:
+  // Workspace, cell and line of insertion.
+  [[nodiscard]] Checked check_cell(const hal::Vec3& wanted_m, const StageConstraint& c) const NONBLOCKING;
+  void keep_out(Checked& out, const StageConstraint& c) const NONBLOCKING;
+  // A way of the tip that begins at the set-point: how much of it keeps out of the region, and what lies
+  // beyond the plane before which the region ends it.
+  struct FreeWay {
+    double part = 1;
+    double beyond_m = 0;  // of the whole way
+    hal::Vec3 away = hal::Vec3::UnitX();
+  };
+  [[nodiscard]] FreeWay free_way(Region region, const hal::Vec3& to_m) const NONBLOCKING;
+  [[nodiscard]] bool may_point(const hal::Vec3& axis) const NONBLOCKING;
   // The set-point was held at held_m instead: its way across that limit begins from rest.
   void settle(const hal::Vec3& wanted_m, const hal::Vec3& held_m) NONBLOCKING;
   void advance(const hal::Vec3& goal_m, const StageConstraint& c) NONBLOCKING;
@@ -120,6 +136,9 @@ class StageLimits {
   LimitParams limits_;
   hal::Vec3 low_m_;
   hal::Vec3 high_m_;
+  std::optional<ForbiddenRegions> regions_;
+  // Directions in which needle and regions lie apart: as long as they do, nothing more is computed.
+  std::array<hal::Vec3, std::size(kRegions)> away_{hal::Vec3::UnitX(), hal::Vec3::UnitX()};
   double dt_s_;
   double hardest_m_s2_;  // of which the window bounds the jerk
   double reach_m_;       // on its way to a new speed the needle gets no further

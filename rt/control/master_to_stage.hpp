@@ -13,15 +13,26 @@ namespace punctum::rt {
 
 struct MappingParams {
   double position_scale = 500;    // k_p: hand metres per needle metre
+  double position_scale_min = 0;  // what a command may change it to; 0 = as position_scale
+  double position_scale_max = 0;
   double force_scale = 1e5;       // k_f: hand newtons per needle newton
   double tremor_cutoff_Hz = 3.0;  // second-order low-pass on the set-point; 0 = off
   double coupling_s = 0.3;        // forces return over this after a start, a clutch, a reset
   double max_tilt_rad = 0.1;      // the handle's orientation tilts the approach axis up to this; 0 = off
   hal::Vec3 workspace_min_m{-280e-6, -180e-6, -60e-6};  // of the needle tip, world frame
   hal::Vec3 workspace_max_m{280e-6, 180e-6, 60e-6};
+
+  [[nodiscard]] constexpr double least_position_scale() const NONBLOCKING {
+    return position_scale_min > 0 ? position_scale_min : position_scale;
+  }
+  [[nodiscard]] constexpr double most_position_scale() const NONBLOCKING {
+    return position_scale_max > 0 ? position_scale_max : position_scale;
+  }
 };
 constexpr auto keys_of(const MappingParams*) {
   return hal::keys(hal::real("position_scale", &MappingParams::position_scale, 1, 1e5),
+                   hal::real("position_scale_min", &MappingParams::position_scale_min, 0, 1e5),
+                   hal::real("position_scale_max", &MappingParams::position_scale_max, 0, 1e5),
                    hal::real("force_scale", &MappingParams::force_scale, 0, 1e7),
                    hal::real("tremor_cutoff_hz", &MappingParams::tremor_cutoff_Hz, 0, 100),
                    hal::real("max_tilt_rad", &MappingParams::max_tilt_rad, 0, 0.5),
@@ -43,6 +54,11 @@ class MasterToStage {
   // One tick. coupled = false (clutch): the hand moves freely, hand_point() stays. tilting = false: the axis
   // stays.
   void step(const hal::HandState& hand, bool coupled, bool tilting) NONBLOCKING;
+
+  // Hand metres per needle metre from here on. While hand and needle are uncoupled: the hand's way so far
+  // would move the needle otherwise.
+  void set_position_scale(double scale) NONBLOCKING { params_.position_scale = scale; }
+  [[nodiscard]] double position_scale() const NONBLOCKING { return params_.position_scale; }
 
   // Moves the anchor so that hand_point() is `to`: at a limit the hand slips, nothing winds up.
   void slip(const hal::Vec3& to) NONBLOCKING;

@@ -47,7 +47,7 @@ double membrane_stiffness_N_m(const ServoConfig& config) NONBLOCKING {
     return 0;
   }
   constexpr int kSteps = 200;
-  const double k_p = config.mapping.position_scale;
+  const double k_p = config.mapping.least_position_scale();
   const double k_f = config.mapping.force_scale;
   double largest = 0;
   for (int i = 1; i <= kSteps; ++i) {
@@ -125,10 +125,17 @@ std::optional<NotRenderable> find_stiffness(const ServoConfig& config) NONBLOCKI
   const Spring membrane_spring{membrane, membrane_stiffness_N_m(config)};
   const Spring repulsive_spring{repulsive, config.repulsive ? config.repulsive->K_N_m : 0};
   const Spring friction_spring{friction, config.friction ? config.friction->K_N_m : 0};
+  const Spring wall{forbidden, config.forbidden ? config.forbidden->K_N_m : 0};
   const double B1 = config.damping ? config.damping->B1_Ns_m : 0;
   const double B2 = config.damping ? config.damping->B2_Ns_m : 0;
   const Springs outside{Spring{cone, cone_N_m}, membrane_spring, repulsive_spring, friction_spring};
   if (const auto found = find_springs(config, outside, B1)) {
+    return found;
+  }
+  // Glass stands beside the cell, where its cone, membrane and axis have ended. Where they overlap all the
+  // same, the guard takes the sum.
+  const Springs at_glass{wall, repulsive_spring, friction_spring};
+  if (const auto found = find_springs(config, at_glass, B1)) {
     return found;
   }
   const Crossing crossing = stiffest_crossing(config, cone_N_m);
@@ -153,7 +160,7 @@ std::optional<NotRenderable> find_not_renderable(const ServoConfig& config) NONB
 }
 
 double stage_click_N(const ServoConfig& config, double stage_step_m) NONBLOCKING {
-  return membrane_stiffness_N_m(config) * config.mapping.position_scale * stage_step_m;
+  return membrane_stiffness_N_m(config) * config.mapping.least_position_scale() * stage_step_m;
 }
 
 }  // namespace punctum::rt

@@ -14,7 +14,7 @@
 namespace punctum::rt {
 
 struct Spring {
-  enum class Of : std::uint8_t { cone, membrane, axis, repulsive, friction };
+  enum class Of : std::uint8_t { cone, membrane, axis, repulsive, friction, forbidden };
   Of of{};
   double K_N_m = 0;  // at the hand
 };

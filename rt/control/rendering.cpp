@@ -10,9 +10,7 @@ constexpr double kFadeOut_s = 0.05;     // when the clutch is pressed or the run
 constexpr double kStiffnessKept = 0.9;  // of the commanded one; less raises an alarm
 
 [[nodiscard]] EffectSetup setup_of(const ServoConfig& config) NONBLOCKING {
-  return {.position_scale = config.mapping.position_scale,
-          .force_scale = config.mapping.force_scale,
-          .force_delay_ticks = config.device.delay_ticks};
+  return {.force_scale = config.mapping.force_scale, .force_delay_ticks = config.device.delay_ticks};
 }
 
 }  // namespace
@@ -34,7 +32,9 @@ const EffectSum& Rendering::sum_effects(const RenderInput& in, const Readings& r
                    in.dt_s);
   needle_fade_.step(holding && !clutch, return_s_, kFadeOut_s, in.dt_s);
   e.force_fade = force_fade_.gain();
-  e.fixture_gain = needle_fade_.gain() * cell.force_gain;
+  e.coupling_gain = needle_fade_.gain();
+  e.fixture_gain = e.coupling_gain * cell.force_gain;
+  e.position_scale = in.position_scale;
   e.commanded_scale = in.commanded_scale;
   e.dt_s = in.dt_s;
 
@@ -42,6 +42,7 @@ const EffectSum& Rendering::sum_effects(const RenderInput& in, const Readings& r
   e.handle_velocity_m_s = world_from_hand(in.hand_velocity_m_s);
   e.fixture_point_m = in.hand_point_m;
   e.needle_tip_m = readings.has_stage ? readings.stage.tip_m : in.hand_point_m;
+  e.needle_axis = in.needle_axis;
   e.approach_axis = cell.approach_axis;
 
   const Membrane3D& membrane = cell.membrane;

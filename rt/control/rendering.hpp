@@ -21,6 +21,8 @@ struct RenderInput {
   bool ending = false;
   hal::Vec3 hand_velocity_m_s = hal::Vec3::Zero();  // device frame
   hal::Vec3 hand_point_m = hal::Vec3::Zero();       // the hand at needle scale
+  hal::Vec3 needle_axis = -hal::Vec3::UnitX();      // as commanded
+  double position_scale = 500;
   double commanded_scale = 1;
   EffectGains effect_gain = kFullGains;
 };
@@ -41,6 +43,7 @@ class Rendering {
   void restart() NONBLOCKING { force_fade_.set(0); }  // the force returns by a ramp
 
   [[nodiscard]] bool faded() const NONBLOCKING { return force_fade_.at() == 0; }
+  [[nodiscard]] bool needle_faded() const NONBLOCKING { return needle_fade_.at() == 0; }
   [[nodiscard]] double guard_N() const NONBLOCKING { return guard_N_; }  // what the guard changed
   [[nodiscard]] const std::optional<Membrane>& membrane() const NONBLOCKING { return effects_.membrane(); }
   // The needle's force by the membrane law; 0 if the scene has none.

@@ -16,8 +16,11 @@ void approach(double& value, double target, double most) NONBLOCKING {
 Requests::Requests(const ServoConfig& config, Station& station) NONBLOCKING
     : station_(station),
       most_hand_force_N_(config.limits.hand_force_N),
+      least_position_scale_(config.mapping.least_position_scale()),
+      most_position_scale_(config.mapping.most_position_scale()),
       hand_force_target_N_(config.limits.hand_force_N) {
   requested_.hand_force_N = config.limits.hand_force_N;
+  requested_.position_scale = config.mapping.position_scale;
 #define PUNCTUM_EFFECT(name, Class) effect_exists_[effect_##name] = config.name.has_value();
   PUNCTUM_EFFECTS(PUNCTUM_EFFECT)
 #undef PUNCTUM_EFFECT
@@ -81,6 +84,12 @@ bool Requests::obey(const Command& command, CommandKinds role) NONBLOCKING {
         return false;
       }
       hand_force_target_N_ = command.value;
+      return true;
+    case Command::position_scale:
+      if (!(command.value >= least_position_scale_ && command.value <= most_position_scale_)) {
+        return false;
+      }
+      requested_.position_scale = command.value;
       return true;
     default:
       return false;

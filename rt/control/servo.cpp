@@ -75,7 +75,9 @@ std::uint32_t Servo::follow_hand(const TickTime& time, const Readings& readings,
        .clutched = readings.button(hal::kButtonClutch) || task_.ending(requested),
        .may_tilt = last_task.phase == Phase::free,
        .constraint = constraint(last_cell, last_task, requested, force_limits_.last_tip_force_soft()),
-       .elapsed_s = time.elapsed_s});
+       .elapsed_s = time.elapsed_s,
+       .position_scale = requested.position_scale,
+       .nothing_felt = rendering_.needle_faded()});
 }
 
 const CellFacts& Servo::take_newest_observation(const TickTime& time, const Readings& readings) NONBLOCKING {
@@ -102,6 +104,8 @@ const EffectSum& Servo::sum_force_effects(const TickTime& time, const Readings& 
                                  .ending = task_.ending(requested),
                                  .hand_velocity_m_s = velocity_m_s,
                                  .hand_point_m = stage_set_point_.hand_point_m(),
+                                 .needle_axis = stage_set_point_.set_point().axis,
+                                 .position_scale = stage_set_point_.position_scale(),
                                  .commanded_scale = requested.force_scale,
                                  .effect_gain = requested.effect_gain},
                                 readings, cell, task);

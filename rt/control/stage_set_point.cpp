@@ -20,9 +20,8 @@ constexpr double kLead_s = 0.2;
 
 StageSetPoint::StageSetPoint(const ServoConfig& config) NONBLOCKING
     : mapping_(config.mapping),
-      limits_(config.limits, config.mapping, config.rate_Hz),
-      lag_s_(limits_.lag_s() + mapping_.lag_s()),
-      slack_m_(kSlack_m / config.mapping.position_scale) {}
+      limits_(config.limits, config.mapping, config.rate_Hz, config.forbidden),
+      lag_s_(limits_.lag_s() + mapping_.lag_s()) {}
 
 std::uint32_t StageSetPoint::follow_hand(const Readings& readings, const FollowInput& in) NONBLOCKING {
   uncoupled_ = false;
@@ -30,6 +29,10 @@ std::uint32_t StageSetPoint::follow_hand(const Readings& readings, const FollowI
     return 0;
   }
   const bool holding = in.running && readings.stage_ready();
+  // While a fixture is felt, another scale would be another force.
+  if (in.nothing_felt && (!holding || !mapping_.anchored() || readings.button(hal::kButtonClutch))) {
+    mapping_.set_position_scale(in.position_scale);
+  }
   if (!holding || !mapping_.anchored() || readings.hand_begins) {
     anchor(readings);
     uncoupled_ = true;
@@ -55,7 +58,7 @@ std::uint32_t StageSetPoint::follow_hand(const Readings& readings, const FollowI
   if (in.constraint.withdrawal_only) {
     const hal::Vec3& inward = in.constraint.membrane.axis;
     const double in_vain_m = inward.dot(mapping_.hand_point() - allowed.point_m);
-    allowed.point_m += std::clamp(in_vain_m, 0.0, slack_m_) * inward;
+    allowed.point_m += std::clamp(in_vain_m, 0.0, kSlack_m / mapping_.position_scale()) * inward;
   }
   mapping_.slip(allowed.point_m);
   // A hand that was faster than the needle may be slips too: the needle does not go on for long after it.

@@ -19,7 +19,9 @@ struct FollowInput {
   bool clutched = false;  // the operator or the end of the run has uncoupled hand and needle
   bool may_tilt = true;   // the handle's orientation turns the approach axis
   StageConstraint constraint;
-  double elapsed_s = 0;  // since the last tick
+  double elapsed_s = 0;         // since the last tick
+  double position_scale = 500;  // as commanded
+  bool nothing_felt = false;    // of what stands at the needle, on the last tick
 };
 
 class StageSetPoint {
@@ -40,6 +42,7 @@ class StageSetPoint {
     return uncoupled_;
   }  // on this tick, by a stop or no power
   [[nodiscard]] const hal::Vec3& hand_point_m() const NONBLOCKING { return mapping_.hand_point(); }
+  [[nodiscard]] double position_scale() const NONBLOCKING { return mapping_.position_scale(); }
   // For the stage; null until hand and needle are coupled.
   [[nodiscard]] const hal::StageCommand* command() const NONBLOCKING {
     return anchored() ? &limits_.set_point() : nullptr;
@@ -51,8 +54,7 @@ class StageSetPoint {
 
   MasterToStage mapping_;
   StageLimits limits_;
-  double lag_s_;    // of the whole way from the hand to the set-point
-  double slack_m_;  // at needle scale
+  double lag_s_;  // of the whole way from the hand to the set-point
   bool uncoupled_ = false;
   bool last_withdrawal_only_ = false;
   bool last_hand_stuck_ = false;

@@ -149,11 +149,11 @@ EffectOutput ConeGuide::step(const EffectInput& in) NONBLOCKING {
   if (last_gain == 0) {
     frame_ = target;
   } else {
-    last_energy_J = last_gain * cone_pull(params_, scale_, frame_, in.fixture_point_m).energy_J;
+    last_energy_J = last_gain * cone_pull(params_, in.position_scale, frame_, in.fixture_point_m).energy_J;
     follow_frame(frame_, target, params_.ramp_s / 4, in.dt_s);
   }
   ramp_.step(on, params_.ramp_s, params_.ramp_s, in.dt_s);
-  const PotentialForce pull = cone_pull(params_, scale_, frame_, in.fixture_point_m);
+  const PotentialForce pull = cone_pull(params_, in.position_scale, frame_, in.fixture_point_m);
   stored_J_ = ramp_.gain() * pull.energy_J;
   const double last_injected_J = injected_J_;
   injected_J_ += stored_J_ - last_energy_J;

@@ -56,9 +56,8 @@ class ConeGuide {
  public:
   using Params = ConeParams;
 
-  ConeGuide(const ConeParams& params, const EffectSetup& setup) NONBLOCKING
+  ConeGuide(const ConeParams& params, const EffectSetup& /*setup*/) NONBLOCKING
       : params_(params),
-        scale_(setup.position_scale),
         stiffness_bound_N_m_(cone_stiffness_bound_N_m(params)) {}
 
   // On while the cell is known and not punctured: the frame follows the entry point and the gain rises or
@@ -72,7 +71,6 @@ class ConeGuide {
 
  private:
   ConeParams params_;
-  double scale_;
   double stiffness_bound_N_m_;
   FixtureFrame frame_;
   Ramp ramp_;

@@ -19,19 +19,22 @@ namespace punctum::rt {
 
 // What does not change during a run.
 struct EffectSetup {
-  double position_scale = 500;  // k_p: hand metres per needle metre
-  double force_scale = 1e5;     // k_f: hand newtons per needle newton
-  int force_delay_ticks = 0;    // a force acts this many ticks after it is written
+  double force_scale = 1e5;   // k_f: hand newtons per needle newton
+  int force_delay_ticks = 0;  // a force acts this many ticks after it is written
 };
 
 struct EffectInput {
   double dt_s = 0;  // bounded: what ramps advance by
+
+  // Changes only while no fixture is felt: fixture_gain and coupling_gain are zero then.
+  double position_scale = 500;  // k_p: hand metres per needle metre
 
   // Positions and velocity.
   hal::Vec3 handle_m = hal::Vec3::Zero();  // of the handle, as its encoders read
   hal::Vec3 handle_velocity_m_s = hal::Vec3::Zero();
   hal::Vec3 fixture_point_m = hal::Vec3::Zero();  // the handle at needle scale, after clutch and limits
   hal::Vec3 needle_tip_m = hal::Vec3::Zero();     // as the stage's encoders read; follows the handle late
+  hal::Vec3 needle_axis = -hal::Vec3::UnitX();    // unit, out of its tip, as the stage is told to point it
   hal::Vec3 approach_axis = -hal::Vec3::UnitX();  // unit, into the cell
 
   // The cell, as vision and the local membrane model know it.
@@ -53,6 +56,7 @@ struct EffectInput {
 
   // Gains, 0 .. 1.
   double fixture_gain = 0;     // of all effects at the needle: clutch, age of the observation
+  double coupling_gain = 0;    // the same without the age of the observation
   double commanded_scale = 1;  // command force_scale
   double force_fade = 0;       // of every force, applied to the sum: start, stop, end
   double last_force_fade = 0;

@@ -62,8 +62,7 @@ void fade(ForceParts& parts, double force_fade) NONBLOCKING {
 
 }  // namespace
 
-Effects::Effects(const EffectParams& params, const EffectSetup& setup) NONBLOCKING
-    : position_scale_(setup.position_scale) {
+Effects::Effects(const EffectParams& params, const EffectSetup& setup) NONBLOCKING {
 #define PUNCTUM_EFFECT(name, Class)       \
   if (params.name) {                      \
     name##_.emplace(*params.name, setup); \
@@ -94,8 +93,8 @@ const EffectSum& Effects::step(const EffectInput& in, const EffectGains& gain) N
 
   fade(parts, in.force_fade);
   parts.storing[static_cast<std::size_t>(EnergyPoint::fixture_point)].point_m =
-      position_scale_ * in.fixture_point_m;
-  parts.storing[static_cast<std::size_t>(EnergyPoint::needle)].point_m = position_scale_ * in.needle_tip_m;
+      in.position_scale * in.fixture_point_m;
+  parts.storing[static_cast<std::size_t>(EnergyPoint::needle)].point_m = in.position_scale * in.needle_tip_m;
   parts.storing[static_cast<std::size_t>(EnergyPoint::handle)].point_m = in.handle_m;
   parts.stiffness_N_m = in.force_fade * in.fixture_gain * fixtures.stiffness_N_m;
   sum_.force_fade = in.force_fade;

@@ -37,7 +37,6 @@ class Effects {
   [[nodiscard]] const std::optional<Membrane>& membrane() const NONBLOCKING { return membrane_; }
 
  private:
-  double position_scale_;
 #define PUNCTUM_EFFECT(name, Class) std::optional<Class> name##_;
   PUNCTUM_EFFECTS(PUNCTUM_EFFECT)
 #undef PUNCTUM_EFFECT

@@ -8,6 +8,7 @@
 #include "hal/realtime.hpp"
 #include "rt/forces/cone_guide.hpp"
 #include "rt/forces/damping.hpp"
+#include "rt/forces/forbidden_walls.hpp"
 #include "rt/forces/friction.hpp"
 #include "rt/forces/membrane.hpp"
 #include "rt/forces/repulsive_region.hpp"
@@ -23,7 +24,8 @@
   X(damping, Damping)           \
   X(repulsive, RepulsiveRegion) \
   X(friction, Friction)         \
-  X(vibration, Vibration)
+  X(vibration, Vibration)       \
+  X(forbidden, ForbiddenWalls)
 
 namespace punctum::rt {
 

@@ -174,7 +174,7 @@ EffectOutput Membrane::step(const EffectInput& in) NONBLOCKING {
   last_force_N_ = -force_N * in.approach_axis;
   rim_ = rim_forces(state_, force_N, in.approach_axis);
 
-  const double k_p = setup_.position_scale;
+  const double k_p = in.position_scale;
   EffectOutput out;
   out.point = EnergyPoint::needle;
   out.storing_N = last_force_N_;

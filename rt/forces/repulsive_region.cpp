@@ -32,11 +32,12 @@ EffectOutput RepulsiveRegion::step(const EffectInput& in) NONBLOCKING {
   if (last_gain == 0) {
     centre_m_ = target;
   } else {
-    last_energy_J = last_gain * repulsive_push(params_, scale_, centre_m_, in.fixture_point_m).energy_J;
+    last_energy_J =
+        last_gain * repulsive_push(params_, in.position_scale, centre_m_, in.fixture_point_m).energy_J;
     centre_m_ += low_pass_part(in.dt_s, params_.ramp_s / 4) * (target - centre_m_);
   }
   ramp_.step(in.cell_known, params_.ramp_s, params_.ramp_s, in.dt_s);
-  const PotentialForce push = repulsive_push(params_, scale_, centre_m_, in.fixture_point_m);
+  const PotentialForce push = repulsive_push(params_, in.position_scale, centre_m_, in.fixture_point_m);
   stored_J_ = ramp_.gain() * push.energy_J;
   const double last_injected_J = injected_J_;
   injected_J_ += stored_J_ - last_energy_J;

@@ -40,9 +40,8 @@ class RepulsiveRegion {
  public:
   using Params = RepulsiveParams;
 
-  RepulsiveRegion(const RepulsiveParams& params, const EffectSetup& setup) NONBLOCKING
-      : params_(params),
-        scale_(setup.position_scale) {}
+  RepulsiveRegion(const RepulsiveParams& params, const EffectSetup& /*setup*/) NONBLOCKING : params_(params) {
+  }
 
   // On while the cell is known: the region follows its place in the cell and its gain rises or falls, both
   // over ramp_s.
@@ -55,7 +54,6 @@ class RepulsiveRegion {
 
  private:
   RepulsiveParams params_;
-  double scale_;
   hal::Vec3 centre_m_ = hal::Vec3::Zero();
   Ramp ramp_;
   double stored_J_ = 0;

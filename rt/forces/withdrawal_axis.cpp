@@ -38,7 +38,7 @@ EffectOutput WithdrawalAxis::step(const EffectInput& in) NONBLOCKING {
     }
     frame_ = in.insertion;
   }
-  const PotentialForce pull = axis_pull(params_, scale_, frame_, in.fixture_point_m);
+  const PotentialForce pull = axis_pull(params_, in.position_scale, frame_, in.fixture_point_m);
   ramp_.step(on, params_.ramp_s, params_.ramp_s, in.dt_s);
   one_way_.step(on && in.withdrawing, kOneWayRamp_s, kOneWayRamp_s, in.dt_s);
   stored_J_ = ramp_.gain() * pull.energy_J;

@@ -34,9 +34,7 @@ class WithdrawalAxis {
  public:
   using Params = AxisParams;
 
-  WithdrawalAxis(const AxisParams& params, const EffectSetup& setup) NONBLOCKING
-      : params_(params),
-        scale_(setup.position_scale) {}
+  WithdrawalAxis(const AxisParams& params, const EffectSetup& /*setup*/) NONBLOCKING : params_(params) {}
 
   // On while the needle is inside a known cell. The line of insertion is taken over while the gain is zero
   // and stays until the gain is zero again.
@@ -48,7 +46,6 @@ class WithdrawalAxis {
 
  private:
   AxisParams params_;
-  double scale_;
   FixtureFrame frame_;
   Ramp ramp_;
   Ramp one_way_;

@@ -22,10 +22,12 @@ enum Alarm : std::uint32_t {
   alarm_lateral_limited = 1U << 12,     // sideways motion inside the cell is held
   alarm_not_enabled = 1U << 13,         // the enabling device was not pressed yet: no drive has power
   alarm_injection_refused = 1U << 14,   // the button is pressed inside, but the gate may not open
+  alarm_forbidden_region = 1U << 15,    // dish floor or holding pipette hold the needle
 };
 inline constexpr const char* kAlarmNames[] = {  // by bit
-    "vision_stale",      "force_limited",      "depth_limited",   "travel_limited", "tip_force",
-    "model_invalid",     "phase_timeout",      "overrun",         "sensor",         "degraded",
-    "stiffness_reduced", "vision_implausible", "lateral_limited", "not_enabled",    "injection_refused"};
+    "vision_stale",    "force_limited", "depth_limited",     "travel_limited",
+    "tip_force",       "model_invalid", "phase_timeout",     "overrun",
+    "sensor",          "degraded",      "stiffness_reduced", "vision_implausible",
+    "lateral_limited", "not_enabled",   "injection_refused", "forbidden_region"};
 
 }  // namespace punctum::rt

@@ -18,16 +18,20 @@ struct Command {
     force_scale,  // value: 0 .. 1 of the scene's force scale
     effect_gain,  // target: rt::Effect of the scene; value: 0 .. 1 of the scene's effect
     hand_force_limit,  // value: newtons, more than 0, up to the scene's hand-force limit
+    // value: hand metres per needle metre, within the scene's bounds; from when hand and needle are next
+    // uncoupled on, by clutch or stop
+    position_scale,
   };
   std::uint64_t kind = none;
   double value = 0;
   std::uint64_t target = 0;
 };
-inline constexpr int kCommandKinds = 6;
+inline constexpr int kCommandKinds = 7;
 
 // As report.json has it.
 [[nodiscard]] constexpr const char* name(Command::Kind kind) NONBLOCKING {
-  constexpr const char* names[] = {"none", "stop", "end", "force_scale", "effect_gain", "hand_force_limit"};
+  constexpr const char* names[] = {
+      "none", "stop", "end", "force_scale", "effect_gain", "hand_force_limit", "position_scale"};
   static_assert(sizeof names == kCommandKinds * sizeof names[0]);
   return names[static_cast<int>(kind)];
 }
@@ -50,8 +54,9 @@ struct CommandWriter {
 };
 inline constexpr CommandWriter kParent = {"parent", kinds(Command::stop, Command::end, Command::force_scale)};
 // Whoever operates the running station from outside.
-inline constexpr CommandWriter kConsole = {"console", kinds(Command::stop, Command::end, Command::force_scale,
-                                                            Command::effect_gain, Command::hand_force_limit)};
+inline constexpr CommandWriter kConsole = {
+    "console", kinds(Command::stop, Command::end, Command::force_scale, Command::effect_gain,
+                     Command::hand_force_limit, Command::position_scale)};
 
 // Everybody who may ask, in the order in which the core takes their commands. The place in this table is the
 // writer's number in an event.

@@ -67,7 +67,7 @@ inline std::string print(const Schedule& s) {
                   e.axis);
     text += line;
   }
-  return text + (s.setup == 0 ? "}}" : "}, 1}");
+  return text + (s.setup == 0 ? "}}" : "}, " + std::to_string(s.setup) + "}");
 }
 
 // ---- random schedules ----
@@ -179,6 +179,7 @@ inline constexpr std::array<Draw, kLies> kDraws{{
     {Lie::command_end, 8, 1, 1, false, 1, 1},
     {Lie::command_scale, 8, 1e-3, 10, true, 1, 1},
     {Lie::command_odd, 8, 1, 1, false, 1, 1},
+    {Lie::command_position_scale, 8, 150, 1500, false, 1, 1},
 }};
 static_assert([] {
   for (std::size_t i = 0; i < kLies; ++i) {
@@ -196,7 +197,8 @@ inline Schedule random_schedule(std::uint64_t seed, std::uint64_t number) {
   (void)random.next();
   Schedule s;
   s.from = static_cast<From>(random.below(static_cast<int>(kFroms)));
-  s.setup = random.chance(0.2) ? 1 : 0;
+  const double setup = random.uniform();
+  s.setup = setup < 0.2 ? 1 : setup < 0.4 ? 2 : 0;
   s.events.reserve(16);
   s.ticks = random.duration(300, 2000);
   // Most schedules keep to two or three groups: what is combined is then combined often.
@@ -212,6 +214,22 @@ inline Schedule random_schedule(std::uint64_t seed, std::uint64_t number) {
   if (random.chance(0.3)) {
     s.events.push_back(
         {random.below(100), random.duration(200, 1500), Lie::moves, -random.log_uniform(5e-3, 80e-3), 0});
+  }
+  if (s.setup == 2) {
+    // To the floor or to the holder, and another scale with or without the clutch.
+    if (random.chance(0.6)) {
+      const bool to_floor = random.chance(0.4);
+      s.events.push_back({random.below(s.ticks), random.duration(50, 800), Lie::moves,
+                          (to_floor ? -1 : 1) * random.log_uniform(3e-3, 20e-3), to_floor ? 2 : 1});
+    }
+    if (random.chance(0.4)) {
+      const int at = random.below(s.ticks);
+      s.events.push_back({at, 1, Lie::command_position_scale, random.log_uniform(200, 1200), 0});
+      if (random.chance(0.7)) {
+        s.events.push_back(
+            {std::max(at - 50, 0) + random.below(200), random.duration(20, 400), Lie::clutches, 1, 0});
+      }
+    }
   }
   // A real hand is never still.
   if (random.chance(0.4)) {

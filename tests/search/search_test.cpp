@@ -46,7 +46,7 @@ std::size_t cost(const Schedule& s) {
 class Machines {
  public:
   Search& of(const Schedule& s) {
-    auto& machine = machines_[s.setup == 1 ? 1 : 0];
+    auto& machine = machines_.at(static_cast<std::size_t>(s.setup));
     if (!machine) {
       machine = std::make_unique<Search>(s.setup);
     }
@@ -54,7 +54,7 @@ class Machines {
   }
 
  private:
-  std::array<std::unique_ptr<Search>, 2> machines_;
+  std::array<std::unique_ptr<Search>, 3> machines_;
 };
 
 Outcome search(std::uint64_t seed, std::uint64_t first, std::uint64_t count, int jobs) {

@@ -6,7 +6,7 @@
 namespace punctum::rt::test {
 
 inline constexpr double kScale = 500;  // the hand's way for the needle's
-inline constexpr EffectSetup kSetup{.position_scale = kScale};
+inline constexpr EffectSetup kSetup;
 
 // Of the potential U at a point, by sixth-order central differences with step h.
 template <typename Potential>

@@ -47,6 +47,7 @@ enum class Invariant : std::uint8_t {
   no_set_point_in_stop,
   begins_at_the_needle,
   no_motion_unpowered,
+  outside_regions,
   gate_in_phase,
   gate_own_press,
   gate_one_opening,
@@ -65,6 +66,8 @@ enum class Invariant : std::uint8_t {
   stops_on_command,
   quick_stop_in_time,
   power_off_in_time,
+  waits_for_enabling,
+  stops_when_let_go,
   phase_order,
   puncture_confirmed,
   over_at_rest,
@@ -99,6 +102,7 @@ inline constexpr std::array<InvariantName, kInvariants> kInvariantNames{{
     {"M12", "no_set_point_in_stop"},
     {"M13", "begins_at_the_needle"},
     {"M14", "no_motion_unpowered"},
+    {"M15", "outside_regions"},
     {"G1", "gate_in_phase"},
     {"G2", "gate_own_press"},
     {"G3", "gate_one_opening"},
@@ -117,6 +121,8 @@ inline constexpr std::array<InvariantName, kInvariants> kInvariantNames{{
     {"L5", "stops_on_command"},
     {"L6", "quick_stop_in_time"},
     {"L7", "power_off_in_time"},
+    {"L8", "waits_for_enabling"},
+    {"L9", "stops_when_let_go"},
     {"P1", "phase_order"},
     {"P2", "puncture_confirmed"},
     {"P3", "over_at_rest"},
@@ -139,6 +145,31 @@ template <class Limits>
     return limits.stage_jerk_m_s3;
   }
   return std::numeric_limits<double>::infinity();
+}
+
+// How far the needle's glass, its tip there, is from the floor and from the holder of a scene, less the
+// clearance: ball by ball along the shaft.
+[[nodiscard]] inline double to_regions_m(const ForbiddenParams& regions, const hal::Vec3& tip_m,
+                                         const hal::Vec3& axis, int balls = 400, double shaft_m = 2e-3) {
+  double least_m = std::numeric_limits<double>::infinity();
+  if (regions.floor) {
+    const double z_m = regions.floor->z_m;
+    least_m = (z_m > 0 ? z_m - tip_m.z() : tip_m.z() - z_m) - regions.tip_radius_m;
+  }
+  for (int i = 0; regions.holder && i <= balls; ++i) {
+    const double part = i / static_cast<double>(balls);
+    const double behind_m = shaft_m * part * part;
+    const double radius_m = regions.tip_radius_m + std::min(behind_m / regions.taper_m, 1.0) *
+                                                       (regions.shaft_radius_m - regions.tip_radius_m);
+    const hal::Vec3 V = tip_m - behind_m * axis - regions.holder->mouth_m;
+    const double depth_m = V.dot(regions.holder->axis);
+    const double beside_m = V.cross(regions.holder->axis).norm() - regions.holder->radius_m;
+    const double aside_m = std::max(beside_m, 0.0), before_m = std::max(-depth_m, 0.0);
+    const double to_m = beside_m <= 0 && depth_m >= 0 ? std::max(beside_m, -depth_m)
+                                                      : std::sqrt(aside_m * aside_m + before_m * before_m);
+    least_m = std::min(least_m, to_m - radius_m);
+  }
+  return least_m - regions.clearance_m;
 }
 
 // The numbers in the checks. They follow from the scene where it has a limit; the others are stated here.
@@ -166,8 +197,10 @@ struct Bounds {
   double lateral_m = lateral_limit_m(c.limits) + 2e-6;  // the tip follows the set-point late
   double jerk_m_s3 = jerk_limit_m_s3(c.limits);
   double shortest_opening_s = 0.02;
-  double brake_s = 0.03;  // v/a, and two periods of the slowest check
-  double relay_s = 0.02;  // beyond the stop's own time
+  double brake_s = 0.03;      // v/a, and two periods of the slowest check
+  double relay_s = 0.02;      // beyond the stop's own time
+  double region_m = 0.05e-6;  // the checker's balls are up to 10 um apart
+  double nearer_m = 3e-6;     // a needle comes to a region per tick, by its way and its tilt
   int punctured_frames = 2;
 };
 
@@ -208,6 +241,7 @@ struct Seen {
   bool gate = false;
   bool injector_stuck = false;
   bool stop_commanded = false;
+  double position_scale = 0;  // commanded on this tick, within the scene's bounds
   bool ending = false;
   bool finished = false;
   const TelemetrySample* sample = nullptr;
@@ -245,6 +279,7 @@ class Invariants {
     const TelemetrySample& t = *s.sample;
     const bool running = t.stop == StopStage::running;
     watch_inputs(s);
+    watch_scale(s, running);
     numbers(s, t);
     force(s, t, running);
     latch(s, t, running);
@@ -329,6 +364,22 @@ class Invariants {
     }
     unseen_s_ = 1e-9 * static_cast<double>(s.now_ns - s.seen_ns);
     blind_s_ = s.seen_ns > 0 && unseen_s_ > b_.stale_s + 2 * b_.nominal_s ? blind_s_ + dt : 0;
+  }
+
+  // The scale may change only while hand and needle are uncoupled; when exactly is not known.
+  void watch_scale(const Seen& s, bool running) {
+    if (s.position_scale > 0) {
+      next_scale_ = s.position_scale;
+      scale_may_change_ = false;
+    }
+    const bool clutched = (buttons_ & hal::kButtonClutch) != 0;
+    const bool coupled = running && was_running_ && !clutched && stage_known_ && stage_told_.enabled;
+    uncoupled_s_ = coupled ? 0 : uncoupled_s_ + s.elapsed_s;
+    scale_may_change_ = scale_may_change_ || !coupled;
+    if (uncoupled_s_ > b_.filter_s) {
+      scale_ = next_scale_;
+    }
+    least_scale_ = scale_may_change_ ? std::min(scale_, next_scale_) : scale_;
   }
 
   // ---- N ----
@@ -447,6 +498,9 @@ class Invariants {
     if (commanded_ticks_ > 2) {
       must(I::stops_on_command, !running);
     }
+    if (b_.c.enabling) {
+      enabling(s, running, two);
+    }
     // A quick stop on the tick of the stop or on the next.
     if (running) {
       since_stop_ = 0;
@@ -471,23 +525,42 @@ class Invariants {
     }
   }
 
+  void enabling(const Seen& s, bool running, double two_ticks_s) {
+    const auto squeezed = [](std::uint32_t buttons) { return (buttons & hal::kButtonPanic) != 0; };
+    const auto enable = [](std::uint32_t buttons) { return (buttons & hal::kButtonEnable) != 0; };
+    const bool held = enable(buttons_) && !squeezed(buttons_);
+    const bool press = held && !enable(buttons_were_) && !squeezed(buttons_were_);
+    // A press that began in the stop counts as soon as its sample is believed.
+    pressed_ = running && (press || (was_running_ ? pressed_ : press_edge_));
+    if (running && !pressed_) {
+      must(I::waits_for_enabling, !s.power && s.commands == 0 && s.asked_N.norm() == 0);
+    }
+    // A sample that is not believed may be the one that tells it: the hand is silent then.
+    const bool on = running && was_running_ && pressed_;
+    let_go_s_ = on && !held ? let_go_s_ + s.elapsed_s : 0;
+    squeezed_s_ = on && squeezed(buttons_) ? squeezed_s_ + s.elapsed_s : 0;
+    const double unseen_s = b_.c.hand_timeout_s + two_ticks_s;
+    at_most(I::stops_when_let_go, let_go_s_, b_.c.enabling->release_s + unseen_s);
+    at_most(I::stops_when_let_go, squeezed_s_, unseen_s);
+  }
+
   // ---- M ----
   void motion(const Seen& s, const TelemetrySample& t, bool running) {
     const Vec3 axis = -Vec3::UnitX();
     const bool clutched = (buttons_ & hal::kButtonClutch) != 0 || (buttons_were_ & hal::kButtonClutch) != 0;
-    const Vec3 hand = world_from_hand(s.hand_true_m) / b_.c.mapping.position_scale;
+    const Vec3 hand_way = world_from_hand(s.hand_true_m - hand_m_) / least_scale_;
     const bool coupled = running && was_running_ && !clutched;
     clutched_s_ = clutched ? clutched_s_ + s.elapsed_s : 0;
     if (!running || clutched_s_ > b_.filter_s) {
       settle_paths();
     } else if (known_ && !clutched) {
-      hand_path_m_ += (hand - hand_m_).norm();
+      hand_path_m_ += hand_way.norm();
       if (blind_s_ == 0) {
-        hand_inward_m_ += std::max(0.0, (hand - hand_m_).dot(axis));
+        hand_inward_m_ += std::max(0.0, hand_way.dot(axis));
       }
     }
     // A false reading moves the needle by a little at most while it is brief; one that stays is a motion.
-    const double false_m = s.hand_false_m / b_.c.mapping.position_scale;
+    const double false_m = s.hand_false_m / least_scale_;
     if (false_m != false_m_) {
       false_for_s_ = 0;
       false_paid_m_ = 0;
@@ -507,6 +580,14 @@ class Invariants {
     } else {
       must(I::no_set_point_in_stop, running);
       const Vec3& p = s.command.tip_m;
+      if (b_.c.forbidden) {
+        region_room_m_ -= b_.nearer_m;
+        if (!sent_known_ || region_room_m_ <= 0) {
+          region_room_m_ = to_regions_m(*b_.c.forbidden, p, s.command.axis);
+          inside_m_ = std::min(sent_known_ ? std::max(inside_m_, region_room_m_) : region_room_m_, 0.0);
+          at_most(I::outside_regions, inside_m_ - region_room_m_, b_.region_m);
+        }
+      }
       if (!sent_known_) {
         if (stage_known_) {
           // Hand and needle are coupled on this tick, or by the reset on the tick before.
@@ -535,7 +616,7 @@ class Invariants {
           Vec3 a = (way - way_m_) / b_.nominal_s / b_.nominal_s;
           bool held = std::abs(way.dot(a)) <= 0.01 * std::abs(way_m_.dot(a));
           // A curved limit takes it along a direction that only its alarm tells.
-          held = held || (t.alarms & (alarm_depth_limited | alarm_tip_force)) != 0;
+          held = held || (t.alarms & (alarm_depth_limited | alarm_tip_force | alarm_forbidden_region)) != 0;
           for (int i = 0; i < 3; ++i) {
             held = held || (std::abs(way[i]) <= 1e-12 && std::abs(way_m_[i]) > 1e-12);
           }
@@ -570,7 +651,7 @@ class Invariants {
       sent_known_ = true;
     }
     unpowered_ticks_ = stage_known_ && !stage_told_.enabled ? unpowered_ticks_ + 1 : 0;
-    hand_m_ = hand;
+    hand_m_ = s.hand_true_m;
     false_m_ = false_m;
 
     // Depth by the needle's true place, from where the core first said contact. The needle has to come out
@@ -751,6 +832,14 @@ class Invariants {
   double outside_s_ = 0, faded_s_ = 0;
   int commanded_ticks_ = 0, since_stop_ = 0;
   bool quick_stopped_ = false;
+
+  double scale_ = b_.c.mapping.position_scale, next_scale_ = scale_, least_scale_ = scale_;
+  double uncoupled_s_ = 0;
+  bool scale_may_change_ = true;
+  double region_room_m_ = 0, inside_m_ = 0;
+  // L8, L9: a press of the enabling device that began after the start, or after the last stop.
+  bool pressed_ = false;
+  double let_go_s_ = 0, squeezed_s_ = 0;
 
   double path_m_ = 0, inward_m_ = 0, hand_path_m_ = 0, hand_inward_m_ = 0;
   double clutched_s_ = 0;

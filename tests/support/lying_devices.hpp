@@ -110,6 +110,7 @@ enum class Lie : std::uint8_t {
   command_end,
   command_scale,
   command_odd,
+  command_position_scale,  // hand metres per needle metre
   count
 };
 inline constexpr std::size_t kLies = static_cast<std::size_t>(Lie::count);
@@ -186,7 +187,8 @@ inline constexpr std::array<const char*, kLies> kLieNames{"moves",
                                                           "command_stop",
                                                           "command_end",
                                                           "command_scale",
-                                                          "command_odd"};
+                                                          "command_odd",
+                                                          "command_position_scale"};
 
 // One lie, from a tick on for so many ticks.
 struct Event {
@@ -198,7 +200,8 @@ struct Event {
 };
 
 // Icsi with everything that has a place in the servo, and cells without end. Set-up 1: twice as fast, with
-// real actuators, an enabling device and a force sensor.
+// real actuators, an enabling device and a force sensor. Set-up 2: a dish floor and a holding pipette that
+// the hand reaches, beside the way to the cell, and a position scale that commands may change.
 inline ServoConfig searched_config(int setup = 0) {
   ServoConfig c;
   c.membrane.emplace();
@@ -217,6 +220,16 @@ inline ServoConfig searched_config(int setup = 0) {
     c.real_actuators = true;
     c.enabling.emplace();
     c.force_sensor = true;
+  }
+  if (setup == 2) {
+    c.forbidden.emplace();
+    c.forbidden->clearance_m = 2e-6;
+    c.forbidden->felt_m = 4e-6;
+    c.forbidden->floor.emplace().z_m = 20e-6;
+    c.forbidden->holder = HolderBodyParams{{35e-6, -18e-6, 4e-6}, {0.2, -0.97, 0.1}, 15e-6};
+    c.forbidden->holder->axis.normalize();
+    c.mapping.position_scale_min = 250;
+    c.mapping.position_scale_max = 1000;
   }
   return c;
 }
@@ -313,6 +326,7 @@ class LyingStation {
     std::memcpy(servo_bytes_.data(), s.servo.get(), sizeof(Servo));
     std::memcpy(static_cast<void*>(&station_->observation), s.observation.get(), sizeof(ObservationSegment));
     std::memset(static_cast<void*>(&station_->parent.queue), 0, sizeof station_->parent.queue);
+    std::memset(static_cast<void*>(&station_->console.queue), 0, sizeof station_->console.queue);
   }
 
   // One tick: k is its number in the schedule.
@@ -560,6 +574,13 @@ class LyingStation {
     c.value = value(Lie::command_scale);
     if (c.kind != Command::none) {
       (void)station_->parent.queue.try_push(c);
+    }
+    if (begins(Lie::command_position_scale)) {
+      const double scale = value(Lie::command_position_scale);
+      (void)station_->console.queue.try_push({Command::position_scale, scale, 0});
+      const MappingParams& m = config_.mapping;
+      const bool within = scale >= m.least_position_scale() && scale <= m.most_position_scale();
+      seen_.position_scale = within ? scale : 0;
     }
     seen_.stop_commanded = begins(Lie::command_stop);
     truth.ending = truth.ending || begins(Lie::command_end);

@@ -77,6 +77,10 @@ constexpr Saving kSavings[] = {
     {"repulsive", "no region is kept free"},
     {"friction", "no dry friction"},
     {"vibration", "no burst marks contact and puncture"},
+    {"forbidden", "nothing keeps the needle from dish floor and holding pipette but the workspace"},
+    {"forbidden.floor", "nothing keeps the needle from the dish floor but the workspace"},
+    {"forbidden.holder", "nothing keeps the needle from the holding pipette"},
+    {"sim.dish", "the simulated dish has no floor"},
 };
 
 // An effect in one phrase; by its name alone where there is nothing more to say.
@@ -107,6 +111,10 @@ std::string text_of(const char* /*name*/, const rt::FrictionParams& f) {
 }
 std::string text_of(const char* /*name*/, const rt::VibrationParams& v) {
   return fmt::format("vibration at contact and puncture ({:g} Hz, {:g} N)", v.frequency_Hz, v.amplitude_N);
+}
+std::string text_of(const char* /*name*/, const rt::ForbiddenParams& f) {
+  return fmt::format("walls of forbidden regions ({}{}{}, {:g} N/m)", f.floor ? "floor" : "",
+                     f.floor && f.holder ? ", " : "", f.holder ? "holder" : "", f.K_N_m);
 }
 
 // One line per staged failure: its keys, without those that are as if not given.

@@ -11,6 +11,12 @@ constexpr double kSettle_s = 1;  // of the band-pass, after the start and after 
 
 double norm(const double (&v)[3]) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 
+void keep_least(std::optional<double>& least, const std::optional<double>& now) {
+  if (now && !(least && *least <= *now)) {
+    least = now;
+  }
+}
+
 }  // namespace
 
 TremorBand::TremorBand(double rate_Hz) {
@@ -188,6 +194,9 @@ void Measures::tick(const rt::TelemetrySample& s, const sim::Snapshot* world) {
       }
     }
     tremor_ticks += counts ? 1U : 0U;
+    const sim::GlassClearance clearance = sim::glass_clearance(sim_, *world);
+    keep_least(least_floor_m, clearance.floor_m);
+    keep_least(least_holder_m, clearance.holder_m);
 
     // The plant puts a fresh cell in place a tick or more before the core knows.
     if (world->has_cell != 0 && world->cell_index == s.cell) {

@@ -94,6 +94,9 @@ class Measures {
   double force_error2 = 0, force_error_sum = 0, true_force2 = 0;
   std::uint64_t force_ticks = 0;
 
+  // In truth, of the needle's glass from the dish floor and the holding pipette; none without them.
+  std::optional<double> least_floor_m, least_holder_m;
+
   double tremor_hand2 = 0, tremor_tip2 = 0;
   std::uint64_t tremor_ticks = 0;
 

@@ -210,6 +210,8 @@ tl::expected<void, std::string> write_report(const std::string& path, const Scen
   j["peak_force_N"] = cell ? Json(m.peak_force_N) : Json(nullptr);  // at the needle, true
   j["peak_hand_force_N"] = m.peak_hand_N;
   j["max_depth_um"] = cell ? Json(m.max_depth_m * 1e6) : Json(nullptr);
+  j["least_clearance_um"] = {{"floor", number(m.least_floor_m, 1e6)},
+                             {"holder", number(m.least_holder_m, 1e6)}};
   j["depth_beyond_puncture_um"] = mean(m.beyond_puncture_m, 1e6);
   j["withdrawal_s"] = mean(m.withdrawal_s, 1);
   j["tremor_ratio"] = number(m.tremor_ratio());
@@ -335,6 +337,12 @@ std::string summary(const Scene& scene, const RunResult& result, const Measures&
       line("force estimate",
            fmt::format("error {:.2f} uN rms of {:.2f} uN rms true force", *e * 1e6,
                        std::sqrt(m.true_force2 / static_cast<double>(m.force_ticks)) * 1e6));
+    }
+  }
+  for (const auto& [what, least_m] :
+       {std::pair{"dish floor", m.least_floor_m}, std::pair{"holding pipette", m.least_holder_m}}) {
+    if (least_m && *least_m < 0) {
+      line("collision", fmt::format("the needle was {:.1f} um in the {}", -*least_m * 1e6, what));
     }
   }
   if (const auto r = m.tremor_ratio()) {

@@ -10,8 +10,8 @@
 namespace punctum::report {
 namespace {
 
-const std::set<std::string> kEffects = {"membrane",  "cone",     "axis",     "damping",
-                                        "repulsive", "friction", "vibration"};
+const std::set<std::string> kEffects = {"membrane",  "cone",     "axis",      "damping",
+                                        "repulsive", "friction", "vibration", "forbidden"};
 
 std::vector<std::string> effects_of(const tools::Scene& scene) {
   std::vector<std::string> effects;

@@ -239,6 +239,8 @@ SpringWords words_of(rt::Spring::Of spring) {
       return {"repulsive.K_N_m", "repulsive"};
     case rt::Spring::Of::friction:
       return {"friction.K_N_m", "friction"};
+    case rt::Spring::Of::forbidden:
+      return {"forbidden.K_N_m", "forbidden"};
   }
   return {"servo", "?"};
 }
@@ -345,6 +347,61 @@ Found check_stage(const rt::ServoConfig& servo, const sim::StageParams& stage) {
   return std::nullopt;
 }
 
+Found check_forbidden(const rt::ForbiddenParams& forbidden, const sim::StageParams* stage) {
+  if (!forbidden.floor && !forbidden.holder) {
+    return Problem{"forbidden",
+                   "forbids nothing, allowed: add [forbidden.floor] or [forbidden.holder], or leave it out"};
+  }
+  if (forbidden.shaft_radius_m < forbidden.tip_radius_m) {
+    return Problem{"forbidden.shaft_radius_um",
+                   fmt::format("{:g} is smaller than the tip, allowed: at least tip_radius_um = {:g}",
+                               um(forbidden.shaft_radius_m), um(forbidden.tip_radius_m))};
+  }
+  const double kept_m = forbidden.clearance_m + forbidden.tip_radius_m;
+  if (forbidden.holder && forbidden.felt_m > kept_m) {
+    return Problem{
+        "forbidden.felt_um",
+        fmt::format("the holder's edge would be stiffer than K_N_m, allowed: at most clearance_um + "
+                    "tip_radius_um = {:g}",
+                    um(kept_m))};
+  }
+  if (forbidden.floor && std::abs(forbidden.floor->z_m) <= kept_m) {
+    return Problem{"forbidden.floor.z_um",
+                   fmt::format("leaves the needle no room in the picture's plane, allowed: further than "
+                               "clearance_um + tip_radius_um = {:g} from 0",
+                               um(kept_m))};
+  }
+  if (stage == nullptr) {
+    return std::nullopt;
+  }
+  const rt::ForbiddenRegions regions(forbidden);
+  const rt::NeedlePose start{stage->start_m + stage->registration_m, stage->axis};
+  for (const rt::Region region : rt::kRegions) {
+    if (regions.has(region) && regions.apart_m(region, regions.away(region, start), start) < 0) {
+      return Problem{"sim.stage.start_um",
+                     fmt::format("is in a forbidden region, allowed: outside [forbidden.{}]",
+                                 region == rt::Region::floor ? "floor" : "holder")};
+    }
+  }
+  return std::nullopt;
+}
+
+Found check_position_scale(const rt::MappingParams& m) {
+  if (m.position_scale_min != 0 && (m.position_scale_min < 1 || m.position_scale_min > m.position_scale)) {
+    return Problem{
+        "mapping.position_scale_min",
+        fmt::format("{:g} is no lower bound, allowed: 0 (no less), or from 1 to position_scale = {:g}",
+                    m.position_scale_min, m.position_scale)};
+  }
+  if (m.position_scale_max != 0 && m.position_scale_max < m.position_scale) {
+    return Problem{
+        "mapping.position_scale_max",
+        fmt::format("{:g} is no upper bound, allowed: 0 (no more), or from position_scale = {:g} on",
+                    m.position_scale_max, m.position_scale)};
+  }
+  return std::nullopt;
+}
+
 Found check_workspace(const rt::MappingParams& m, const sim::StageParams* stage) {
   for (int i = 0; i < 3; ++i) {
     if (m.workspace_min_m[i] >= m.workspace_max_m[i]) {
@@ -389,6 +446,14 @@ Found check_core(const Scene& s) {
   }
   if (auto p = check_workspace(servo.mapping, stage)) {
     return p;
+  }
+  if (auto p = check_position_scale(servo.mapping)) {
+    return p;
+  }
+  if (servo.forbidden) {
+    if (auto p = check_forbidden(*servo.forbidden, stage)) {
+      return p;
+    }
   }
   if (servo.phases && servo.phases->contact_on_m >= servo.phases->indentation_on_m) {
     return Problem{"phases.contact_on_um", fmt::format("is not below indentation_on_um, allowed: below {:g}",

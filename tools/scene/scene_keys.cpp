@@ -108,6 +108,9 @@ void follow_backends(Scene& s) {
     s.sim->cell.reset();
     s.sim->holder.reset();
   }
+  if (!simulated(s, &DeviceNames::stage)) {
+    s.sim->dish.reset();
+  }
 }
 
 KeyList device_key(Scene& s, const char* table, std::string DeviceNames::* device) {
@@ -245,6 +248,22 @@ void add_effects(std::vector<Table>& t) {
 #define PUNCTUM_EFFECT(name, Class) t.push_back(thing(#name, [](Scene& s) -> auto& { return s.servo.name; }));
   PUNCTUM_EFFECTS(PUNCTUM_EFFECT)
 #undef PUNCTUM_EFFECT
+  t.push_back({"forbidden.floor", Kind::thing,
+               [](const Scene& s) { return s.servo.forbidden && s.servo.forbidden->floor.has_value(); },
+               [](Scene& s, bool on) {
+                 if (s.servo.forbidden) {
+                   have(s.servo.forbidden->floor, on);
+                 }
+               },
+               [](Scene& s) { return bound(*s.servo.forbidden->floor); }});
+  t.push_back({"forbidden.holder", Kind::thing,
+               [](const Scene& s) { return s.servo.forbidden && s.servo.forbidden->holder.has_value(); },
+               [](Scene& s, bool on) {
+                 if (s.servo.forbidden) {
+                   have(s.servo.forbidden->holder, on);
+                 }
+               },
+               [](Scene& s) { return bound(*s.servo.forbidden->holder); }});
   t.push_back(thing("guard", [](Scene& s) -> auto& { return s.servo.guard; }));
   t.push_back(thing("enabling", [](Scene& s) -> auto& { return s.servo.enabling; }));
 }
@@ -287,6 +306,9 @@ void add_simulation(std::vector<Table>& t) {
   t.push_back(simulated_thing(
       "sim.holder", {"stage", "camera"}, [](sim::SimConfig& c) -> auto& { return c.holder; },
       [](Scene& s) { return bound(*s.sim->holder); }));
+  t.push_back(simulated_thing(
+      "sim.dish", {"stage"}, [](sim::SimConfig& c) -> auto& { return c.dish; },
+      [](Scene& s) { return bound(*s.sim->dish); }));
   t.push_back(simulation("sim.injector", Kind::settings, {"injector"},
                          [](Scene& s) { return bound(*s.sim->injector); }));
   t.push_back(simulation("sim.force_sensor", Kind::settings, {"force_sensor"},

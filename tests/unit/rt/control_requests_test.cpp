@@ -97,6 +97,34 @@ TEST(Requests, lower_the_hands_force_limit_within_the_scenes_and_never_raise_it)
   EXPECT_NEAR(requests.take(10).hand_force_N, 1, 1e-12);
 }
 
+TEST(Requests, change_the_position_scale_within_the_scenes_bounds_and_not_without_them) {
+  const auto station = std::make_unique<LocalStation>();
+  ServoConfig config;
+  const auto ask = [&](double scale) {
+    ASSERT_TRUE(station->console.queue.try_push({Command::position_scale, scale}));
+  };
+  Requests fixed(config, station->station);
+  ask(400);
+  EXPECT_EQ(fixed.take(1e-3).refused, 1U);
+  EXPECT_EQ(fixed.requested().position_scale, 500);
+  config.mapping.position_scale_min = 200;
+  config.mapping.position_scale_max = 800;
+  Requests requests(config, station->station);
+  for (const double bad : {199.0, 801.0, 0.0, -500.0, std::nan("")}) {
+    ask(bad);
+  }
+  EXPECT_EQ(requests.take(1e-3).refused, 5U);
+  EXPECT_EQ(requests.requested().position_scale, 500);
+  ask(250);
+  const Requested& taken = requests.take(1e-3);
+  EXPECT_EQ(taken.position_scale, 250);
+  ASSERT_EQ(taken.taken_count, 1U);  // as the event tells it
+  EXPECT_TRUE(taken.taken[0].obeyed);
+  EXPECT_EQ(taken.taken[0].command.value, 250);
+  ASSERT_TRUE(station->parent.queue.try_push({Command::position_scale, 300}));  // not its role
+  EXPECT_EQ(requests.take(1e-3).refused, 6U);
+}
+
 TEST(Requests, change_nothing_that_the_scene_does_not_have_or_the_writer_may_not_ask) {
   const auto station = std::make_unique<LocalStation>();
   Requests requests(with_damping(), station->station);

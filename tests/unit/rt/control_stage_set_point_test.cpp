@@ -78,6 +78,41 @@ TEST(StageSetPoint, stays_at_the_needle_during_a_stop_wherever_the_hand_goes) {
   EXPECT_LT((p.path.set_point().tip_m - p.readings.stage.tip_m).norm(), 1e-12);
 }
 
+TEST(StageSetPoint, takes_another_position_scale_only_while_uncoupled_and_moves_nothing_by_it) {
+  Path p;
+  p.follow_for(0.01);
+  p.readings.hand.position_m.x() -= 10e-3;
+  p.follow_for(1);
+  const Vec3 point = p.path.hand_point_m();
+  const Vec3 set_point = p.path.set_point().tip_m;
+  EXPECT_NEAR(point.x(), 40e-6, 1e-12);
+  const auto nothing_moved = [&] {
+    EXPECT_LT((p.path.hand_point_m() - point).norm(), 1e-15);
+    EXPECT_LT((p.path.set_point().tip_m - set_point).norm(), 1e-9);
+  };
+  p.in.position_scale = 250;
+  p.in.nothing_felt = true;
+  p.follow_for(0.5);  // coupled: not yet
+  EXPECT_EQ(p.path.position_scale(), 500);
+  nothing_moved();
+  p.readings.hand.buttons = hal::kButtonClutch;
+  p.in.clutched = true;
+  p.in.nothing_felt = false;
+  p.follow_for(0.05);  // a fixture's force still fades
+  EXPECT_EQ(p.path.position_scale(), 500);
+  p.in.nothing_felt = true;
+  p.follow_for(0.1);
+  EXPECT_EQ(p.path.position_scale(), 250);
+  nothing_moved();
+  p.readings.hand.buttons = 0;
+  p.in.clutched = p.in.nothing_felt = false;
+  p.follow_for(0.5);
+  nothing_moved();
+  p.readings.hand.position_m.x() += 5e-3;
+  p.follow_for(1);
+  EXPECT_NEAR(p.path.hand_point_m().x(), 60e-6, 1e-12);
+}
+
 TEST(StageSetPoint, forgets_what_the_hand_did_while_vision_was_stale) {
   Path p;
   p.follow_for(0.01);

@@ -11,7 +11,7 @@ namespace punctum::rt {
 namespace {
 
 using hal::Vec3;
-constexpr EffectSetup kForcesScaled{.position_scale = 500, .force_scale = 1e5};
+constexpr EffectSetup kForcesScaled{.force_scale = 1e5};
 
 EffectParams all() {
   EffectParams params;

@@ -92,9 +92,10 @@ TEST(Membrane, force_falls_monotonically_to_zero_after_the_puncture_whatever_the
 }
 
 TEST(Membrane, gives_force_energy_and_stiffness_at_the_scale_of_the_hand) {
-  const EffectSetup setup{.position_scale = 400, .force_scale = 2e5};
+  const EffectSetup setup{.force_scale = 2e5};
   Membrane membrane(MembraneParams{}, setup);
   EffectInput in = pressed(20e-6, false, 1e-3);
+  in.position_scale = 400;
   in.fixture_gain = 0.5;
   in.commanded_scale = 0.25;
   in.depth_correction_m = 1e-8;

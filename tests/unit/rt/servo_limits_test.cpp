@@ -299,5 +299,35 @@ TEST(Servo, never_sends_anything_beyond_a_limit_whatever_the_devices_say) {
   }
 }
 
+TEST(Servo, moves_nothing_when_the_position_scale_is_changed_and_moves_at_it_from_the_next_clutch_on) {
+  ServoConfig config = icsi();
+  config.mapping.position_scale_min = 250;
+  config.mapping.position_scale_max = 1000;
+  Bench b(config);
+  b.run(1);
+  b.move(40e-6, 20e-6);
+  b.run(2);
+  const auto rests = [&](double seconds) {
+    const Vec3 before = b.stage.target;
+    b.run(seconds);
+    return (b.stage.target - before).norm() < 0.1e-6;
+  };
+  ASSERT_TRUE(rests(0.5));
+  ASSERT_TRUE(b.station->console.queue.try_push({Command::position_scale, 250}));
+  EXPECT_TRUE(rests(1));
+  const double at_x = b.stage.target.x();
+  b.move(35e-6, 20e-6);  // 2.5 mm at the hand, at the old scale still
+  b.run(2);
+  EXPECT_NEAR(b.stage.target.x() - at_x, -5e-6, 0.3e-6);
+  b.hand.buttons = hal::kButtonClutch;
+  EXPECT_TRUE(rests(0.5));
+  b.hand.buttons = 0;
+  EXPECT_TRUE(rests(1));
+  const double now_x = b.stage.target.x();
+  b.move(32.5e-6, 20e-6);  // 1.25 mm
+  b.run(2);
+  EXPECT_NEAR(b.stage.target.x() - now_x, -5e-6, 0.3e-6);
+}
+
 }  // namespace
 }  // namespace punctum::rt

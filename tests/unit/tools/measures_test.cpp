@@ -60,6 +60,34 @@ TEST(Measures, the_tremor_ratio_is_the_motion_of_the_tip_scaled_back_to_the_hand
   EXPECT_NEAR(*m.tremor_ratio(), 0.25, 1e-3);
 }
 
+TEST(Measures, the_least_clearance_is_that_of_tip_and_shaft_from_floor_and_holder_in_truth) {
+  Scene scene = scene_of("icsi");
+  scene.servo.forbidden.reset();  // what the core believes does not matter
+  Measures m(scene);
+  sim::Snapshot world;
+  rt::TelemetrySample s;
+  const auto at = [&](double x_um, double y_um, double z_um) {
+    ++s.tick;
+    world.stage.tip_m = hal::Vec3(x_um, y_um, z_um) * 1e-6;
+    world.stage.axis = hal::Vec3(-1, 0, 0);
+    m.tick(s, &world);
+  };
+  // The needle's tip is 3.8 um thick, its shaft 9 um 160 um behind it; the mouth is at x = -100, 45 um in
+  // radius.
+  at(0, 0, 20);
+  EXPECT_NEAR(*m.least_floor_m, (65 - 20 - 3.8) * 1e-6, 1e-12);
+  EXPECT_NEAR(*m.least_holder_m, (100 - 3.8) * 1e-6, 1e-12);
+  at(-300, 60, 0);  // the shaft passes the mouth's rim
+  EXPECT_NEAR(*m.least_holder_m, (60 - 45 - 9) * 1e-6, 0.1e-6);
+  at(-120, 0, 63);  // in the floor
+  EXPECT_NEAR(*m.least_floor_m, (65 - 63 - 3.8) * 1e-6, 1e-12);
+  at(0, 0, 0);
+  EXPECT_LT(*m.least_floor_m, 0);
+  Measures none(scene_of("free"));
+  none.tick(s, &world);
+  EXPECT_FALSE(none.least_floor_m || none.least_holder_m);
+}
+
 TEST(Measures, phases_cells_faults_and_gaps_are_counted_and_listed) {
   const Scene scene = scene_of("icsi");
   Measures m(scene);

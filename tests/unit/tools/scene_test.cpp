@@ -58,11 +58,13 @@ const std::vector<Broken>& broken() {
   static const std::string all_tables =
       "scene, servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, velocity, mapping, "
       "limits, "
-      "vision, phases, local_model, membrane, cone, axis, damping, repulsive, friction, vibration, guard, "
+      "vision, phases, local_model, membrane, cone, axis, damping, repulsive, friction, vibration, "
+      "forbidden, guard, "
       "enabling, "
       "sim";
   static const std::string sim_tables =
-      "sim.operator, sim.haptic, sim.stage, sim.needle, sim.estop, sim.cell, sim.holder, sim.injector, "
+      "sim.operator, sim.haptic, sim.stage, sim.needle, sim.estop, sim.cell, sim.holder, sim.dish, "
+      "sim.injector, "
       "sim.force_sensor, sim.camera, sim.failure, sim.estop_press";
   static const std::vector<Broken> list = {
       {"nothing at all", "",
@@ -211,6 +213,35 @@ const std::vector<Broken>& broken() {
       {"a zona that is broken before it is touched", kLeast + "[sim.cell]\nzona_puncture_strain = 0.01\n",
        "b.toml:6:24: sim.cell.zona_puncture_strain: is reached before the needle touches, allowed: above "
        "zona_pretension = 0.2"},
+      {"regions of which none is there", kLeast + "[forbidden]\n",
+       "b.toml:5:2: forbidden: forbids nothing, allowed: add [forbidden.floor] or [forbidden.holder], or "
+       "leave it out"},
+      {"a floor in the picture's plane", kLeast + "[forbidden.floor]\nz_um = -3\n",
+       "b.toml:6:8: forbidden.floor.z_um: leaves the needle no room in the picture's plane, allowed: further "
+       "than clearance_um + tip_radius_um = 8.8 from 0"},
+      {"a floor further than any stage", kLeast + "[forbidden.floor]\nz_um = 1e6\n",
+       "b.toml:6:8: forbidden.floor.z_um: 1000000 is out of range, allowed: a number from -100000 to 100000"},
+      {"a holder that points nowhere", kLeast + "[forbidden.holder]\naxis = [0, 0, 0]\n",
+       "b.toml:6:8: forbidden.holder.axis: the direction is zero, allowed: a direction [x, y, z] that is not "
+       "zero, each from -1 to 1"},
+      {"a wall wider than the holder's edge allows",
+       kLeast + "[forbidden.holder]\n[forbidden]\nfelt_um = 20\n",
+       "b.toml:7:11: forbidden.felt_um: the holder's edge would be stiffer than K_N_m, allowed: at most "
+       "clearance_um + tip_radius_um = 8.8"},
+      {"a shaft thinner than its tip in the regions",
+       kLeast + "[forbidden.floor]\n[forbidden]\nshaft_radius_um = 2\n",
+       "b.toml:7:19: forbidden.shaft_radius_um: 2 is smaller than the tip, allowed: at least tip_radius_um = "
+       "3.8"},
+      {"a stage that starts in the holder",
+       kLeast + "[forbidden.holder]\nmouth_um = [120, 0, 0]\n[sim.stage]\nstart_um = [90, 6, 0]\n",
+       "b.toml:8:12: sim.stage.start_um: is in a forbidden region, allowed: outside [forbidden.holder]"},
+      {"a wall too stiff for the handle", kLeast + "[forbidden.floor]\n[forbidden]\nK_N_m = 2000\n", ""},
+      {"a lowest scale above the scale", kLeast + "[mapping]\nposition_scale_min = 600\n",
+       "b.toml:6:22: mapping.position_scale_min: 600 is no lower bound, allowed: 0 (no less), or from 1 to "
+       "position_scale = 500"},
+      {"a highest scale below the scale", kLeast + "[mapping]\nposition_scale_max = 400\n",
+       "b.toml:6:22: mapping.position_scale_max: 400 is no upper bound, allowed: 0 (no more), or from "
+       "position_scale = 500 on"},
       {"soft above hard", kLeast + "[limits]\ntip_force_soft_uN = 70\n",
        "b.toml:6:21: limits.tip_force_soft_uN: is not below the hard limit, allowed: below tip_force_hard_uN "
        "= 60"},
@@ -537,19 +568,21 @@ TEST(Scene, overrides_are_read_and_checked_as_the_file_is) {
        "--set: operator.depth_um: unknown key (did you mean sim.operator.depth_um?), allowed: tables scene, "
        "servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, velocity, mapping, limits, "
        "vision, "
-       "phases, local_model, membrane, cone, axis, damping, repulsive, friction, vibration, guard, enabling, "
+       "phases, local_model, membrane, cone, axis, damping, repulsive, friction, vibration, forbidden, "
+       "guard, enabling, "
        "sim"},
       {"cell.inner.gap_um=4",
        "--set: cell.inner.gap_um: unknown key (did you mean sim.cell.inner.gap_um?), allowed: tables scene, "
        "servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, velocity, mapping, limits, "
        "vision, "
-       "phases, local_model, membrane, cone, axis, damping, repulsive, friction, vibration, guard, enabling, "
+       "phases, local_model, membrane, cone, axis, damping, repulsive, friction, vibration, forbidden, "
+       "guard, enabling, "
        "sim"},
       {"cell=off",
        "--set: cell: unknown table (did you mean sim.cell?), allowed: scene, servo, haptic, stage, estop, "
        "vacuum, injector, force_sensor, camera, velocity, mapping, limits, vision, phases, local_model, "
        "membrane, "
-       "cone, axis, damping, repulsive, friction, vibration, guard, enabling, sim"},
+       "cone, axis, damping, repulsive, friction, vibration, forbidden, guard, enabling, sim"},
       {"damping.B2_Ns_m=0.5",
        "--set: damping.B2_Ns_m: is below the damping outside, allowed: at least B1_Ns_m = 1"},
       {"damping.B2_Ns_m=", "--set: damping.B2_Ns_m: not valid TOML: expected value, saw '\\n'"},

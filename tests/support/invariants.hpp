@@ -324,10 +324,10 @@ class Invariants {
   void watch_inputs(const Seen& s) {
     const double dt = s.elapsed_s;
     // A servo that is told too short a period counts no more than that; it takes a tenth of its own at least.
-    const double told_s = s.clock_true ? dt : std::min(dt, 0.1 * b_.nominal_s);
-    hand_silent_s_ += told_s;
-    stage_silent_s_ += told_s;
-    estop_silent_s_ += told_s;
+    told_s_ = s.clock_true ? dt : std::min(dt, 0.1 * b_.nominal_s);
+    hand_silent_s_ += told_s_;
+    stage_silent_s_ += told_s_;
+    estop_silent_s_ += told_s_;
     if (s.hand_status == hal::Status::ok && s.hand.sample_ns != hand_sample_ns_) {
       hand_sample_ns_ = s.hand.sample_ns;
       hand_silent_s_ =
@@ -727,7 +727,7 @@ class Invariants {
       } else {
         open_s_ += s.elapsed_s;
       }
-      open_in_cell_s_ += s.elapsed_s;
+      open_in_cell_s_ += told_s_;
       if (b_.c.injector) {
         at_most(I::gate_time, open_in_cell_s_,
                 b_.c.injector->max_open_s + std::max(s.elapsed_s, b_.nominal_s) + 1e-9);
@@ -817,6 +817,7 @@ class Invariants {
   // What was told.
   bool hand_known_ = false, stage_known_ = false, stage_new_ = false;
   std::int64_t hand_sample_ns_ = -1, stage_sample_ns_ = -1;
+  double told_s_ = 0;  // of this tick, as the servo may count it
   double hand_silent_s_ = 0, stage_silent_s_ = 0, estop_silent_s_ = 0;
   std::uint32_t buttons_ = 0, buttons_were_ = 0;
   hal::StageState stage_told_;

@@ -79,6 +79,25 @@ void StageLimits::restart(const hal::Vec3& tip_m, const hal::Vec3& axis) NONBLOC
   ahead_m_ = tip_m;
   ahead_m_s_.setZero();
   bounds_jerk_.restart(tip_m);
+  look_for_regions();
+}
+
+void StageLimits::look_for_regions() NONBLOCKING {
+  if (!regions_) {
+    return;
+  }
+  const NeedlePose needle{set_point_.tip_m, set_point_.axis};
+  free_m_ = std::numeric_limits<double>::infinity();
+  for (const Region region : kRegions) {
+    if (!regions_->has(region)) {
+      continue;
+    }
+    hal::Vec3& away = away_[static_cast<std::size_t>(region)];
+    if (regions_->apart_m(region, away, needle) < kNear_m) {
+      away = regions_->away(region, needle);
+    }
+    free_m_ = std::min(free_m_, regions_->apart_m(region, away, needle));
+  }
 }
 
 StageLimits::Checked StageLimits::check(const hal::Vec3& wanted_m, const StageConstraint& c) const
@@ -218,6 +237,9 @@ StageLimits::FreeWay StageLimits::free_way(Region region, const hal::Vec3& to_m)
 
 void StageLimits::keep_out(Checked& out, const StageConstraint& c) const NONBLOCKING {
   const hal::Vec3& here = set_point_.tip_m;
+  if ((out.point_m - here).norm() < free_m_) {
+    return;
+  }
   for (int round = 0; round < kCornerRounds; ++round) {
     bool held = false;
     for (const Region region : kRegions) {
@@ -366,15 +388,6 @@ void StageLimits::settle(const hal::Vec3& wanted_m, const hal::Vec3& held_m) NON
 const hal::StageCommand& StageLimits::step(const hal::StageCommand& target, const StageConstraint& c)
     NONBLOCKING {
   alarms_ = 0;
-  for (const Region region : kRegions) {
-    if (regions_ && regions_->has(region)) {
-      hal::Vec3& away = away_[static_cast<std::size_t>(region)];
-      const NeedlePose needle{set_point_.tip_m, set_point_.axis};
-      if (regions_->apart_m(region, away, needle) < kNear_m) {
-        away = regions_->away(region, needle);
-      }
-    }
-  }
   finite_ = is_finite(target.tip_m) && is_finite(target.axis);
   if (c.frozen) {
     restart(set_point_.tip_m, set_point_.axis);
@@ -400,6 +413,7 @@ const hal::StageCommand& StageLimits::step(const hal::StageCommand& target, cons
   set_point_.tip_m = next.point_m;
   velocity_m_s_ = (next.point_m - here) / dt_s_;
   if (!finite_) {
+    look_for_regions();
     return set_point_;
   }
 
@@ -409,6 +423,7 @@ const hal::StageCommand& StageLimits::step(const hal::StageCommand& target, cons
   if (length > 0.5 && (!regions_ || may_point(axis / length))) {
     set_point_.axis = axis / length;
   }
+  look_for_regions();
   return set_point_;
 }
 

@@ -124,6 +124,8 @@ class StageLimits {
     hal::Vec3 away = hal::Vec3::UnitX();
   };
   [[nodiscard]] FreeWay free_way(Region region, const hal::Vec3& to_m) const NONBLOCKING;
+  // From the set-point, after it was moved.
+  void look_for_regions() NONBLOCKING;
   [[nodiscard]] bool may_point(const hal::Vec3& axis) const NONBLOCKING;
   // The set-point was held at held_m instead: its way across that limit begins from rest.
   void settle(const hal::Vec3& wanted_m, const hal::Vec3& held_m) NONBLOCKING;
@@ -139,6 +141,7 @@ class StageLimits {
   std::optional<ForbiddenRegions> regions_;
   // Directions in which needle and regions lie apart: as long as they do, nothing more is computed.
   std::array<hal::Vec3, std::size(kRegions)> away_{hal::Vec3::UnitX(), hal::Vec3::UnitX()};
+  double free_m_ = 0;  // so far from the set-point there is no region
   double dt_s_;
   double hardest_m_s2_;  // of which the window bounds the jerk
   double reach_m_;       // on its way to a new speed the needle gets no further

@@ -181,6 +181,13 @@ TEST(CellObserver, counts_the_depth_past_the_first_contact_by_the_encoders_alone
   EXPECT_NEAR(o.cell.facts().inward_limit_m, -20e-6 + config.limits.penetration_depth_m, 1e-9);
   EXPECT_NE(o.cell.facts().alarms & alarm_vision_implausible, 0U);
   EXPECT_FALSE(o.cell.facts().vision_fresh);
+  // Out by less than clears the cell: it is the same contact still.
+  o.readings.stage.tip_m.x() = 25e-6;
+  o.last.outside = true;
+  (void)o.tick();
+  (void)o.tick();
+  EXPECT_NEAR(o.cell.facts().contact_depth_m, -5e-6, 1e-9);
+  EXPECT_NEAR(o.cell.facts().inward_limit_m, -20e-6 + config.limits.penetration_depth_m, 1e-9);
   // Out and clear of where it was touched, the next contact counts from where it will be.
   o.readings.stage.tip_m.x() = 31e-6;
   o.last.outside = true;

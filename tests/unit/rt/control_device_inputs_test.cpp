@@ -189,6 +189,18 @@ TEST(DeviceInputs, ignores_one_sample_of_the_hand_that_cannot_be_true_and_refuse
   }
 }
 
+TEST(DeviceInputs, bears_bad_samples_of_a_slow_hand_no_longer_than_its_time) {
+  Inputs in;
+  in.hand.sample_every_ns = 10'000'000;
+  in.settle();
+  in.hand.nan = true;
+  for (int k = 0; k < 40; ++k) {
+    const Readings& r = in.read();
+    const bool old = r.hand_age_s > in.config.hand_timeout_s + 1e-9;
+    EXPECT_EQ(r.device_fault, old ? Fault::hand_invalid : Fault::none) << k;
+  }
+}
+
 TEST(DeviceInputs, takes_no_button_of_a_sample_that_cannot_be_true) {
   for (const bool pressed : {false, true}) {
     Inputs in;
@@ -278,6 +290,12 @@ TEST(DeviceInputs, refuses_readings_of_the_stage_that_no_stage_gives) {
     in.stage.extra_error_m = 0;
     in.stage.axis = Vec3(absurd, 0, 0);
     EXPECT_EQ(in.read().device_fault, Fault::stage_fault) << absurd;
+  }
+  for (const double length : {0.0, 0.5, 0.998}) {
+    Inputs in;
+    in.settle();
+    in.stage.axis = Vec3(-length, 0, 0);
+    EXPECT_EQ(in.read().device_fault, Fault::stage_fault) << length;
   }
   Inputs in;
   in.settle();
@@ -381,6 +399,29 @@ TEST(DeviceInputs, tells_an_open_contact_and_whether_the_two_had_disagreed_befor
   EXPECT_EQ(in.read().estop_fault, Fault::estop);
   in.estop.state.contact_a_closed = in.estop.state.contact_b_closed = true;
   EXPECT_EQ(in.read().estop_fault, Fault::none);
+}
+
+TEST(DeviceInputs, stops_for_a_contact_that_opened_between_two_readings) {
+  Inputs in;
+  in.settle();
+  in.estop.state.pulse_seen = true;
+  EXPECT_EQ(in.read().estop_fault, Fault::estop);
+  in.estop.state.pulse_seen = false;
+  EXPECT_EQ(in.read().estop_fault, Fault::none);
+}
+
+TEST(DeviceInputs, stops_for_an_open_contact_whatever_the_time_of_its_sample) {
+  for (const bool a : {true, false}) {
+    for (const std::int64_t wrong_by_ns : {-1'000'000'000, 1'000'000'000}) {
+      Inputs in;
+      in.settle();
+      (a ? in.estop.state.contact_a_closed : in.estop.state.contact_b_closed) = false;
+      in.estop.now_ns = in.now_ns + wrong_by_ns;
+      const TickTime tick{.now_ns = in.now_ns + 1'000'000, .elapsed_s = 1e-3, .dt_s = 1e-3};
+      EXPECT_EQ(in.inputs.read(tick, in.last).estop_fault, Fault::estop);
+      EXPECT_FALSE(in.inputs.readings().estop_readable);
+    }
+  }
 }
 
 TEST(DeviceInputs, without_an_estop_chain_there_is_nothing_readable_and_nothing_wrong) {

@@ -395,6 +395,26 @@ TEST(StageLimits, say_which_limit_holds_the_needle) {
   EXPECT_EQ(alarms(Vec3(500e-6, 0, 0)) & alarm_travel_limited, alarm_travel_limited);
 }
 
+TEST(StageLimits, let_the_needle_no_further_in_than_the_encoders_allow_whatever_vision_says_of_the_cell) {
+  StageConstraint c;
+  c.inward_limit_m = -40e-6;  // along the axis: at x = 40 um
+  for (const double entry_x_m : {60e-6, -100e-6}) {
+    for (const bool known : {false, true}) {
+      StageLimits stage(LimitParams{}, MappingParams{}, 1000);
+      stage.restart(Vec3(70e-6, 0, 0), -Vec3::UnitX());
+      c.membrane.known = known;
+      c.membrane.entry_m = Vec3(entry_x_m, 0, 0);
+      c.membrane.R_m = 60e-6;
+      for (int k = 0; k < 3000; ++k) {
+        stage.step({Vec3(-200e-6, 0, 0), -Vec3::UnitX()}, c);
+        ASSERT_GE(stage.set_point().tip_m.x(), 40e-6 - 1e-12);
+      }
+      EXPECT_NEAR(stage.set_point().tip_m.x(), 40e-6, 1e-9);
+      EXPECT_NE(stage.alarms() & alarm_depth_limited, 0U);
+    }
+  }
+}
+
 TEST(Membrane3D, measures_depth_and_far_wall_on_the_line_through_the_point) {
   Membrane3D m;
   m.entry_m = Vec3(20e-6, 0, 0);

@@ -283,6 +283,21 @@ TEST(LocalMembraneModel, keeps_the_focal_plane_from_cell_to_cell) {
   }
 }
 
+TEST(LocalMembraneModel, moves_the_entry_in_the_plane_of_the_picture_only_however_the_needle_is_tilted) {
+  Bench b;
+  b.world.axis = Vec3(-std::cos(0.2), 0, std::sin(0.2));
+  for (int k = 0; k < 500; ++k) {
+    b.step();
+  }
+  const Vec3 before = b.model.membrane().entry_m;
+  b.world.R = 63e-6;
+  for (int k = 0; k < 1500; ++k) {
+    b.step();
+  }
+  EXPECT_GT((b.model.membrane().entry_m - before).norm(), 2e-6);
+  EXPECT_NEAR(b.model.membrane().entry_m.z(), before.z(), 1e-12);
+}
+
 TEST(PoseHistory, begins_anew_when_the_clock_jumps_back) {
   static PoseHistory history;
   for (int k = 0; k < 100; ++k) {

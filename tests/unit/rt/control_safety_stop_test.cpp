@@ -55,6 +55,21 @@ TEST(SafetyStop, gives_no_force_on_the_tick_that_clears_it) {
   EXPECT_EQ(out.faults_latched, bit(Fault::hand_lost));
 }
 
+TEST(SafetyStop, is_not_cleared_while_either_contact_is_open) {
+  for (const bool a : {true, false}) {
+    SafetyStop stop{EstopParams{}};
+    Readings readings = chain();
+    (a ? readings.estop.contact_a_closed : readings.estop.contact_b_closed) = false;
+    (void)stop.step(Fault::estop, kForce, readings, 1e-3);
+    for (int k = 0; k < 1000; ++k) {
+      (void)stop.step(Fault::none, kForce, readings, 1e-3);
+    }
+    ASSERT_EQ(stop.stage(), StopStage::stopped);
+    readings.estop.reset_pressed = true;
+    EXPECT_FALSE(stop.step(Fault::none, kForce, readings, 1e-3).latch.cleared);
+  }
+}
+
 TEST(SafetyStop, remembers_a_discrepancy_behind_an_open_contact) {
   SafetyStop stop{EstopParams{}};
   Readings readings = chain();

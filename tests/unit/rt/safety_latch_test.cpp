@@ -109,6 +109,16 @@ TEST(SafetyLatch, takes_drive_power_only_after_the_stop_at_standstill_or_after_t
   });
 }
 
+TEST(SafetyLatch, leaves_the_drive_its_power_to_brake_with_also_where_no_force_has_to_fade) {
+  EstopParams params = short_times();
+  params.hand_ramp_s = 0;
+  SafetyLatch latch(params);
+  LatchInput in;
+  in.cause = Fault::estop;
+  EXPECT_TRUE(latch.step(in, kTick_s).drive_power);  // the standstill is from before the stop
+  EXPECT_FALSE(latch.step(in, kTick_s).drive_power);
+}
+
 TEST(SafetyLatch, lets_the_hand_force_only_fall) {
   explore([](const auto& before, const auto&, const auto& after, const auto& out) {
     if (before.stage != StopStage::running && after.stage != StopStage::running) {

@@ -5,12 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
 
 #include "rt/forces/list.hpp"
 #include "tools/shared/csv.hpp"
+#include "tools/shared/whole_file.hpp"
 
 namespace punctum::tools {
 namespace {
@@ -313,12 +313,7 @@ tl::expected<void, std::string> write_report(const std::string& path, const Scen
   uname(&system);
   j["machine"] = {{"kernel", std::string(system.release) + " " + system.version},
                   {"architecture", system.machine}};
-  std::ofstream out(path);
-  out << j.dump(2, ' ', false, Json::error_handler_t::replace) << '\n';
-  if (!out.flush()) {
-    return tl::unexpected(path + ": cannot be written");
-  }
-  return {};
+  return write_whole(path, j.dump(2, ' ', false, Json::error_handler_t::replace) + '\n');
 }
 
 std::string summary(const Scene& scene, const RunResult& result, const Measures& m,

@@ -12,6 +12,7 @@
 #include <fstream>
 #include <vector>
 
+#include "tools/scene/messages.hpp"
 #include "tools/shared/whole_file.hpp"
 
 namespace punctum::tools {
@@ -118,7 +119,7 @@ tl::expected<ReportFolder, std::string> prepare_report_folder(const Scene& scene
                                                               bool overwrite) {
   std::error_code ec;
   ReportFolder report;
-  const fs::path name = (wanted.empty() ? fs::path(dated_name(scene.name)) : fs::path(wanted)).lexically_normal();
+  const fs::path name = (wanted.empty() ? fs::path(dated_name(printable(scene.name))) : fs::path(wanted)).lexically_normal();
   fs::path folder = name.has_filename() ? name : name.parent_path();
   const bool there = fs::exists(fs::symlink_status(folder, ec));
   if (there && !fs::is_directory(folder, ec)) {

@@ -27,6 +27,7 @@
 #include "tools/punctum/run_report.hpp"
 #include "tools/punctum/terminal.hpp"
 #include "tools/punctum/vision_process.hpp"
+#include "tools/scene/messages.hpp"
 #include "tools/shared/exit_codes.hpp"
 #include "tools/shared/station_segments.hpp"
 #include "tools/shared/stop_signal.hpp"
@@ -256,8 +257,8 @@ class Run {
 };
 
 int Run::run() {
-  terminal_.say("{}: {} ({} Hz, {} clock, seed {})", scene_.name,
-                scene_.title.empty() ? scene_.source : scene_.title, scene_.servo.rate_Hz,
+  terminal_.say("{}: {} ({} Hz, {} clock, seed {})", printable(scene_.name),
+                printable(scene_.title.empty() ? scene_.source : scene_.title, 200), scene_.servo.rate_Hz,
                 scene_.clock == ClockKind::real ? "real" : "virtual", scene_.sim ? scene_.sim->seed : 0);
   terminal_.say("report: {}{}", folder_,
                 report_folder_.replaces.empty()
@@ -459,7 +460,7 @@ int Run::report() {
     terminal_.complain(written.error());
   }
   std::string folder = folder_;
-  if (written && !report_folder_.replaces.empty()) {
+  if (written && !report_folder_.replaces.empty() && !vision_was_refused_) {
     if (auto moved = take_place(report_folder_)) {
       folder = *moved;
     } else {

@@ -19,6 +19,11 @@ void say(std::string_view text) noexcept {
   (void)std::fflush(stdout);
 }
 
+void say_aside(std::string_view text) noexcept {
+  write(stderr, text);
+  (void)std::fflush(stderr);
+}
+
 void complain(std::string_view text) noexcept {
   write(stderr, text);
   write(stderr, "\n");

@@ -7,8 +7,9 @@
 
 namespace punctum::tools {
 
-void say(std::string_view text) noexcept;       // on the standard output, as it is
-void complain(std::string_view text) noexcept;  // on the standard error output, as a line of its own
+void say(std::string_view text) noexcept;        // on the standard output, as it is
+void say_aside(std::string_view text) noexcept;  // on the standard error output, as it is
+void complain(std::string_view text) noexcept;   // likewise, as a line of its own
 
 // For programs whose words are their result: whether all of them were taken. Where they were not, one line on
 // the standard error output says so.

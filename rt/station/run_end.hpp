@@ -27,18 +27,9 @@ inline constexpr int kRunEnds = 12;
 
 // As report.json has it.
 [[nodiscard]] constexpr const char* name(RunEnd e) NONBLOCKING {
-  constexpr const char* names[] = {"running",
-                                   "done",
-                                   "cell lost",
-                                   "not injected",
-                                   "time limit",
-                                   "stopped",
-                                   "fault",
-                                   "core died",
-                                   "invalid set-up",
-                                   "injected in part",
-                                   "done after a fault",
-                                   "without vision"};
+  constexpr const char* names[] = {
+      "running", "done",      "cell lost",      "not injected",     "time limit",         "stopped",
+      "fault",   "core died", "invalid set-up", "injected in part", "done after a fault", "without vision"};
   static_assert(sizeof names == kRunEnds * sizeof names[0]);
   return names[static_cast<int>(e)];
 }

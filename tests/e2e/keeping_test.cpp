@@ -131,8 +131,8 @@ TEST_F(Programs, a_run_that_may_write_more_than_there_is_room_for_says_so_before
   ASSERT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "0.1", "--samples-every", "1"}), 0);
   EXPECT_EQ(said_.find("MB are free"), std::string::npos) << said_;
   // At its time limit it has written terabytes.
-  Running long_run({"run", "free", "--seconds", "1000000", "--rate", "8000", "--samples-every", "1", "--report",
-                    report("l"), "--no-figure"},
+  Running long_run({"run", "free", "--seconds", "1000000", "--rate", "8000", "--samples-every", "1",
+                    "--report", report("l"), "--no-figure"},
                    words("l"));
   for (int i = 0; i < 500 && long_run.output().find("report:") == std::string::npos; ++i) {
     std::this_thread::sleep_for(10ms);
@@ -146,8 +146,8 @@ TEST_F(Programs, a_run_that_may_write_more_than_there_is_room_for_says_so_before
 // ---- earlier reports ----
 
 TEST_F(Programs, a_run_leaves_an_earlier_report_alone_and_says_where_it_writes_instead) {
-  const Strings args{"run",    "free",          "--clock", "virtual", "--seconds", "0.5", "--report", report(),
-                     "--no-figure"};
+  const Strings args{"run", "free",     "--clock", "virtual",    "--seconds",
+                     "0.5", "--report", report(),  "--no-figure"};
   Running first(args, words("1"));
   ASSERT_EQ(first.wait(), 0) << first.output();
   const std::string before = read_all(fs::path(report()) / "report.json");
@@ -202,8 +202,8 @@ TEST_F(Programs, with_overwrite_the_old_report_stays_until_the_new_one_is_whole)
 // ---- samples that are lost ----
 
 TEST_F(Programs, samples_that_a_stopped_parent_did_not_read_are_counted) {
-  Running run({"run", "free", "--rate", "8000", "--seconds", "60", "--set", kPatientRelay, "--report", report(),
-               "--no-figure", "--quiet"},
+  Running run({"run", "free", "--rate", "8000", "--seconds", "60", "--set", kPatientRelay, "--report",
+               report(), "--no-figure", "--quiet"},
               words());
   Look look("free", run);
   ASSERT_TRUE(look.until_started()) << run.output();

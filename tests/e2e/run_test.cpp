@@ -214,7 +214,8 @@ TEST_F(Programs, a_core_that_is_told_three_times_to_end_leaves_its_devices_witho
 
 TEST_F(Programs, every_signal_that_ends_a_program_stops_the_core_in_order) {
   for (const int signal : {SIGTERM, SIGINT, SIGHUP, SIGQUIT}) {
-    Running run({"run", "free", "--seconds", "60", "--report", report(), "--overwrite", "--no-figure"}, words());
+    Running run({"run", "free", "--seconds", "60", "--report", report(), "--overwrite", "--no-figure"},
+                words());
     Look look("free", run);
     ASSERT_TRUE(look.until_started()) << run.output();
     std::this_thread::sleep_for(300ms);

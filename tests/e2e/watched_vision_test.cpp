@@ -81,8 +81,8 @@ TEST_F(Programs, vision_goes_on_when_none_of_its_files_can_be_kept) {
 // ---- the outcome ----
 
 TEST_F(Programs, a_time_limit_before_the_injection_is_called_a_time_limit) {
-  EXPECT_EQ(punctum({"run", "icsi", "--clock", "virtual", "--seconds", "9", "--set", "vision.method=truth", "--set",
-                     "sim.operator.reaction_s=2"}),
+  EXPECT_EQ(punctum({"run", "icsi", "--clock", "virtual", "--seconds", "9", "--set", "vision.method=truth",
+                     "--set", "sim.operator.reaction_s=2"}),
             1)
       << said_;
   EXPECT_EQ(json()["outcome"], "time limit") << said_;

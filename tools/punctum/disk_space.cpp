@@ -16,9 +16,7 @@ constexpr double kFramesPerAnnotated = 12;
 constexpr double kRest_bytes = 4e6;  // the report, the figure and its script, the logs
 
 double frame_rate(const Scene& scene) {
-  return scene.recorded            ? scene.recorded->fps
-         : scene.simulated_camera() ? scene.sim->microscope->fps
-                                    : 0;
+  return scene.recorded ? scene.recorded->fps : scene.simulated_camera() ? scene.sim->microscope->fps : 0;
 }
 
 }  // namespace
@@ -38,8 +36,9 @@ tl::expected<std::string, std::string> look_for_space(const std::string& folder,
   }
   const auto free = static_cast<double>(space.available);
   if (free < kRest_bytes) {
-    return tl::unexpected(fmt::format("{}: {:.1f} MB are free on its disk, needed: {:.0f} MB for the report alone",
-                                      folder, free * 1e-6, kRest_bytes * 1e-6));
+    return tl::unexpected(
+        fmt::format("{}: {:.1f} MB are free on its disk, needed: {:.0f} MB for the report alone", folder,
+                    free * 1e-6, kRest_bytes * 1e-6));
   }
   if (free >= bytes_wanted) {
     return std::string();

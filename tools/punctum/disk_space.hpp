@@ -19,8 +19,8 @@ struct ExpectedRecording {
 // Bytes that a run writes into its folder, at most or nearly so.
 [[nodiscard]] double bytes_written(const Scene& scene, const ExpectedRecording& recording);
 
-// The error, one line: not even the report itself finds room. The value, one line: what may not find room; empty
-// where everything does, or where nobody knows.
+// The error, one line: not even the report itself finds room. The value, one line: what may not find room;
+// empty where everything does, or where nobody knows.
 [[nodiscard]] tl::expected<std::string, std::string> look_for_space(const std::string& folder,
                                                                     double bytes_wanted);
 

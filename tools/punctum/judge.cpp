@@ -7,8 +7,8 @@ using rt::RunEnd;
 
 // A run that came to its end: whether something happened on the way that somebody should look into.
 RunEnd ended_well(const rt::CoreStatus& core) {
-  constexpr std::uint64_t kNoFaults = 1ULL << static_cast<unsigned>(rt::Fault::none) |
-                                      1ULL << static_cast<unsigned>(rt::Fault::command_stop);
+  constexpr std::uint64_t kNoFaults =
+      1ULL << static_cast<unsigned>(rt::Fault::none) | 1ULL << static_cast<unsigned>(rt::Fault::command_stop);
   return (core.faults_latched.load() & ~kNoFaults) != 0 ? RunEnd::after_fault : RunEnd::done;
 }
 

@@ -14,8 +14,8 @@ Whereabouts in_truth(const sim::Truth& truth) {
   w.source = Whereabouts::truth;
   w.depth_m = -truth.gap_m;
   w.where = truth.zona_punctured && truth.gap_m < 0 ? Whereabouts::inside
-            : truth.contact                        ? Whereabouts::touching
-                                                   : Whereabouts::outside;
+            : truth.contact                         ? Whereabouts::touching
+                                                    : Whereabouts::outside;
   return w;
 }
 
@@ -275,7 +275,8 @@ void Measures::tick(const rt::TelemetrySample& s, const sim::Snapshot* world) {
   last_s = s.t_s;
 }
 
-// As the core saw it. Its model tells a depth once it knows a membrane; its phases, whether the tip is inside.
+// As the core saw it. Its model tells a depth once it knows a membrane; its phases, whether the tip is
+// inside.
 Whereabouts Measures::believed() const {
   Whereabouts w;
   w.source = Whereabouts::core;

@@ -71,8 +71,8 @@ struct CellMeasures {
   // button was down there. Given: in truth where the cell is simulated, otherwise as the injector reports.
   double asked_s = 0;
   std::optional<double> injected_s;
-  bool done = false;                 // the core came to `clear`
-  bool lost = false;                 // in truth: torn, pierced through or off the pipette
+  bool done = false;  // the core came to `clear`
+  bool lost = false;  // in truth: torn, pierced through or off the pipette
 
   // A button is read once in a tick, and valve and line answer within some 10 ms. What is missing beyond that
   // and a tenth of the dose did not go into the cell.
@@ -98,7 +98,8 @@ struct Whereabouts {
   };
   Where where = unknown;
   Source source = nobody;
-  std::optional<double> depth_m{};  // of the tip, past the undeformed outer membrane along the axis; < 0: before it
+  std::optional<double>
+      depth_m{};  // of the tip, past the undeformed outer membrane along the axis; < 0: before it
 };
 // As report.json has them.
 [[nodiscard]] constexpr const char* name(Whereabouts::Where where) noexcept {
@@ -125,7 +126,7 @@ class Measures {
   std::vector<CellMeasures> cells;
   std::uint64_t phase_count = 0, cell_count = 0, cells_done = 0, cells_lost = 0;
   std::uint64_t cells_without_injection =
-      0;  // clear and whole, but nothing came out of the injector that is there
+      0;                               // clear and whole, but nothing came out of the injector that is there
   std::uint64_t cells_underdosed = 0;  // clear and whole, but got clearly less than was asked
   double asked_s = 0, injected_s = 0;  // of all cells
   Spread contact_delay_s, puncture_delay_s, inner_delay_s, lateral_error_m, lateral_contact_m,

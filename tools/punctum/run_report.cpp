@@ -344,7 +344,8 @@ std::string summary(const Scene& scene, const RunResult& result, const Measures&
     line("cells",
          fmt::format(
              "{} done, {} lost, {}{} tried", m.cells_done, m.cells_lost,
-             (m.cells_without_injection > 0 ? fmt::format("{} got nothing, ", m.cells_without_injection) : "") +
+             (m.cells_without_injection > 0 ? fmt::format("{} got nothing, ", m.cells_without_injection)
+                                            : "") +
                  (m.cells_underdosed > 0 ? fmt::format("{} got too little, ", m.cells_underdosed) : ""),
              m.cell_count));
     if (scene.servo.injector) {

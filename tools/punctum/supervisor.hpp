@@ -15,7 +15,7 @@ struct RunSettings {
   bool frames = true;               // annotated frames
   bool figure = true;
   bool overwrite = false;  // an earlier report in the folder
-  bool quiet = false;  // the summary only
+  bool quiet = false;      // the summary only
 };
 
 // Returns an ExitCode.

@@ -1,4 +1,5 @@
-// Vision as its parent sees it: started, and started again when it dies or hangs, at once and then ever slower.
+// Vision as its parent sees it: started, and started again when it dies or hangs, at once and then ever
+// slower.
 #pragma once
 
 #include <atomic>

@@ -36,8 +36,9 @@ struct Progress::Shared {
     const auto full = static_cast<std::size_t>(part * kBar);
     const double seconds = std::chrono::duration<double>(t - begun).count();
     if (terminal) {
-      tools::say_aside(fmt::format("\r{:<12}[{}{}] {:3.0f} %  {} {:.0f} s\033[K", topic, std::string(full, '#'),
-                                   std::string(kBar - full, '.'), part * 100, what, seconds));
+      tools::say_aside(fmt::format("\r{:<12}[{}{}] {:3.0f} %  {} {:.0f} s\033[K", topic,
+                                   std::string(full, '#'), std::string(kBar - full, '.'), part * 100, what,
+                                   seconds));
     } else {
       tools::complain(fmt::format("{:<12}{:3.0f} %  {} {:.0f} s", topic, part * 100, what, seconds));
     }

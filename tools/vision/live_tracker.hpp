@@ -1,6 +1,6 @@
-// The tracker of a live camera, which starts anew after a gap in time. What it knew of needle and cell, and of
-// where they were going, is then of another moment: followed from there, a needle that has moved away may never
-// be found again.
+// The tracker of a live camera, which starts anew after a gap in time. What it knew of needle and cell, and
+// of where they were going, is then of another moment: followed from there, a needle that has moved away may
+// never be found again.
 #pragma once
 
 #include <algorithm>

@@ -123,8 +123,7 @@ int run(int argc, char** argv) {
   sim::BenchClock clock(**bench);
   waiting_clock = &clock;
   sim::SimCamera camera(*scene->sim, **bench, **answers, sim::SimCamera::Picture::none);
-  const int code =
-      observe(camera, clock, **bench, **observations, tools::VisionLiar(scene->sim->seed));
+  const int code = observe(camera, clock, **bench, **observations, tools::VisionLiar(scene->sim->seed));
   waiting_clock = nullptr;
   return code;
 }

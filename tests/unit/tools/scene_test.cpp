@@ -831,8 +831,12 @@ TEST(SceneText, a_byte_order_mark_before_the_text_changes_nothing) {
 }
 
 TEST(SceneText, what_is_printed_of_a_scene_gives_a_terminal_no_orders) {
-  EXPECT_EQ(printable("a\x1b[31mb\x07\x7f" "c"), "a [31mb  c");
-  EXPECT_EQ(printable("\xc2\x9b" "2J caf\xc3\xa9 \xc2\xb5m"), " 2J caf\xc3\xa9 \xc2\xb5m");
+  EXPECT_EQ(printable("a\x1b[31mb\x07\x7f"
+                      "c"),
+            "a [31mb  c");
+  EXPECT_EQ(printable("\xc2\x9b"
+                      "2J caf\xc3\xa9 \xc2\xb5m"),
+            " 2J caf\xc3\xa9 \xc2\xb5m");
 }
 
 }  // namespace

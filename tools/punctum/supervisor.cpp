@@ -231,6 +231,7 @@ class Run {
   void watch_vision();
   void tell_progress();
   void tell_what_is_not_kept();
+  [[nodiscard]] int refuse(const std::string& why);
   Ended watch_until_the_core_ends();
   void judge_end(const Ended& core);
   void let_devices_come_to_rest();
@@ -272,27 +273,21 @@ int Run::run() {
   const bool vision_follows_core = scene_.recorded && scene_.clock == ClockKind::real;
   if (scene_.vision && !vision_follows_core) {
     if (auto started = vision_.start(); !started) {
-      terminal_.complain(started.error());
-      return exit_bad_input;
+      return refuse(started.error());
     }
   }
   const HandedSegments handed = for_core(segments_);
   if (auto started =
           core_.start(core_arguments(scene_, folder_, handed), folder_ + "/core.log", handed.descriptors());
       !started) {
-    terminal_.complain(started.error());
-    return exit_bad_input;
+    return refuse(started.error());
   }
   begun_ = std::chrono::steady_clock::now();
   const Ended core = watch_until_the_core_ends();
   recorder_.finish();
   terminal_.clear_progress();
   if (core.exited && core.code == exit_bad_input) {  // it has not begun
-    terminal_.complain(fmt::format("punctum-core: {}", last_line(core_.log())));
-    vision_.send(SIGTERM);
-    vision_.end();
-    discard(report_folder_);
-    return exit_bad_input;
+    return refuse(fmt::format("punctum-core: {}", last_line(core_.log())));
   }
   judge_end(core);
   if (segments_.bench) {
@@ -301,6 +296,15 @@ int Run::run() {
   vision_.end();
   tell_what_is_not_kept();
   return report();
+}
+
+// It has not begun: nothing has moved, and there is nothing to keep.
+int Run::refuse(const std::string& why) {
+  terminal_.complain(why);
+  vision_.end(true);
+  reserve_.give_back();
+  discard(report_folder_);
+  return exit_bad_input;
 }
 
 Ended Run::watch_until_the_core_ends() {
@@ -407,6 +411,13 @@ void Run::judge_end(const Ended& core) {
   result_.wall_s = now_s();
   if (result_.end == rt::RunEnd::fault) {
     result_.detail = rt::name(static_cast<rt::Fault>(status().fault.load()));
+  }
+  const Measures& m = recorder_.measures();
+  if (result_.end == rt::RunEnd::after_fault && !m.faults.empty()) {
+    result_.detail = fmt::format("{} at {:.3f} s", rt::name(m.faults.front().fault), m.faults.front().t_s);
+  }
+  if (result_.end == rt::RunEnd::underdosed) {
+    result_.detail = fmt::format("{:.2f} s of {:.2f} s asked", m.injected_s, m.asked_s);
   }
   if (result_.end == rt::RunEnd::core_died) {
     result_.detail = core.text();

@@ -106,7 +106,7 @@ VisionProcess::News VisionProcess::watch(double now_s, double run_s) {
   return News::none;
 }
 
-void VisionProcess::end() {
+void VisionProcess::end(bool at_once) {
   if (!child_.running()) {
     return;
   }
@@ -115,7 +115,7 @@ void VisionProcess::end() {
   Ended how;
   while (!child_.ended(how)) {
     const auto waited = std::chrono::steady_clock::now() - begun;
-    if (!asked && waited > kTimeToEnd) {
+    if (!asked && (at_once || waited > kTimeToEnd)) {
       child_.send(SIGTERM);
       asked = true;
     }

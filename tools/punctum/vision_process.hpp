@@ -35,13 +35,13 @@ class VisionProcess {
   [[nodiscard]] tl::expected<void, std::string> start();
   // Once per round of the parent; run_s is the time of the run, for the record of restarts.
   [[nodiscard]] News watch(double now_s, double run_s);
-  // The plant has stopped: vision ends by itself. When it does not, it is asked to, and then killed.
-  void end();
+  // The plant has stopped: vision ends by itself. When it does not, it is asked to, and then killed. At once:
+  // it is asked without waiting, for the plant never was.
+  void end(bool at_once = false);
 
   [[nodiscard]] bool was_started() const noexcept { return started_; }
   [[nodiscard]] bool over() const noexcept { return over_; }
   [[nodiscard]] const std::vector<Restart>& restarts() const noexcept { return restarts_; }
-  void send(int signal) const noexcept { child_.send(signal); }
 
  private:
   void start_again();

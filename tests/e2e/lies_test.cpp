@@ -130,7 +130,7 @@ class Lies : public Programs, public testing::WithParamInterface<Row> {
   // Every snapshot of one run; empty if some were missed.
   std::vector<sim::Snapshot> run(const Strings& args) {
     Strings all = args;
-    all.insert(all.end(), {"--report", report(), "--no-figure", "--no-frames", "--quiet"});
+    all.insert(all.end(), {"--report", report(), "--overwrite", "--no-figure", "--no-frames", "--quiet"});
     Running running(all, words());
     const std::string name = "icsi-" + std::to_string(running.pid());
     std::optional<hal::Shared<const sim::Bench>> bench;

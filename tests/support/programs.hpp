@@ -135,10 +135,10 @@ class Programs : public testing::Test {
   [[nodiscard]] std::string report(const std::string& name = "r") const { return (folder_ / name).string(); }
   [[nodiscard]] fs::path words(const std::string& name = "r") const { return folder_ / (name + ".txt"); }
 
-  // Runs to the end. `args` after the command; the report goes to report(name).
+  // Runs to the end. `args` after the command; the report goes to report(name), in place of an earlier one.
   int punctum(std::vector<std::string> args, const std::string& name = "r") {
     if (args.front() == "run") {
-      args.insert(args.end(), {"--report", report(name), "--no-figure", "--no-frames"});
+      args.insert(args.end(), {"--report", report(name), "--overwrite", "--no-figure", "--no-frames"});
     }
     Running running(args, words(name));
     const int code = running.wait();
@@ -181,6 +181,7 @@ class Look {
   }
   bool until_started() { return until(rt::Phase::free); }
   [[nodiscard]] pid_t core() const { return static_cast<pid_t>((*core_)->status.pid.load()); }
+  [[nodiscard]] std::uint64_t ticks() const { return (*core_)->status.ticks.load(); }
   [[nodiscard]] const sim::Bench& bench() const { return **bench_; }
   [[nodiscard]] pid_t vision() const { return static_cast<pid_t>((*camera_)->pid.load()); }
 

@@ -11,6 +11,7 @@
 #include "rt/control/device_limits.hpp"
 #include "rt/forces/list.hpp"
 #include "rt/platform/real_time_rights.hpp"
+#include "tools/scene/messages.hpp"
 #include "tools/scene/scene_keys.hpp"
 #include "tools/shared/child.hpp"
 
@@ -144,7 +145,7 @@ std::string explain(const Scene& s) {
   std::string out;
   const auto line = [&out](const std::string& text) { out += text + "\n"; };
   const double rate = s.servo.rate_Hz;
-  line(fmt::format("{}: {}", s.name, s.title.empty() ? s.source : s.title));
+  line(fmt::format("{}: {}", printable(s.name), printable(s.title.empty() ? s.source : s.title, 200)));
   line(fmt::format("  task       {}{}",
                    !s.servo.phases     ? "none, runs until its time limit"
                    : s.servo.cells > 0 ? fmt::format("inject {} cell(s)", s.servo.cells)

@@ -4,10 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <iterator>
 #include <string>
+#include <utility>
 
 #include "rt/forces/list.hpp"
 
@@ -52,18 +51,16 @@ constexpr int kMostFaultsKept = 20;  // a station that is reset again and again 
 tl::expected<Recorder, std::string> Recorder::create(const std::string& folder, const Scene& scene,
                                                      const rt::CoreSegment& core, sim::Bench* bench,
                                                      std::uint64_t every) {
-  const std::string csv_path = folder + "/samples.csv";
-  std::FILE* file = std::fopen(csv_path.c_str(), "we");
-  if (file == nullptr) {
-    return tl::unexpected(fmt::format("{}: {}", csv_path, std::strerror(errno)));
+  auto file = RowFile::open(folder + "/samples.csv", RowFile::Begin::empty);
+  if (!file) {
+    return tl::unexpected(file.error());
   }
-  return Recorder(file, folder, scene, core, bench, every);
+  return Recorder(std::move(*file), folder, scene, core, bench, every);
 }
 
-Recorder::Recorder(std::FILE* file, const std::string& folder, const Scene& scene,
-                   const rt::CoreSegment& core, sim::Bench* bench, std::uint64_t every)
-    : file_(file),
-      fault_path_(folder + "/fault.csv"),
+Recorder::Recorder(RowFile file, const std::string& folder, const Scene& scene, const rt::CoreSegment& core,
+                   sim::Bench* bench, std::uint64_t every)
+    : folder_(folder),
       recent_(static_cast<std::size_t>(kBeforeFault_s * scene.servo.rate_Hz)),
       sim_(scene.sim.value_or(sim::SimConfig{})),
       measures_(scene),
@@ -72,7 +69,8 @@ Recorder::Recorder(std::FILE* file, const std::string& folder, const Scene& scen
       every_(every > 0 ? every : 1),
       half_period_s_(0.5 / scene.servo.rate_Hz),
       ticks_after_fault_(static_cast<std::uint64_t>(kAfterFault_s * scene.servo.rate_Hz)) {
-  std::fputs(columns().c_str(), file);
+  samples_.file = std::move(file);
+  samples_.file.append(columns());
   if (bench != nullptr) {
     taker_ = std::make_unique<sim::SnapshotTaker>(*bench);
     taker_->attach();
@@ -119,11 +117,11 @@ const sim::Snapshot* Recorder::world_of(const rt::TelemetrySample& s) {
 
 void Recorder::record(const rt::TelemetrySample& s, const sim::Snapshot* world) {
   measures_.tick(s, world);
-  const bool change = rows_ == 0 || s.phase != before_.phase || s.fault != before_.fault ||
+  const bool change = measures_.ticks == 1 || s.phase != before_.phase || s.fault != before_.fault ||
                       s.stop != before_.stop || s.estop != before_.estop || s.cell != before_.cell;
   if (change || s.tick % every_ == 0) {
-    row(file_.get(), s, world);
-    ++rows_;
+    row(samples_, s, world);
+    rows_ += samples_.failed ? 0 : 1;
   }
   record_fault(s, world);
   before_ = s;
@@ -131,7 +129,7 @@ void Recorder::record(const rt::TelemetrySample& s, const sim::Snapshot* world) 
 
 void Recorder::record_fault(const rt::TelemetrySample& s, const sim::Snapshot* world) {
   if (after_fault_ > 0) {
-    row(fault_file_.get(), s, world);
+    row(fault_, s, world);
     --after_fault_;
     return;
   }
@@ -152,27 +150,38 @@ void Recorder::keep_last_seconds() {
     return;
   }
   ++faults_kept_;
-  if (!fault_file_) {
-    std::FILE* const opened = std::fopen(fault_path_.c_str(), "we");
-    if (opened == nullptr) {
-      failed_ = true;
-      return;
+  if (!fault_.file.is_open() && !fault_.failed) {
+    if (auto opened = RowFile::open(folder_ + "/" + fault_.name, RowFile::Begin::empty)) {
+      fault_.file = std::move(*opened);
+      fault_.file.append(columns());
+    } else {
+      note_failure(fault_, opened.error(), before_.t_s);
     }
-    fault_file_ = File(opened);
-    std::fputs(columns().c_str(), fault_file_.get());
   }
   for (std::uint64_t i = recent_end_ - recent_count_; i < recent_end_; ++i) {
     const Tick& tick = recent_[i % recent_.size()];
-    row(fault_file_.get(), tick.sample, tick.has_world ? &tick.world : nullptr);
+    row(fault_, tick.sample, tick.has_world ? &tick.world : nullptr);
   }
   recent_count_ = 0;
   after_fault_ = ticks_after_fault_;
-  if (std::fflush(fault_file_.get()) != 0) {
-    failed_ = true;
+  flush(fault_, before_.t_s);
+}
+
+void Recorder::flush(Table& table, double t_s) {
+  table.file.flush();
+  if (!table.file.failure().empty()) {
+    note_failure(table, table.file.failure(), t_s);
   }
 }
 
-void Recorder::row(std::FILE* file, const rt::TelemetrySample& s, const sim::Snapshot* world) {
+void Recorder::note_failure(Table& table, const std::string& why, double t_s) {
+  if (!table.failed) {
+    table.failed = true;
+    not_kept_.push_back({table.name, t_s, why});
+  }
+}
+
+void Recorder::row(Table& table, const rt::TelemetrySample& s, const sim::Snapshot* world) {
   fmt::basic_memory_buffer<char, 1024> out;
   const auto put = [&out](double v) { fmt::format_to(std::back_inserter(out), FMT_COMPILE("{:.9g},"), v); };
   const auto count = [&out](std::uint64_t v) {
@@ -228,19 +237,17 @@ void Recorder::row(std::FILE* file, const rt::TelemetrySample& s, const sim::Sna
     put(s.effect_N[i]);
   }
   out.data()[out.size() - 1] = '\n';  // in place of the last comma
-  if (std::fwrite(out.data(), 1, out.size(), file) != out.size()) {
-    failed_ = true;
+  table.file.append({out.data(), out.size()});
+  if (!table.file.failure().empty()) {
+    note_failure(table, table.file.failure(), s.t_s);
   }
 }
 
 void Recorder::finish() {
   drain(true);
   measures_.finish();
-  for (std::FILE* file : {file_.get(), fault_file_.get()}) {
-    if (file != nullptr && std::fflush(file) != 0) {
-      failed_ = true;
-    }
-  }
+  flush(samples_, measures_.last_s);
+  flush(fault_, measures_.last_s);
 }
 
 }  // namespace punctum::tools

@@ -8,9 +8,9 @@
 #include <algorithm>
 #include <cctype>
 #include <chrono>
-#include <fstream>
 #include <optional>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "hal/ipc/rendezvous.hpp"
@@ -19,6 +19,7 @@
 #include "hal/sim/world.hpp"
 #include "rt/station/station.hpp"
 #include "tools/punctum/core_process.hpp"
+#include "tools/punctum/disk_space.hpp"
 #include "tools/punctum/judge.hpp"
 #include "tools/punctum/recorder.hpp"
 #include "tools/punctum/report_folder.hpp"
@@ -26,9 +27,11 @@
 #include "tools/punctum/run_report.hpp"
 #include "tools/punctum/terminal.hpp"
 #include "tools/punctum/vision_process.hpp"
+#include "tools/scene/messages.hpp"
 #include "tools/shared/exit_codes.hpp"
 #include "tools/shared/station_segments.hpp"
 #include "tools/shared/stop_signal.hpp"
+#include "tools/shared/whole_file.hpp"
 
 namespace punctum::tools {
 namespace {
@@ -202,17 +205,21 @@ std::vector<std::string> vision_arguments(const Scene& scene, const std::string&
 // One run, from the first process to the report.
 class Run {
  public:
-  Run(const Scene& scene, const RunSettings& settings, const std::string& folder, Segments& segments,
-      Recorder& recorder, Terminal& terminal)
+  Run(const Scene& scene, const RunSettings& settings, const ReportFolder& report_folder, Segments& segments,
+      Recorder& recorder, SpaceReserve& reserve, Terminal& terminal)
       : scene_(scene),
         settings_(settings),
-        folder_(folder),
+        report_folder_(report_folder),
+        folder_(report_folder.folder),
+        reserve_(reserve),
         segments_(segments),
         recorder_(recorder),
         terminal_(terminal),
         core_(*segments.core, segments.commands.front()->queue, scene.clock == ClockKind::real, terminal),
-        vision_(vision_arguments(scene, folder, for_vision(segments), settings.frames),
-                for_vision(segments).descriptors(), folder + "/vision.log", terminal) {}
+        vision_(vision_arguments(scene, folder_, for_vision(segments), settings.frames),
+                for_vision(segments).descriptors(), folder_ + "/vision.log",
+                segments.observation ? &(*segments.observation)->rounds : nullptr,
+                scene.clock == ClockKind::real, terminal) {}
 
   int run();
 
@@ -223,14 +230,19 @@ class Run {
   [[nodiscard]] const rt::CoreStatus& status() const { return segments_.core->status; }
   void watch_vision();
   void tell_progress();
+  void tell_what_is_not_kept();
+  [[nodiscard]] int refuse(const std::string& why);
   Ended watch_until_the_core_ends();
   void judge_end(const Ended& core);
   void let_devices_come_to_rest();
   int report();
+  [[nodiscard]] bool draw_figure();
 
   const Scene& scene_;
   const RunSettings& settings_;
-  const std::string& folder_;
+  const ReportFolder& report_folder_;
+  std::string folder_;
+  SpaceReserve& reserve_;
   Segments& segments_;
   Recorder& recorder_;
   Terminal& terminal_;
@@ -240,46 +252,59 @@ class Run {
   bool vision_was_refused_ = false;
   bool rights_told_ = false;
   double next_progress_s_ = 0;
+  std::size_t recorder_failures_ = 0;       // told so far
+  std::uint64_t vision_does_not_keep_ = 0;  // likewise
   RunResult result_;
 };
 
 int Run::run() {
-  terminal_.say("{}: {} ({} Hz, {} clock, seed {})", scene_.name,
-                scene_.title.empty() ? scene_.source : scene_.title, scene_.servo.rate_Hz,
+  terminal_.say("{}: {} ({} Hz, {} clock, seed {})", printable(scene_.name),
+                printable(scene_.title.empty() ? scene_.source : scene_.title, 200), scene_.servo.rate_Hz,
                 scene_.clock == ClockKind::real ? "real" : "virtual", scene_.sim ? scene_.sim->seed : 0);
-  terminal_.say("report: {}", folder_);
+  terminal_.say("report: {}{}", folder_,
+                report_folder_.replaces.empty()
+                    ? ""
+                    : fmt::format(" (takes the place of {} once it is whole)", report_folder_.replaces));
+  if (!report_folder_.note.empty()) {
+    terminal_.say("{}", report_folder_.note);
+  }
 
   // Recorded frames play from the core's first tick on; a camera is there before it.
   const bool vision_follows_core = scene_.recorded && scene_.clock == ClockKind::real;
   if (scene_.vision && !vision_follows_core) {
     if (auto started = vision_.start(); !started) {
-      terminal_.complain(started.error());
-      return exit_bad_input;
+      return refuse(started.error());
     }
   }
   const HandedSegments handed = for_core(segments_);
   if (auto started =
           core_.start(core_arguments(scene_, folder_, handed), folder_ + "/core.log", handed.descriptors());
       !started) {
-    terminal_.complain(started.error());
-    return exit_bad_input;
+    return refuse(started.error());
   }
   begun_ = std::chrono::steady_clock::now();
   const Ended core = watch_until_the_core_ends();
   recorder_.finish();
   terminal_.clear_progress();
   if (core.exited && core.code == exit_bad_input) {  // it has not begun
-    terminal_.complain(fmt::format("punctum-core: {}", last_line(core_.log())));
-    vision_.send(SIGTERM);
-    vision_.end();
-    return exit_bad_input;
+    return refuse(fmt::format("punctum-core: {}", last_line(core_.log())));
   }
   judge_end(core);
   if (segments_.bench) {
     (*segments_.bench)->finished.store(1);  // a camera that still waits for the plant ends
   }
   vision_.end();
+  tell_what_is_not_kept();
   return report();
+}
+
+// It has not begun: nothing has moved, and there is nothing to keep.
+int Run::refuse(const std::string& why) {
+  terminal_.complain(why);
+  vision_.end(true);
+  reserve_.give_back();
+  discard(report_folder_);
+  return exit_bad_input;
 }
 
 Ended Run::watch_until_the_core_ends() {
@@ -291,6 +316,7 @@ Ended Run::watch_until_the_core_ends() {
     segments_.rendezvous.serve();
     watch_vision();
     core_.watch(now_s(), stop_signal::count());
+    tell_what_is_not_kept();
     tell_progress();
     if (taken < kBusyRound) {
       std::this_thread::sleep_for(std::chrono::microseconds(scene_.clock == ClockKind::real ? 2000 : 100));
@@ -331,6 +357,30 @@ void Run::watch_vision() {
   }
 }
 
+// At once: whoever stands at the station may still make room, or end the run.
+void Run::tell_what_is_not_kept() {
+  const auto tell = [this](const NotKept& n) {
+    terminal_.complain(
+        fmt::format("{:.3f} s: {} is not kept from here on: {}; the run goes on", n.t_s, n.file, n.why));
+    result_.not_kept.push_back(n);
+  };
+  const std::vector<NotKept>& failures = recorder_.not_kept();
+  for (; recorder_failures_ < failures.size(); ++recorder_failures_) {
+    tell(failures[recorder_failures_]);
+  }
+  if (!segments_.observation) {
+    return;
+  }
+  const std::uint64_t now = (*segments_.observation)->not_kept.load() & ~vision_does_not_keep_;
+  for (const auto& [what, file] : {std::pair{rt::ObservationSegment::observations, "obs.csv"},
+                                   {rt::ObservationSegment::frames, "frames"}}) {
+    if ((now & what) != 0) {
+      tell({file, recorder_.measures().last_s, "vision could not write it"});
+    }
+  }
+  vision_does_not_keep_ |= now;
+}
+
 void Run::tell_progress() {
   const rt::CoreStatus& core = status();
   if (!rights_told_ && core.started.load() != 0) {
@@ -355,11 +405,19 @@ void Run::judge_end(const Ended& core) {
   const RunFacts facts{.core_exited = core.exited,
                        .stop_was_asked = core_.stop_was_asked(),
                        .vision_over = vision_.over(),
-                       .has_task = scene_.has_task()};
+                       .has_task = scene_.has_task(),
+                       .has_vision = scene_.vision.has_value()};
   result_.end = judge(facts, status(), recorder_.measures());
   result_.wall_s = now_s();
   if (result_.end == rt::RunEnd::fault) {
     result_.detail = rt::name(static_cast<rt::Fault>(status().fault.load()));
+  }
+  const Measures& m = recorder_.measures();
+  if (result_.end == rt::RunEnd::after_fault && !m.faults.empty()) {
+    result_.detail = fmt::format("{} at {:.3f} s", rt::name(m.faults.front().fault), m.faults.front().t_s);
+  }
+  if (result_.end == rt::RunEnd::underdosed) {
+    result_.detail = fmt::format("{:.2f} s of {:.2f} s asked", m.injected_s, m.asked_s);
   }
   if (result_.end == rt::RunEnd::core_died) {
     result_.detail = core.text();
@@ -368,6 +426,7 @@ void Run::judge_end(const Ended& core) {
     recorder_.keep_last_seconds();
     let_devices_come_to_rest();
   }
+  result_.needle = recorder_.measures().whereabouts(result_.unattended ? &result_.unattended->last : nullptr);
 }
 
 // The core is dead: what the simulated devices do by themselves.
@@ -398,42 +457,47 @@ int Run::report() {
   result_.rows_every = recorder_.every();
   result_.samples_lost = recorder_.lost();
   const auto contour = read_contour_error(folder_ + "/obs.csv");
-  const std::string path = folder_ + "/report.json";
-  bool complete = true;
-  std::string places;
-  if (auto written = write_report(path, scene_, result_, m, recorder_.events(), status(), contour);
-      !written) {
+  reserve_.give_back();
+  const auto write = [&] {
+    return write_report(folder_ + "/report.json", scene_, result_, m, recorder_.events(), status(), contour);
+  };
+  auto written = write();
+  const bool drawn = settings_.figure && draw_figure();
+  if (settings_.figure && !drawn && !result_.not_kept.empty()) {
+    written = write();  // it tells that, too
+  }
+  if (!written) {
     terminal_.complain(written.error());
-    complete = false;
-  } else {
-    places = fmt::format("report          {}\n", path);
   }
-  if (recorder_.write_failed()) {
-    terminal_.complain(fmt::format("{}: samples are not complete, is the disk full?", folder_));
-    complete = false;
-  }
-  if (settings_.figure) {
-    if (auto drawn = draw_run(folder_, scene_, m, result_.rows); !drawn) {
-      terminal_.complain(fmt::format("no figure: {}", drawn.error()));
+  std::string folder = folder_;
+  if (written && !report_folder_.replaces.empty() && !vision_was_refused_) {
+    if (auto moved = take_place(report_folder_)) {
+      folder = *moved;
     } else {
-      places = fmt::format("figure          {}\n", *drawn) + places;
+      terminal_.complain(moved.error());
+      written = tl::unexpected(moved.error());
     }
   }
+  std::string places = drawn ? fmt::format("figure          {}/figure.png\n", folder) : "";
+  places += written ? fmt::format("report          {}/report.json\n", folder) : "";
   terminal_.print("\n" + summary(scene_, result_, m, status(), contour) + places);
   if (vision_was_refused_) {
     return exit_bad_input;
   }
+  const bool complete = written && result_.not_kept.empty();
   const ExitCode code = exit_code(result_.end);
   return code == exit_done && !complete ? exit_not_done : code;
 }
 
-tl::expected<void, std::string> write_resolved(const Scene& scene, const std::string& folder) {
-  std::ofstream out(folder + "/scene.toml");
-  out << to_toml(scene);
-  if (!out.flush()) {
-    return tl::unexpected(fmt::format("{}/scene.toml: cannot be written", folder));
+bool Run::draw_figure() {
+  const auto drawn = draw_run(folder_, scene_, recorder_.measures(), result_.rows);
+  if (!drawn) {
+    terminal_.complain(fmt::format("no figure: {}", drawn.error()));
+    if (drawn.error().find("cannot be written") != std::string::npos) {
+      result_.not_kept.push_back({"figure.png", recorder_.measures().last_s, drawn.error()});
+    }
   }
-  return {};
+  return drawn.has_value();
 }
 
 }  // namespace
@@ -444,26 +508,42 @@ int run_scene(const Scene& scene, const RunSettings& settings) {
     terminal.complain(why);
     return exit_bad_input;
   };
-  const auto folder = prepare_report_folder(scene, settings.report);
-  if (!folder) {
-    return refuse(folder.error());
+  const auto report = prepare_report_folder(scene, settings.report, settings.overwrite);
+  if (!report) {
+    return refuse(report.error());
   }
-  if (auto written = write_resolved(scene, *folder); !written) {
-    return refuse(written.error());
+  const std::string& folder = report->folder;
+  const auto refuse_and_leave_nothing = [&](const std::string& why) {
+    discard(*report);
+    return refuse(why);
+  };
+  const std::uint64_t every = rows_every(scene, settings);
+  const auto space = look_for_space(
+      folder, bytes_written(scene, {.seconds = scene.seconds > 0 ? scene.seconds : kOpenEnded_s,
+                                    .rows_every = every,
+                                    .frames = settings.frames && !is_long(scene)}));
+  if (!space) {
+    return refuse_and_leave_nothing(space.error());
   }
+  if (!space->empty()) {
+    terminal.complain(*space);
+  }
+  if (auto written = write_whole(folder + "/scene.toml", to_toml(scene)); !written) {
+    return refuse_and_leave_nothing(written.error());
+  }
+  SpaceReserve reserve(folder);
   auto segments = create_segments(scene);
   if (!segments) {
-    return refuse(segments.error());
+    return refuse_and_leave_nothing(segments.error());
   }
-  auto recorder =
-      Recorder::create(*folder, scene, *segments->core, segments->bench ? segments->bench->get() : nullptr,
-                       rows_every(scene, settings));
+  auto recorder = Recorder::create(folder, scene, *segments->core,
+                                   segments->bench ? segments->bench->get() : nullptr, every);
   if (!recorder) {
-    return refuse(recorder.error());
+    return refuse_and_leave_nothing(recorder.error());
   }
   stop_signal::watch({SIGINT, SIGTERM, SIGHUP, SIGQUIT});
   signal(SIGPIPE, SIG_IGN);
-  Run run(scene, settings, *folder, *segments, *recorder, terminal);
+  Run run(scene, settings, *report, *segments, *recorder, reserve, terminal);
   return run.run();
 }
 

@@ -5,7 +5,6 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -13,6 +12,8 @@
 
 #include "rt/forces/membrane.hpp"
 #include "tools/shared/csv.hpp"
+#include "tools/shared/say.hpp"
+#include "tools/shared/whole_file.hpp"
 
 namespace punctum::report {
 namespace {
@@ -147,7 +148,7 @@ tl::expected<std::string, std::string> evaluate_pairs(std::string_view csv) {
 int evaluate_pairs_file(const std::string& input, const std::string& output) {
   constexpr int kBadInput = 2;
   const auto fail = [](const std::string& text) {
-    fmt::print(stderr, "{}\n", text);
+    tools::complain(text);
     return kBadInput;
   };
   std::error_code error;
@@ -167,26 +168,10 @@ int evaluate_pairs_file(const std::string& input, const std::string& output) {
     return fail(fmt::format("{}: {}", input, rows.error()));
   }
 
-  // The file is complete or absent: it is written under another name first. A pipe or a terminal is written
-  // directly.
-  const bool plain = !fs::exists(output, error) || fs::is_regular_file(output, error);
-  const std::string place = plain ? output + ".part" : output;
-  std::ofstream out(place, std::ios::binary);
-  out << *rows;
-  out.close();
-  if (out && plain) {
-    fs::rename(place, output, error);
-    if (!error) {
-      return 0;
-    }
+  if (const auto written = tools::write_whole(output, *rows); !written) {
+    return fail("--output: " + written.error());
   }
-  if (out && !plain) {
-    return 0;
-  }
-  if (plain) {
-    fs::remove(place, error);
-  }
-  return fail(fmt::format("--output: {}: cannot be written", output));
+  return 0;
 }
 
 }  // namespace punctum::report

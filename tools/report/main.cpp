@@ -9,17 +9,21 @@
 #include <chrono>
 #include <ctime>
 #include <exception>
-#include <fstream>
 #include <string>
 #include <vector>
 
 #include "tools/report/output.hpp"
+#include "tools/shared/say.hpp"
 #include "tools/shared/version.hpp"
+#include "tools/shared/whole_file.hpp"
 
 namespace {
 
 namespace fs = std::filesystem;
 using namespace punctum::report;
+using punctum::tools::complain;
+using punctum::tools::say;
+using punctum::tools::write_whole;
 
 constexpr int kTopicFailed = 1, kBadInput = 2;
 #ifdef PUNCTUM_VISION
@@ -29,15 +33,13 @@ constexpr const char* kLeftOut = "vision and surface are left out: built without
 #endif
 
 int bad(const std::string& text) {
-  fmt::print(stderr, "{}\n", text);
+  complain(text);
   return kBadInput;
 }
 
 void write(const fs::path& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  if (!file.flush()) {
-    throw std::runtime_error(path.string() + ": cannot be written");
+  if (const auto written = write_whole(path, text); !written) {
+    throw std::runtime_error(written.error());
   }
 }
 
@@ -70,16 +72,15 @@ Finished finish(const Topic& topic, bool quick, const fs::path& out, const Prove
     }
     for (const Figure& f : done.result.figures) {
       if (const auto drawn = punctum::tools::draw(f, out / (f.name + ".svg")); !drawn) {
-        fmt::print(stderr, "{}.svg: {}\n", f.name, drawn.error());
+        complain(fmt::format("{}.svg: {}", f.name, drawn.error()));
       }
     }
   } catch (const std::exception& e) {
     done.error = e.what();
   }
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
-  fmt::print("{:<12}{} ({:.1f} s)\n", done.topic,
-             done.error.empty() ? done.result.reading : "failed: " + done.error, seconds);
-  (void)std::fflush(stdout);
+  say(fmt::format("{:<12}{} ({:.1f} s)\n", done.topic,
+                  done.error.empty() ? done.result.reading : "failed: " + done.error, seconds));
   return done;
 }
 
@@ -114,7 +115,7 @@ int main_or_throw(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : kBadInput;
+    return app.exit(e) != 0 ? kBadInput : punctum::tools::all_was_said() ? 0 : kTopicFailed;
   }
 
   const bool all = std::find(wanted.begin(), wanted.end(), "all") != wanted.end();
@@ -141,7 +142,7 @@ int main_or_throw(int argc, char** argv) {
   }
 
   if (all) {
-    fmt::print("{}", kLeftOut);
+    say(kLeftOut);
   }
   const Provenance from = provenance();
   std::vector<Finished> finished;
@@ -151,7 +152,7 @@ int main_or_throw(int argc, char** argv) {
     }
   }
   write(out / "index.html", page(finished, from, out));
-  fmt::print("{}\n", (out / "index.html").string());
+  say((out / "index.html").string() + "\n");
   const bool failed =
       std::any_of(finished.begin(), finished.end(), [](const Finished& f) { return !f.error.empty(); });
   return failed ? kTopicFailed : 0;
@@ -160,10 +161,11 @@ int main_or_throw(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  punctum::tools::take_file_limits_as_errors();
   try {
     return main_or_throw(argc, argv);
   } catch (const std::exception& e) {
-    fmt::print(stderr, "punctum-report: {}\n", e.what());
+    complain(std::string("punctum-report: ") + e.what());
     return kBadInput;
   }
 }

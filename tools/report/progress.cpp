@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
 #include <mutex>
 
 #include "tools/report/topic.hpp"
+#include "tools/shared/say.hpp"
 
 namespace punctum::report {
 namespace {
@@ -36,12 +36,12 @@ struct Progress::Shared {
     const auto full = static_cast<std::size_t>(part * kBar);
     const double seconds = std::chrono::duration<double>(t - begun).count();
     if (terminal) {
-      fmt::print(stderr, "\r{:<12}[{}{}] {:3.0f} %  {} {:.0f} s\033[K", topic, std::string(full, '#'),
-                 std::string(kBar - full, '.'), part * 100, what, seconds);
+      tools::say_aside(fmt::format("\r{:<12}[{}{}] {:3.0f} %  {} {:.0f} s\033[K", topic,
+                                   std::string(full, '#'), std::string(kBar - full, '.'), part * 100, what,
+                                   seconds));
     } else {
-      fmt::print(stderr, "{:<12}{:3.0f} %  {} {:.0f} s\n", topic, part * 100, what, seconds);
+      tools::complain(fmt::format("{:<12}{:3.0f} %  {} {:.0f} s", topic, part * 100, what, seconds));
     }
-    (void)std::fflush(stderr);
   }
 };
 
@@ -51,7 +51,7 @@ Progress::Progress(std::string topic) : shared_(std::make_unique<Shared>()) {
 
 Progress::~Progress() {
   if (shared_->terminal) {
-    fmt::print(stderr, "\r\033[K");
+    tools::say_aside("\r\033[K");
   }
 }
 

@@ -9,6 +9,7 @@
 
 #include "tools/report/tick_tape.hpp"
 #include "tools/shared/csv.hpp"
+#include "tools/shared/say.hpp"
 #include "tools/shared/version.hpp"
 
 namespace punctum::report {
@@ -25,28 +26,27 @@ std::vector<std::string> overrides_of(std::string_view variant) {
 
 int run(int argc, char** argv) {
   if (argc == 2 && std::string_view(argv[1]) == "--version") {
-    fmt::print("{}\n", tools::version_line("punctum-tick-cost"));
-    return 0;
+    tools::say(tools::version_line("punctum-tick-cost") + "\n");
+    return tools::all_was_said() ? 0 : 1;
   }
   if (argc < 4) {
-    fmt::print(stderr,
-               "punctum-tick-cost TAPE SCENE VARIANT...; `punctum-report scenes` starts this program\n");
+    tools::complain("punctum-tick-cost TAPE SCENE VARIANT...; `punctum-report scenes` starts this program");
     return 2;
   }
   const auto tape = read_tape(argv[1]);
   if (!tape) {
-    fmt::print(stderr, "{}\n", tape.error());
+    tools::complain(tape.error());
     return 2;
   }
   for (int i = 3; i < argc; ++i) {
     const auto scene = tools::load_scene(argv[2], overrides_of(argv[i]));
     if (!scene) {
-      fmt::print(stderr, "{}\n", scene.error());
+      tools::complain(scene.error());
       return 2;
     }
-    fmt::print("{} {}\n", tape->size(), rt::name(run_variant(*scene, *tape)));
+    tools::say(fmt::format("{} {}\n", tape->size(), rt::name(run_variant(*scene, *tape))));
   }
-  return 0;
+  return tools::all_was_said() ? 0 : 1;
 }
 
 }  // namespace punctum::report

@@ -8,6 +8,7 @@
 
 namespace punctum::tools {
 
+// Without control characters: whatever a file says, no terminal obeys it.
 [[nodiscard]] std::string printable(std::string_view s, std::size_t max = 80);
 
 // " (did you mean X?)" for the name nearest to `given`; nothing if none is near.

@@ -132,6 +132,10 @@ std::string Source::at(const toml::source_position& p) const {
 }
 
 tl::expected<toml::table, std::string> parse_toml(std::string_view text, const Source& source) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // some editors put it before UTF-8
+  if (text.starts_with(kByteOrderMark)) {
+    text.remove_prefix(kByteOrderMark.size());
+  }
   const auto ascii = in_ascii(text, source);
   if (!ascii) {
     return Unexpected(ascii.error());

@@ -127,6 +127,77 @@ TEST(Measures, phases_cells_faults_and_gaps_are_counted_and_listed) {
   EXPECT_NEAR(m.withdrawal_s.mean, 0.5, 1e-9);
 }
 
+// A station whose cell nobody simulates: the core alone tells of it.
+Scene scene_without_a_simulated_cell() {
+  Scene scene = scene_of("icsi");
+  scene.sim->cell.reset();
+  return scene;
+}
+
+TEST(Measures, the_dose_is_what_the_injector_gave_of_what_the_button_asked_inside_the_cell) {
+  const Scene scene = scene_without_a_simulated_cell();
+  Measures m(scene);
+  rt::TelemetrySample s;
+  const auto run = [&](rt::Phase phase, int ticks, bool pressed, bool open) {
+    for (int i = 0; i < ticks; ++i) {
+      s.tick++;
+      s.t_s += 1e-3;
+      s.phase = phase;
+      s.buttons = pressed ? hal::kButtonInject : 0U;
+      s.injector_open = open ? 1 : 0;
+      m.tick(s, nullptr);
+    }
+  };
+  run(rt::Phase::free, 100, true, false);  // a press outside asks for nothing
+  run(rt::Phase::puncture, 100, false, false);
+  run(rt::Phase::injection, 390, true, true);
+  run(rt::Phase::injection, 1110, true, false);
+  run(rt::Phase::withdrawal, 100, false, false);
+  run(rt::Phase::clear, 100, false, false);
+  m.finish();
+  EXPECT_NEAR(m.asked_s, 1.5, 1e-9);
+  EXPECT_NEAR(m.injected_s, 0.39, 1e-9);
+  EXPECT_EQ(m.cells_underdosed, 1U);
+  EXPECT_EQ(m.cells_done, 0U);
+}
+
+TEST(Measures, a_dose_that_lacks_no_more_than_the_valve_may_take_is_whole) {
+  CellMeasures cell;
+  cell.asked_s = 1.5;
+  cell.injected_s = 1.36;
+  EXPECT_FALSE(cell.underdosed());
+  cell.injected_s = 1.3;
+  EXPECT_TRUE(cell.underdosed());
+  cell.asked_s = 0;
+  cell.injected_s = 0;
+  EXPECT_FALSE(cell.underdosed()) << "nothing was asked";
+}
+
+TEST(Measures, the_needle_is_where_the_core_last_saw_it_and_unknown_where_it_saw_nothing) {
+  const Scene scene = scene_without_a_simulated_cell();
+  const auto ended_in = [&scene](rt::Phase phase, bool stale) {
+    Measures m(scene);
+    rt::TelemetrySample s;
+    s.phase = phase;
+    s.alarms = stale ? rt::alarm_vision_stale : 0U;
+    s.R_m = 60e-6;
+    s.axis[0] = -1;
+    s.entry_m[0] = 20e-6;
+    s.tip_m[0] = -3e-6;  // 23 um further along the axis
+    m.tick(s, nullptr);
+    m.finish();
+    return m.whereabouts();
+  };
+  EXPECT_EQ(ended_in(rt::Phase::injection, false).where, Whereabouts::inside);
+  EXPECT_EQ(ended_in(rt::Phase::injection, true).where, Whereabouts::inside) << "blind, it is still inside";
+  EXPECT_NEAR(ended_in(rt::Phase::injection, false).depth_m.value_or(0), 23e-6, 1e-12);
+  EXPECT_EQ(ended_in(rt::Phase::indentation, false).where, Whereabouts::touching);
+  EXPECT_EQ(ended_in(rt::Phase::clear, false).where, Whereabouts::outside);
+  EXPECT_EQ(ended_in(rt::Phase::free, true).where, Whereabouts::unknown);
+  EXPECT_EQ(ended_in(rt::Phase::free, false).source, Whereabouts::core);
+  EXPECT_EQ(Measures(scene_of("free")).whereabouts().where, Whereabouts::no_cell);
+}
+
 TEST(Measures, eight_hours_of_cells_take_no_more_memory_than_one) {
   const Scene scene = scene_of("icsi");
   Measures m(scene);

@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "tools/scene/messages.hpp"
 #include "tools/scene/scene_keys.hpp"
 
 namespace punctum::tools {
@@ -849,6 +850,26 @@ TEST_F(SceneFiles, a_scene_file_is_named_after_itself) {
   ASSERT_TRUE(scene.has_value()) << scene.error();
   EXPECT_EQ(scene->name, "my-cell");
   EXPECT_EQ(scene->source, file.string());
+}
+
+TEST(SceneText, a_byte_order_mark_before_the_text_changes_nothing) {
+  const std::string text(*builtin_text("free"));
+  const auto plain = parse_scene(text, "a.toml");
+  const auto marked = parse_scene("\xEF\xBB\xBF" + text, "a.toml");
+  ASSERT_TRUE(plain && marked) << (marked ? "" : marked.error());
+  EXPECT_EQ(to_toml(*plain), to_toml(*marked));
+  const auto wrong = parse_scene("\xEF\xBB\xBFnonsense = 1\n", "a.toml");
+  ASSERT_FALSE(wrong);
+  EXPECT_TRUE(wrong.error().starts_with("a.toml:1:1: ")) << wrong.error();
+}
+
+TEST(SceneText, what_is_printed_of_a_scene_gives_a_terminal_no_orders) {
+  EXPECT_EQ(printable("a\x1b[31mb\x07\x7f"
+                      "c"),
+            "a [31mb  c");
+  EXPECT_EQ(printable("\xc2\x9b"
+                      "2J caf\xc3\xa9 \xc2\xb5m"),
+            " 2J caf\xc3\xa9 \xc2\xb5m");
 }
 
 }  // namespace

@@ -2,20 +2,25 @@
 // line.
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <regex>
 #include <string>
 #include <vector>
 
 #include "tools/shared/csv.hpp"
+#include "tools/shared/row_file.hpp"
+#include "tools/shared/say.hpp"
 #include "tools/shared/station_segments.hpp"
 #include "tools/shared/stop_signal.hpp"
 #include "tools/shared/version.hpp"
+#include "tools/shared/whole_file.hpp"
 
 namespace punctum::tools {
 namespace {
@@ -54,6 +59,106 @@ TEST(CsvTest, a_file_that_is_not_there_has_no_rows) {
   CsvReader table("/nowhere/obs.csv");
   EXPECT_FALSE(table.has("t_s"));
   EXPECT_FALSE(table.next());
+}
+
+// ---- files ----
+
+std::string read_all(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+// A folder, and while it is wanted no file that grows beyond some bytes: a disk that is full.
+class FilesTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "punctum-files-XXXXXX").string();
+    ASSERT_NE(::mkdtemp(name.data()), nullptr);
+    folder_ = name;
+    take_file_limits_as_errors();
+    ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before_), 0);
+  }
+  void TearDown() override {
+    ::setrlimit(RLIMIT_FSIZE, &before_);
+    fs::remove_all(folder_);
+  }
+  void full_beyond(rlim_t bytes) const {
+    const rlimit limit{.rlim_cur = bytes, .rlim_max = before_.rlim_max};
+    ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &limit), 0);
+  }
+  [[nodiscard]] std::size_t files() const {
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
+  }
+  fs::path folder_;
+  rlimit before_{};
+};
+
+TEST_F(FilesTest, a_file_is_written_whole_and_nothing_lies_beside_it) {
+  const fs::path file = folder_ / "report.json";
+  ASSERT_TRUE(write_whole(file, "old"));
+  ASSERT_TRUE(write_whole(file, "new and longer"));
+  EXPECT_EQ(read_all(file), "new and longer");
+  EXPECT_EQ(files(), 1U);
+}
+
+TEST_F(FilesTest, where_there_is_no_room_the_old_file_stays_and_no_half_of_the_new_one) {
+  const fs::path file = folder_ / "report.json";
+  ASSERT_TRUE(write_whole(file, "old"));
+  full_beyond(1000);
+  const auto written = write_whole(file, std::string(5000, 'x'));
+  ASSERT_FALSE(written);
+  EXPECT_NE(written.error().find("report.json: cannot be written: "), std::string::npos) << written.error();
+  EXPECT_EQ(read_all(file), "old");
+  EXPECT_EQ(files(), 1U);
+}
+
+TEST_F(FilesTest, a_folder_that_is_not_there_is_an_error_and_a_device_is_written_directly) {
+  EXPECT_FALSE(write_whole(folder_ / "nowhere" / "a.csv", "x"));
+  EXPECT_TRUE(write_whole("/dev/null", "x"));
+  EXPECT_FALSE(write_whole("/dev/full", "x"));
+  EXPECT_TRUE(fs::is_character_file("/dev/full"));
+}
+
+TEST_F(FilesTest, rows_are_written_in_order_and_continued) {
+  const std::string file = folder_ / "samples.csv";
+  {
+    auto rows = RowFile::open(file, RowFile::Begin::empty);
+    ASSERT_TRUE(rows);
+    rows->append("t,x\n");
+    rows->append("1,2\n");
+  }
+  auto more = RowFile::open(file, RowFile::Begin::after);
+  ASSERT_TRUE(more);
+  more->append("2,3\n");
+  more->flush();
+  EXPECT_EQ(read_all(file), "t,x\n1,2\n2,3\n");
+  EXPECT_TRUE(more->failure().empty());
+}
+
+TEST_F(FilesTest, rows_that_find_no_room_are_cut_off_at_a_line_end_and_the_failure_is_told) {
+  const std::string file = folder_ / "samples.csv";
+  full_beyond(100);
+  auto rows = RowFile::open(file, RowFile::Begin::empty);
+  ASSERT_TRUE(rows);
+  std::string whole;
+  for (int i = 0; i < 20; ++i) {
+    const std::string row = "row " + std::to_string(i) + ",abc\n";
+    if (whole.size() + row.size() <= 100) {
+      whole += row;
+    }
+    rows->append(row);
+  }
+  rows->flush();
+  EXPECT_FALSE(rows->failure().empty());
+  EXPECT_EQ(read_all(file), whole);
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before_), 0);
+  rows->append("later\n");
+  rows->flush();
+  EXPECT_EQ(read_all(file), whole) << "after a failure there are no rows: none is missing in between";
+}
+
+TEST_F(FilesTest, a_table_that_cannot_be_opened_is_an_error) {
+  EXPECT_FALSE(RowFile::open(folder_ / "nowhere" / "a.csv", RowFile::Begin::empty));
 }
 
 std::atomic<int> woken{0};

@@ -1,0 +1,215 @@
+// What is recorded of a run, and what is said of what is not: samples that were overwritten, files that
+// cannot be written. And whether vision hangs.
+#include "tools/punctum/recorder.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+
+#include "tools/punctum/disk_space.hpp"
+#include "tools/punctum/report_folder.hpp"
+#include "tools/punctum/vision_watchdog.hpp"
+#include "tools/shared/say.hpp"
+
+namespace punctum::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+class RecorderTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "punctum-recorder-XXXXXX").string();
+    ASSERT_NE(::mkdtemp(name.data()), nullptr);
+    folder_ = name;
+    take_file_limits_as_errors();
+    ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before_), 0);
+  }
+  void TearDown() override {
+    ::setrlimit(RLIMIT_FSIZE, &before_);
+    fs::remove_all(folder_);
+  }
+  void full_beyond(rlim_t bytes) const {
+    const rlimit limit{.rlim_cur = bytes, .rlim_max = before_.rlim_max};
+    ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &limit), 0);
+  }
+  void tick(std::uint64_t n, rt::Fault fault = rt::Fault::none) {
+    for (std::uint64_t i = 0; i < n; ++i) {
+      sample_.tick = next_++;
+      sample_.t_s = static_cast<double>(sample_.tick) * 1e-3;
+      sample_.fault = fault;
+      core_->telemetry.push(sample_);
+    }
+  }
+  [[nodiscard]] std::size_t lines(const char* file) const {
+    std::ifstream in(folder_ / file);
+    std::size_t n = 0;
+    for (std::string line; std::getline(in, line);) {
+      ++n;
+    }
+    return n;
+  }
+  [[nodiscard]] Recorder recorder() const {
+    return std::move(*Recorder::create(folder_.string(), *load_scene("free"), *core_, nullptr, 1));
+  }
+
+  fs::path folder_;
+  rlimit before_{};
+  std::unique_ptr<rt::CoreSegment> core_ = std::make_unique<rt::CoreSegment>();
+  rt::TelemetrySample sample_;
+  std::uint64_t next_ = 0;
+};
+
+TEST_F(RecorderTest, every_sample_is_a_row_and_none_is_lost) {
+  Recorder r = recorder();
+  tick(3000);
+  r.finish();
+  EXPECT_EQ(lines("samples.csv"), 3001U);
+  EXPECT_EQ(r.rows(), 3000U);
+  EXPECT_EQ(r.lost(), 0U);
+  EXPECT_TRUE(r.not_kept().empty());
+}
+
+TEST_F(RecorderTest, samples_that_were_overwritten_before_they_were_read_are_counted_as_lost) {
+  Recorder r = recorder();
+  tick(10);
+  r.drain();
+  const std::uint64_t more = rt::TelemetryRing::kSize + 500;
+  tick(more);
+  r.finish();
+  EXPECT_GE(r.lost(), 500U);
+  EXPECT_EQ(r.lost() + r.rows(), 10 + more) << "each sample is a row or lost";
+}
+
+TEST_F(RecorderTest, samples_that_cannot_be_written_are_noticed_while_the_run_goes_on) {
+  Recorder r = recorder();
+  full_beyond(20'000);
+  tick(4000);
+  r.drain();
+  ASSERT_EQ(r.not_kept().size(), 1U) << "at once, not at the end";
+  EXPECT_EQ(r.not_kept()[0].file, "samples.csv");
+  EXPECT_GT(r.not_kept()[0].t_s, 0);
+  EXPECT_LT(r.not_kept()[0].t_s, 4);
+  EXPECT_FALSE(r.not_kept()[0].why.empty());
+  tick(4000);
+  r.finish();
+  EXPECT_EQ(r.not_kept().size(), 1U) << "once";
+  EXPECT_EQ(r.measures().ticks, 8000U) << "it is measured all the same";
+  EXPECT_LT(r.rows(), 4000U);
+  EXPECT_LE(lines("samples.csv"), r.rows() + 1);
+}
+
+TEST_F(RecorderTest, what_is_left_in_the_buffer_at_the_end_is_noticed_too) {
+  Recorder r = recorder();
+  full_beyond(1000);
+  tick(5);  // fewer bytes than are written at once
+  r.finish();
+  ASSERT_EQ(r.not_kept().size(), 1U);
+  EXPECT_EQ(r.not_kept()[0].file, "samples.csv");
+}
+
+TEST_F(RecorderTest, the_last_seconds_before_a_fault_that_cannot_be_written_are_noticed) {
+  Recorder r = recorder();
+  tick(1000);
+  r.drain();
+  fs::create_directory(folder_ / "fault.csv");  // no file of that name can be
+  tick(100, rt::Fault::estop);
+  r.finish();
+  ASSERT_EQ(r.not_kept().size(), 1U);
+  EXPECT_EQ(r.not_kept()[0].file, "fault.csv");
+  EXPECT_EQ(lines("samples.csv"), 1101U);
+}
+
+// ---- the place of the report ----
+
+TEST_F(RecorderTest, a_folder_without_room_for_a_report_is_refused_and_a_small_one_is_warned_of) {
+  const auto enough = look_for_space(folder_.string(), 0);
+  ASSERT_TRUE(enough) << enough.error();
+  EXPECT_EQ(*enough, "");
+  const auto small = look_for_space(folder_.string(), 1e30);
+  ASSERT_TRUE(small);
+  EXPECT_NE(small->find("MB are free"), std::string::npos);
+  EXPECT_EQ(std::count(small->begin(), small->end(), '\n'), 0);
+}
+
+TEST_F(RecorderTest, a_run_at_a_faster_rate_or_with_more_frames_needs_more_room) {
+  Scene scene = *load_scene("icsi");
+  const ExpectedRecording minute{.seconds = 60};
+  const double one = bytes_written(scene, minute);
+  EXPECT_GT(one, 60e3 * 300);  // 60 000 rows of some 60 numbers
+  EXPECT_LT(one, 60e3 * 2000);
+  EXPECT_GT(bytes_written(scene, {.seconds = 60, .frames = true}), one);
+  EXPECT_LT(bytes_written(scene, {.seconds = 60, .rows_every = 10}), one);
+  scene.servo.rate_Hz = 8000;
+  EXPECT_GT(bytes_written(scene, minute), one);
+}
+
+TEST_F(RecorderTest, the_room_kept_back_is_there_until_it_is_given_back) {
+  {
+    SpaceReserve reserve(folder_.string());
+    EXPECT_EQ(fs::file_size(folder_ / "reserve"), static_cast<std::uintmax_t>(SpaceReserve::kBytes));
+    reserve.give_back();
+    EXPECT_TRUE(fs::is_empty(folder_));
+  }
+  EXPECT_TRUE(fs::is_empty(folder_));
+}
+
+TEST_F(RecorderTest, two_runs_never_get_the_same_new_folder) {
+  const Scene scene = *load_scene("free");
+  const std::string wanted = folder_ / "r";
+  const auto first = prepare_report_folder(scene, wanted, false);
+  ASSERT_TRUE(first);
+  EXPECT_EQ(first->folder, wanted);
+  std::ofstream(fs::path(first->folder) / "scene.toml") << "# free" << kResolvedScene << "\n";
+  const auto second = prepare_report_folder(scene, wanted, false);
+  const auto third = prepare_report_folder(scene, wanted, true);
+  ASSERT_TRUE(second && third);
+  EXPECT_EQ(second->folder, wanted + "-2");
+  EXPECT_EQ(second->replaces, "");
+  EXPECT_NE(second->note, "");
+  EXPECT_EQ(third->folder, wanted + "-3");
+  EXPECT_EQ(third->replaces, wanted);
+  discard(*second);
+  EXPECT_FALSE(fs::exists(second->folder));
+}
+
+// ---- whether vision hangs ----
+
+TEST(VisionWatchdog, a_loop_that_goes_round_never_hangs_and_one_that_stops_does) {
+  VisionWatchdog dog(true);
+  double now_s = 100;
+  std::uint64_t rounds = 7;  // of one that ran before
+  dog.started(now_s, rounds);
+  const auto watch_for = [&](double seconds, bool goes_round) {
+    bool hangs = false;
+    for (double until_s = now_s + seconds; now_s < until_s && !hangs; now_s += 0.01) {
+      rounds += goes_round ? 1 : 0;
+      hangs = dog.hangs(now_s, rounds);
+    }
+    return hangs;
+  };
+  EXPECT_FALSE(watch_for(VisionWatchdog::kStart_s - 1, false)) << "it may take its time to start";
+  EXPECT_FALSE(watch_for(60, true));
+  EXPECT_FALSE(watch_for(VisionWatchdog::kHung_s - 0.1, false));
+  EXPECT_TRUE(watch_for(0.3, false));
+  dog.started(now_s, rounds);
+  EXPECT_FALSE(watch_for(VisionWatchdog::kStart_s - 1, false));
+  EXPECT_TRUE(watch_for(2, false)) << "it may also hang before its first round";
+}
+
+TEST(VisionWatchdog, time_in_which_nobody_watched_does_not_count) {
+  VisionWatchdog dog(true);
+  dog.started(0, 0);
+  EXPECT_FALSE(dog.hangs(0.1, 1));
+  EXPECT_FALSE(dog.hangs(600, 1)) << "the parent was stopped, and perhaps the whole machine";
+  EXPECT_FALSE(dog.hangs(600.1, 2));
+}
+
+}  // namespace
+}  // namespace punctum::tools

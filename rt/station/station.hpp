@@ -45,15 +45,20 @@ inline constexpr std::uint64_t CoreSegment::kLayout =
 struct ObservationSegment {
   static constexpr bool kOneWriter = true;
   static constexpr std::uint64_t kMagic = 0x6576726573626f50ULL;  // "Pobserve"
-  static constexpr std::uint64_t kVersion = 3;
+  static constexpr std::uint64_t kVersion = 4;
   static const std::uint64_t kLayout;
 
   hal::SegmentHeader header;
   ObservationSlot slot;
+  Word rounds{};    // of vision's loop, with a frame or without: while it grows, vision does not hang
+  Word not_kept{};  // bits of NotKept: files that it could not write and goes on without
+
+  enum NotKept : std::uint64_t { observations = 1U << 0, frames = 1U << 1 };
 };
 inline constexpr std::uint64_t ObservationSegment::kLayout = hal::fingerprint(
     ObservationSegment::kVersion, sizeof(ObservationSegment), sizeof(Observation),
-    offsetof(Observation, gap_m), offsetof(Observation, total_us), offsetof(ObservationSegment, slot));
+    offsetof(Observation, gap_m), offsetof(Observation, total_us), offsetof(ObservationSegment, slot),
+    offsetof(ObservationSegment, rounds), offsetof(ObservationSegment, not_kept));
 
 // One for each writer of commands: it puts, the core takes.
 struct CommandSegment {

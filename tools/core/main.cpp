@@ -28,6 +28,7 @@
 #include "tools/core/shut_down.hpp"
 #include "tools/scene/scene.hpp"
 #include "tools/shared/exit_codes.hpp"
+#include "tools/shared/say.hpp"
 #include "tools/shared/station_segments.hpp"
 #include "tools/shared/stop_signal.hpp"
 #include "tools/shared/version.hpp"
@@ -118,7 +119,7 @@ class Core {
 Core core;
 
 int bad(const std::string& text) {
-  fmt::print(stderr, "{}\n", text);
+  tools::complain(text);
   return tools::exit_bad_input;
 }
 
@@ -210,8 +211,8 @@ tl::expected<StationSegments, std::string> attach_station(const tools::HandedSeg
 
 int run(int argc, char** argv) {
   if (argc == 2 && std::string_view(argv[1]) == "--version") {
-    fmt::print("{}\n", tools::version_line("punctum-core"));
-    return tools::exit_done;
+    tools::say(tools::version_line("punctum-core") + "\n");
+    return tools::all_was_said() ? tools::exit_done : tools::exit_not_done;
   }
   stop_signal::watch({SIGTERM, SIGINT, SIGHUP, SIGQUIT}, on_stop_signal);
   const auto arguments = read_arguments(argc, argv);
@@ -364,10 +365,11 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  tools::take_file_limits_as_errors();
   try {
     return run(argc, argv);
   } catch (const std::exception& e) {
-    fmt::print(stderr, "punctum-core: {}\n", e.what());
+    tools::complain(std::string("punctum-core: ") + e.what());
     return tools::exit_bad_input;
   }
 }

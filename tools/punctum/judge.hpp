@@ -12,6 +12,7 @@ struct RunFacts {
   bool stop_was_asked = false;  // by a signal to the parent
   bool vision_over = false;     // it ended before the core did
   bool has_task = false;        // of the scene
+  bool has_vision = false;      // of the scene
 };
 
 [[nodiscard]] rt::RunEnd judge(const RunFacts& facts, const rt::CoreStatus& core, const Measures& measures);

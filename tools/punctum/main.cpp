@@ -10,6 +10,8 @@
 #include "tools/punctum/explain.hpp"
 #include "tools/punctum/supervisor.hpp"
 #include "tools/scene/scene.hpp"
+#include "tools/shared/exit_codes.hpp"
+#include "tools/shared/say.hpp"
 #include "tools/shared/version.hpp"
 
 namespace {
@@ -17,7 +19,7 @@ namespace {
 using namespace punctum::tools;
 
 int bad(const std::string& text) {
-  fmt::print(stderr, "{}\n", text);
+  complain(text);
   return 2;
 }
 
@@ -50,6 +52,9 @@ int main_or_throw(int argc, char** argv) {
   CLI::App* run = app.add_subcommand("run", "run a scene and write a report");
   common(run);
   run->add_option("--report", settings.report, "folder of the report (default: reports/SCENE-DATE)");
+  run->add_flag("--overwrite", settings.overwrite,
+                "the new report takes the place of the one in --report once it is whole; without, it gets a "
+                "new folder");
   run->add_option("--samples-every", settings.samples_every,
                   "write every n-th tick to samples.csv (0: choose)")
       ->check(CLI::Range(0, 1'000'000'000));
@@ -68,7 +73,7 @@ int main_or_throw(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     const int code = app.exit(e);
-    return code == 0 ? 0 : 2;
+    return code != 0 ? exit_bad_input : all_was_said() ? exit_done : exit_not_done;
   }
 
   // Options are overrides too, so that their messages are the same.
@@ -98,14 +103,14 @@ int main_or_throw(int argc, char** argv) {
   }
 
   if (*explaining) {
-    fmt::print("{}", keys ? explain_keys(*scene) : explain(*scene));
-    return 0;
+    say(keys ? explain_keys(*scene) : explain(*scene));
+    return all_was_said() ? exit_done : exit_not_done;
   }
   if (*checking) {
     std::string text;
     const int code = check(*scene, text);
-    fmt::print("{}", text);
-    return code;
+    say(text);
+    return code == exit_done && !all_was_said() ? exit_not_done : code;
   }
   if (const auto files = files_of(*scene); !files) {
     return bad(files.error());
@@ -118,10 +123,11 @@ int main_or_throw(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  punctum::tools::take_file_limits_as_errors();
   try {
     return main_or_throw(argc, argv);
   } catch (const std::exception& e) {
-    fmt::print(stderr, "punctum: {}\n", e.what());
+    punctum::tools::complain(std::string("punctum: ") + e.what());
     return 2;
   }
 }

@@ -9,6 +9,16 @@ namespace {
 constexpr double kTremorLow_Hz = 8, kTremorHigh_Hz = 12;
 constexpr double kSettle_s = 1;  // of the band-pass, after the start and after the clutch
 
+Whereabouts in_truth(const sim::Truth& truth) {
+  Whereabouts w;
+  w.source = Whereabouts::truth;
+  w.depth_m = -truth.gap_m;
+  w.where = truth.zona_punctured && truth.gap_m < 0 ? Whereabouts::inside
+            : truth.contact                        ? Whereabouts::touching
+                                                   : Whereabouts::outside;
+  return w;
+}
+
 double norm(const double (&v)[3]) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 
 }  // namespace
@@ -38,6 +48,8 @@ double TremorBand::next(double x) noexcept {
 
 Measures::Measures(const Scene& scene)
     : sim_(scene.sim.value_or(sim::SimConfig{})),
+      has_phases_(scene.servo.phases.has_value()),
+      has_injector_(scene.servo.injector.has_value()),
       position_scale_(scene.servo.mapping.position_scale),
       period_s_(1 / scene.servo.rate_Hz),
       hand_band_(3, TremorBand(scene.servo.rate_Hz)),
@@ -71,9 +83,15 @@ void Measures::close_cell() {
   }
   closed_cell_ = true;
   ++cell_count;
-  const bool without = sim_.injector && now_.injected_s == 0.0;
-  cells_done += now_.done && !now_.lost && !without ? 1U : 0U;
-  cells_without_injection += now_.done && !now_.lost && without ? 1U : 0U;
+  const bool whole = now_.done && !now_.lost;
+  // Unknown is neither.
+  const bool without = has_injector_ && now_.injected_s && *now_.injected_s <= 0;
+  const bool too_little = has_injector_ && now_.injected_s && !without && now_.underdosed();
+  cells_done += whole && !without && !too_little ? 1U : 0U;
+  cells_without_injection += whole && without ? 1U : 0U;
+  cells_underdosed += whole && too_little ? 1U : 0U;
+  asked_s += now_.asked_s;
+  injected_s += now_.injected_s.value_or(0);
   cells_lost += now_.lost ? 1U : 0U;
   const auto keep = [](const std::optional<double>& v, Spread& into) {
     if (v) {
@@ -138,7 +156,7 @@ void Measures::tick(const rt::TelemetrySample& s, const sim::Snapshot* world) {
     any_ = true;
     open_ = {s.cell, s.phase, s.t_s, s.t_s};
     now_.cell = s.cell;
-    closed_cell_ = !sim_.cell.has_value();
+    closed_cell_ = !sim_.cell && !(has_phases_ && has_injector_);
   } else {
     if (s.phase != open_.phase || s.cell != open_.cell) {
       change_phase(s);
@@ -166,6 +184,14 @@ void Measures::tick(const rt::TelemetrySample& s, const sim::Snapshot* world) {
       ++alarm_ticks[i];
     }
   }
+  if (has_injector_ && has_phases_ && !sim_.cell) {  // nobody knows better than the core
+    const bool inside = s.phase == rt::Phase::puncture || s.phase == rt::Phase::injection;
+    now_.asked_s += inside && (s.buttons & hal::kButtonInject) != 0 ? period_s_ : 0;
+    now_.injected_s = now_.injected_s.value_or(0) + (inside && s.injector_open != 0 ? period_s_ : 0);
+  }
+  if (s.obs_age_s < 0 || (s.alarms & rt::alarm_vision_stale) != 0) {
+    ++blind_ticks;
+  }
   observations = s.observations;
   stale_ticks = s.stale_ticks;
   const double hand_N = norm(s.force_N);
@@ -192,6 +218,7 @@ void Measures::tick(const rt::TelemetrySample& s, const sim::Snapshot* world) {
     // The plant puts a fresh cell in place a tick or more before the core knows.
     if (world->has_cell != 0 && world->cell_index == s.cell) {
       const sim::Truth truth = sim::truth_of(sim_, *world);
+      true_end_ = in_truth(truth);
       if (truth.contact && !was_contact_) {
         true_contact_s_ = s.t_s;
       }
@@ -211,7 +238,11 @@ void Measures::tick(const rt::TelemetrySample& s, const sim::Snapshot* world) {
       }
       const double depth = -truth.gap_m;
       const double delivered_s = world->injector.delivered_s - delivered_s_;
-      now_.injected_s = now_.injected_s.value_or(0) + (truth.zona_punctured && depth > 0 ? delivered_s : 0);
+      const bool inside = truth.zona_punctured && depth > 0;
+      now_.injected_s = now_.injected_s.value_or(0) + (inside ? delivered_s : 0);
+      if (has_injector_ && inside && (s.buttons & hal::kButtonInject) != 0) {
+        now_.asked_s += period_s_;
+      }
       if (truth.punctured) {
         if (!puncture_seen_) {
           puncture_seen_ = true;
@@ -242,6 +273,52 @@ void Measures::tick(const rt::TelemetrySample& s, const sim::Snapshot* world) {
   }
   last = s;
   last_s = s.t_s;
+}
+
+// As the core saw it. Its model tells a depth once it knows a membrane; its phases, whether the tip is inside.
+Whereabouts Measures::believed() const {
+  Whereabouts w;
+  w.source = Whereabouts::core;
+  switch (last.phase) {
+    case rt::Phase::free:
+    case rt::Phase::clear:
+      w.where = Whereabouts::outside;
+      break;
+    case rt::Phase::contact:
+    case rt::Phase::indentation:
+      w.where = Whereabouts::touching;
+      break;
+    case rt::Phase::puncture:
+    case rt::Phase::injection:
+    case rt::Phase::withdrawal:
+      w.where = Whereabouts::inside;
+      break;
+  }
+  const bool blind = last.obs_age_s < 0 || (last.alarms & rt::alarm_vision_stale) != 0;
+  if (blind && w.where == Whereabouts::outside) {
+    w.where = Whereabouts::unknown;  // that it touches nothing, only a fresh picture tells
+  }
+  if (last.R_m > 0 && norm(last.axis) > 0) {
+    double depth_m = 0;
+    for (int i = 0; i < 3; ++i) {
+      depth_m += (last.tip_m[i] - last.entry_m[i]) * last.axis[i];
+    }
+    w.depth_m = depth_m;
+  }
+  return w;
+}
+
+Whereabouts Measures::whereabouts(const sim::Snapshot* later) const {
+  if (later != nullptr && later->has_cell != 0) {
+    return in_truth(sim::truth_of(sim_, *later));
+  }
+  if (true_end_) {
+    return *true_end_;
+  }
+  if (!has_phases_) {
+    return {.where = Whereabouts::no_cell};
+  }
+  return any_ ? believed() : Whereabouts{};
 }
 
 void Measures::finish() {

@@ -67,10 +67,48 @@ struct CellMeasures {
   double peak_force_N = 0;  // true, along the needle
   double max_depth_m = 0;   // true, past the undeformed outer membrane
   double peak_hand_N = 0;
-  std::optional<double> injected_s;  // in truth: the injector's opening over time, tip in the cell
+  // The dose, as the time for which the injector is fully open with the tip in the cell. Asked: how long the
+  // button was down there. Given: in truth where the cell is simulated, otherwise as the injector reports.
+  double asked_s = 0;
+  std::optional<double> injected_s;
   bool done = false;                 // the core came to `clear`
   bool lost = false;                 // in truth: torn, pierced through or off the pipette
+
+  // A button is read once in a tick, and valve and line answer within some 10 ms. What is missing beyond that
+  // and a tenth of the dose did not go into the cell.
+  static constexpr double kDoseTolerance = 0.1, kDoseTolerance_s = 0.02;
+  [[nodiscard]] bool underdosed() const noexcept {
+    return injected_s.value_or(0) < (1 - kDoseTolerance) * asked_s - kDoseTolerance_s;
+  }
 };
+
+// Where the needle is when a run ends.
+struct Whereabouts {
+  enum Where : std::uint8_t {
+    unknown,   // the scene has a cell to enter, but nobody saw it or the needle
+    no_cell,   // the scene has none
+    outside,   // clear of the cell
+    touching,  // it touches or dents the outer membrane
+    inside,    // through the outer membrane
+  };
+  enum Source : std::uint8_t {
+    nobody,
+    core,   // its phases and its model of the membrane
+    truth,  // of the simulated world
+  };
+  Where where = unknown;
+  Source source = nobody;
+  std::optional<double> depth_m{};  // of the tip, past the undeformed outer membrane along the axis; < 0: before it
+};
+// As report.json has them.
+[[nodiscard]] constexpr const char* name(Whereabouts::Where where) noexcept {
+  constexpr const char* names[] = {"unknown", "no cell", "outside", "touching", "inside"};
+  return names[where];
+}
+[[nodiscard]] constexpr const char* name(Whereabouts::Source source) noexcept {
+  constexpr const char* names[] = {"nobody", "core", "truth"};
+  return names[source];
+}
 
 class Measures {
  public:
@@ -79,6 +117,8 @@ class Measures {
   // One tick; `world` is the plant at that tick, null if nobody simulates.
   void tick(const rt::TelemetrySample& s, const sim::Snapshot* world);
   void finish();  // after the last tick
+  // At the last tick, or in a later state of the simulated world.
+  [[nodiscard]] Whereabouts whereabouts(const sim::Snapshot* later = nullptr) const;
 
   static constexpr std::size_t kKept = 1000;  // phases and cells listed one by one; all are counted
   std::vector<PhaseSpan> phases;
@@ -86,6 +126,8 @@ class Measures {
   std::uint64_t phase_count = 0, cell_count = 0, cells_done = 0, cells_lost = 0;
   std::uint64_t cells_without_injection =
       0;  // clear and whole, but nothing came out of the injector that is there
+  std::uint64_t cells_underdosed = 0;  // clear and whole, but got clearly less than was asked
+  double asked_s = 0, injected_s = 0;  // of all cells
   Spread contact_delay_s, puncture_delay_s, inner_delay_s, lateral_error_m, lateral_contact_m,
       beyond_puncture_m, withdrawal_s;
   double peak_force_N = 0, max_depth_m = 0, peak_hand_N = 0;
@@ -99,6 +141,7 @@ class Measures {
 
   std::uint64_t ticks = 0, gaps = 0;  // gaps: grid indices without a sample
   std::uint64_t observations = 0, stale_ticks = 0, stale_spells = 0;
+  std::uint64_t blind_ticks = 0;  // without a fresh observation, also before the first one
   std::array<std::uint64_t, 16> alarm_ticks{};
   struct Fault {
     rt::Fault fault{};
@@ -117,7 +160,10 @@ class Measures {
   void close_phase(double end_s);
   void close_cell();
 
+  [[nodiscard]] Whereabouts believed() const;
+
   sim::SimConfig sim_;
+  bool has_phases_, has_injector_;
   double position_scale_;
   double period_s_;
   std::vector<TremorBand> hand_band_, tip_band_;
@@ -130,6 +176,7 @@ class Measures {
   double true_contact_s_ = -1, phase_contact_s_ = -1, phase_puncture_s_ = -1, withdrawal_from_s_ = -1;
   double puncture_depth_m_ = 0;
   double delivered_s_ = 0;
+  std::optional<Whereabouts> true_end_;  // at the last tick that had a cell
   bool zona_seen_ = false, puncture_seen_ = false;
   double clutch_until_s_ = 0;
 };

@@ -92,6 +92,26 @@ double seconds_of(const Measures& m, std::uint64_t ticks) {
 
 }  // namespace
 
+std::string in_words(const Whereabouts& needle) {
+  const double um = needle.depth_m.value_or(0) * 1e6;
+  switch (needle.where) {
+    case Whereabouts::unknown:
+      return "not known: nobody saw it at the end";
+    case Whereabouts::no_cell:
+      return "there is no cell in this scene";
+    case Whereabouts::outside:
+      return needle.depth_m && um < 0 ? fmt::format("outside the cell, {:.0f} um before its membrane", -um)
+                                      : "outside the cell";
+    case Whereabouts::touching:
+      return needle.depth_m && um > 0 ? fmt::format("ON THE CELL, denting it by {:.1f} um", um)
+                                      : "ON THE CELL";
+    case Whereabouts::inside:
+      return needle.depth_m ? fmt::format("INSIDE THE CELL, {:.1f} um past its membrane", um)
+                            : "INSIDE THE CELL";
+  }
+  return {};
+}
+
 std::optional<ContourError> read_contour_error(const std::string& obs_csv) {
   CsvReader table(obs_csv);
   ContourError e;
@@ -148,6 +168,15 @@ tl::expected<void, std::string> write_report(const std::string& path, const Scen
   j["outcome"] = rt::name(result.end);
   if (!result.detail.empty()) {
     j["outcome_detail"] = result.detail;
+  }
+  j["needle_at_end"] = {{"where", name(result.needle.where)},
+                        {"depth_um", number(result.needle.depth_m, 1e6)},
+                        {"known_from", name(result.needle.source)},
+                        {"in_words", in_words(result.needle)}};
+  j["dose"] = scene.servo.injector ? Json{{"asked_s", m.asked_s}, {"given_s", m.injected_s}} : Json(nullptr);
+  j["not_kept"] = Json::array();
+  for (const NotKept& n : result.not_kept) {
+    j["not_kept"].push_back({{"file", n.file}, {"t_s", n.t_s}, {"why", n.why}});
   }
   j["scene"] = scene.name;
   j["clock"] = scene.clock == ClockKind::real ? "real" : "virtual";
@@ -222,7 +251,8 @@ tl::expected<void, std::string> write_report(const std::string& path, const Scen
   j["cells"] = {{"tried", m.cell_count},
                 {"done", m.cells_done},
                 {"lost", m.cells_lost},
-                {"without_injection", m.cells_without_injection}};
+                {"without_injection", m.cells_without_injection},
+                {"injected_in_part", m.cells_underdosed}};
   j["cell_list"] = Json::array();
   for (const auto& c : m.cells) {
     j["cell_list"].push_back({{"cell", c.cell},
@@ -236,12 +266,14 @@ tl::expected<void, std::string> write_report(const std::string& path, const Scen
                               {"max_depth_um", c.max_depth_m * 1e6},
                               {"depth_beyond_puncture_um", number(c.beyond_puncture_m, 1e6)},
                               {"withdrawal_s", number(c.withdrawal_s)},
-                              {"injected_s", number(c.injected_s)}});
+                              {"injected_s", number(c.injected_s)},
+                              {"asked_s", c.asked_s}});
   }
 
   j["observations"] = m.observations;
   j["stale_observations"] = m.stale_spells;  // times an observation became too old
   j["stale_s"] = seconds_of(m, m.stale_ticks);
+  j["without_vision_s"] = seconds_of(m, m.blind_ticks);
   j["vision_restarts"] = Json::array();
   for (const auto& r : result.vision_restarts) {
     j["vision_restarts"].push_back({{"t_s", r.t_s}, {"why", r.why}});
@@ -300,6 +332,7 @@ std::string summary(const Scene& scene, const RunResult& result, const Measures&
                               scene.clock == ClockKind::virtual_time
                                   ? fmt::format(" of virtual time, {:.1f} s real", result.wall_s)
                                   : ""));
+  line("needle now", in_words(result.needle));
   if (scene.servo.phases) {
     std::string text;
     const std::size_t shown = std::min<std::size_t>(m.phases.size(), 14);
@@ -316,8 +349,12 @@ std::string summary(const Scene& scene, const RunResult& result, const Measures&
     line("cells",
          fmt::format(
              "{} done, {} lost, {}{} tried", m.cells_done, m.cells_lost,
-             m.cells_without_injection > 0 ? fmt::format("{} got nothing, ", m.cells_without_injection) : "",
+             (m.cells_without_injection > 0 ? fmt::format("{} got nothing, ", m.cells_without_injection) : "") +
+                 (m.cells_underdosed > 0 ? fmt::format("{} got too little, ", m.cells_underdosed) : ""),
              m.cell_count));
+    if (scene.servo.injector) {
+      line("dose", fmt::format("{:.2f} s of {:.2f} s asked", m.injected_s, m.asked_s));
+    }
     const auto value = [](const Spread& v, double scale, const char* unit) {
       if (v.n == 0) {
         return std::string("-");
@@ -373,6 +410,9 @@ std::string summary(const Scene& scene, const RunResult& result, const Measures&
   }
   for (std::size_t i = 0; i < std::min<std::size_t>(m.faults.size(), 5); ++i) {
     line("fault", fmt::format("{} at {:.3f} s", rt::name(m.faults[i].fault), m.faults[i].t_s));
+  }
+  for (const NotKept& n : result.not_kept) {
+    line("not kept", fmt::format("{} from {:.3f} s on: {}", n.file, n.t_s, n.why));
   }
   if (result.samples_lost > 0) {
     line("recording", fmt::format("{} samples were overrun before they were read", result.samples_lost));

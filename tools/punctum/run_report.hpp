@@ -12,6 +12,7 @@
 #include "rt/station/run_end.hpp"
 #include "tools/punctum/event_list.hpp"
 #include "tools/punctum/measures.hpp"
+#include "tools/punctum/not_kept.hpp"
 #include "tools/punctum/vision_process.hpp"
 #include "tools/scene/scene.hpp"
 
@@ -24,10 +25,13 @@ struct ContourError {
 };
 [[nodiscard]] std::optional<ContourError> read_contour_error(const std::string& obs_csv);
 
+// What a run came to, beside its measures. The dose, asked and given, stands there with each cell.
 struct RunResult {
   rt::RunEnd end = rt::RunEnd::done;
   std::string detail;  // of a fault or of the death of the core
+  Whereabouts needle;  // at the end, after the devices have come to rest
   double wall_s = 0;
+  std::vector<NotKept> not_kept;  // in the order of time
   std::uint64_t rows = 0, rows_every = 1, samples_lost = 0;
   std::vector<Restart> vision_restarts;
   std::optional<sim::UnattendedEnd> unattended;  // what the devices did after the death of the core
@@ -38,6 +42,8 @@ struct RunResult {
                                                            const EventList& events,
                                                            const rt::CoreStatus& core,
                                                            const std::optional<ContourError>& contour);
+// "inside the cell, 23.1 um past its membrane", "outside the cell", ...
+[[nodiscard]] std::string in_words(const Whereabouts& needle);
 [[nodiscard]] std::string summary(const Scene& scene, const RunResult& result, const Measures& m,
                                   const rt::CoreStatus& core, const std::optional<ContourError>& contour);
 // The rights the core did not get, and how to get them; empty when it has all it needs.

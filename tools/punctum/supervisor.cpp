@@ -355,7 +355,8 @@ void Run::judge_end(const Ended& core) {
   const RunFacts facts{.core_exited = core.exited,
                        .stop_was_asked = core_.stop_was_asked(),
                        .vision_over = vision_.over(),
-                       .has_task = scene_.has_task()};
+                       .has_task = scene_.has_task(),
+                       .has_vision = scene_.vision.has_value()};
   result_.end = judge(facts, status(), recorder_.measures());
   result_.wall_s = now_s();
   if (result_.end == rt::RunEnd::fault) {
@@ -368,6 +369,8 @@ void Run::judge_end(const Ended& core) {
     recorder_.keep_last_seconds();
     let_devices_come_to_rest();
   }
+  result_.needle =
+      recorder_.measures().whereabouts(result_.unattended ? &result_.unattended->last : nullptr);
 }
 
 // The core is dead: what the simulated devices do by themselves.

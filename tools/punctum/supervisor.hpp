@@ -14,6 +14,7 @@ struct RunSettings {
   std::uint64_t samples_every = 0;  // 0: every tick, of long runs every n-th
   bool frames = true;               // annotated frames
   bool figure = true;
+  bool overwrite = false;  // an earlier report in the folder
   bool quiet = false;  // the summary only
 };
 

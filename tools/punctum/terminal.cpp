@@ -3,28 +3,20 @@
 #include <unistd.h>
 
 #include <cmath>
-#include <cstdio>
+
+#include "tools/shared/say.hpp"
 
 namespace punctum::tools {
-namespace {
-
-void write(std::FILE* to, const std::string& text) {
-  (void)std::fwrite(text.data(), 1, text.size(), to);
-  (void)std::fflush(to);
-}
-
-}  // namespace
-
 Terminal::Terminal() : is_terminal_(isatty(STDOUT_FILENO) != 0) {}
 
 void Terminal::complain(const std::string& text) {
   clear_progress();
-  write(stderr, fmt::format("punctum: {}\n", text));
+  tools::complain("punctum: " + text);
 }
 
 void Terminal::print(const std::string& text) {
   clear_progress();
-  write(stdout, text);
+  tools::say(text);
 }
 
 void Terminal::progress(const std::string& line) {
@@ -32,13 +24,13 @@ void Terminal::progress(const std::string& line) {
     say("{}", line);
     return;
   }
-  write(stdout, "\r\033[K" + line);
+  tools::say("\r\033[K" + line);
   progress_drawn_ = true;
 }
 
 void Terminal::clear_progress() {
   if (progress_drawn_) {
-    write(stdout, "\r\033[K");
+    tools::say("\r\033[K");
   }
   progress_drawn_ = false;
 }

@@ -5,14 +5,13 @@
 #include <signal.h>
 #include <sys/resource.h>
 
-#include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <filesystem>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <optional>
-#include <vector>
+#include <string>
+#include <tl/expected.hpp>
+#include <utility>
 
 #include "hal/ipc/segment.hpp"
 #include "hal/recorded/picture.hpp"
@@ -24,20 +23,24 @@
 #include "rt/station/station.hpp"
 #include "tools/scene/scene.hpp"
 #include "tools/shared/exit_codes.hpp"
+#include "tools/shared/say.hpp"
 #include "tools/shared/station_segments.hpp"
 #include "tools/shared/stop_signal.hpp"
 #include "tools/shared/truth_observer.hpp"
 #include "tools/shared/vision_lies.hpp"
+#include "tools/vision/live_tracker.hpp"
 #include "tools/vision/observation_csv.hpp"
-#include "vision/image/polyline.hpp"
+#include "tools/vision/picture_file.hpp"
+#include "tools/vision/truth_comparison.hpp"
 #include "vision/overlay.hpp"
-#include "vision/tracker.hpp"
 
 namespace punctum::tools {
 
 namespace {
 
 constexpr std::int64_t kFrameTimeout_ns = 100'000'000;
+
+using Opened = tl::expected<void, std::string>;  // the error is one line
 
 std::atomic<sim::BenchClock*> waiting_clock{nullptr};
 static_assert(std::atomic<sim::BenchClock*>::is_always_lock_free);
@@ -47,83 +50,6 @@ void on_stop_signal(int) noexcept {
     clock->stop_waiting();
   }
 }
-
-int bad(const std::string& text) {
-  fmt::print(stderr, "{}\n", text);
-  return exit_bad_input;
-}
-
-// What was seen against what is so.
-class TruthComparison {
- public:
-  TruthComparison(const vision::VisionConfig& config, int width, int height)
-      : um_(config.pixel_m * 1e6), pixel_m_(config.pixel_m), middle_((width - 1) / 2.0, (height - 1) / 2.0) {}
-
-  [[nodiscard]] TruthError compare(const vision::Result& r, const sim::SimCamera& camera) {
-    TruthError e;
-    const sim::Truth& t = camera.truth();
-    if (r.needle.ok) {
-      const vision::Point d = r.needle.tip - pixel(t.tip_m.x(), t.tip_m.y());
-      vision::Point axis(t.axis.x(), t.axis.y());
-      axis *= 1 / std::max(cv::norm(axis), 1e-9);
-      e.tip_um = d.dot(axis) * um_;
-      e.tip_lateral_um = axis.cross(d) * um_;
-    }
-    if (!t.cell) {
-      return e;
-    }
-    if (r.outer.ok && !camera.outer().empty()) {
-      std::vector<double> d = distances(r.outer.contour, camera.outer());
-      e.outer_rms_um = rms(d);
-      e.outer_max_um = *std::max_element(d.begin(), d.end());
-      const auto p95 = d.begin() + static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(d.size() - 1));
-      std::nth_element(d.begin(), p95, d.end());
-      e.outer_p95_um = *p95;
-    }
-    if (r.inner.ok && !camera.inner().empty()) {
-      e.inner_rms_um = rms(distances(r.inner.contour, camera.inner()));
-    }
-    if (r.gap_px) {
-      e.gap_um = *r.gap_px * um_ - t.gap_m * 1e6;
-    }
-    if (r.wd_px) {
-      e.wd_um = *r.wd_px * um_ - t.wd_m * 1e6;
-    }
-    if (r.a_px && t.wd_m > 0) {
-      e.a_um = *r.a_px * um_ - t.a_m * 1e6;
-    }
-    return e;
-  }
-
- private:
-  [[nodiscard]] vision::Point pixel(double x_m, double y_m) const {
-    return {x_m / pixel_m_ + middle_.x, y_m / pixel_m_ + middle_.y};
-  }
-  [[nodiscard]] std::vector<double> distances(const vision::Contour& seen,
-                                              std::span<const std::array<double, 2>> truth) {
-    vision::Contour contour;
-    for (const auto& p : truth) {
-      contour.push_back(pixel(p[0], p[1]));
-    }
-    const vision::Polyline line(std::move(contour), true);
-    std::vector<double> d;
-    d.reserve(seen.size());
-    for (const vision::Point& p : seen) {
-      d.push_back(line.distance(p) * um_);
-    }
-    return d;
-  }
-  [[nodiscard]] static double rms(const std::vector<double>& d) {
-    double ss = 0;
-    for (const double x : d) {
-      ss += x * x;
-    }
-    return std::sqrt(ss / static_cast<double>(d.size()));
-  }
-
-  double um_, pixel_m_;
-  vision::Point middle_;
-};
 
 // On another processor and behind the control core, where that is allowed.
 void yield_to_core(const Scene& scene) {
@@ -138,205 +64,348 @@ void yield_to_core(const Scene& scene) {
   }
 }
 
-}  // namespace
+// One vision process: the camera of a scene, what is made of its frames, and who gets it. Set up once, part by
+// part; then one round per frame.
+class LiveVision {
+ public:
+  explicit LiveVision(const LiveOptions& options) : options_(options) {}
+  ~LiveVision() { waiting_clock = nullptr; }
+  LiveVision(const LiveVision&) = delete;
+  LiveVision& operator=(const LiveVision&) = delete;
 
-int live(const LiveOptions& options) {
-  const auto scene = load_scene(options.scene);
+  [[nodiscard]] Opened open();
+  [[nodiscard]] ExitCode run();
+
+ private:
+  struct Seen {
+    const vision::Result* result = nullptr;  // null: nobody looked at a picture
+    rt::Observation observation;
+    TruthError error;
+    std::optional<cv::Mat> picture;  // to be annotated
+    double t_s = 0;                  // of the exposure, in the run
+  };
+
+  [[nodiscard]] Opened read_scene();
+  [[nodiscard]] Opened join_station();
+  [[nodiscard]] Opened join_bench(int descriptor);
+  [[nodiscard]] Opened open_camera();
+  [[nodiscard]] Opened begin_tracker();
+  [[nodiscard]] Opened open_files();
+
+  [[nodiscard]] hal::Clock& clock() {
+    return bench_clock_ ? static_cast<hal::Clock&>(*bench_clock_) : monotonic_;
+  }
+  [[nodiscard]] hal::Camera& camera() {
+    return sim_camera_ ? static_cast<hal::Camera&>(*sim_camera_) : static_cast<hal::Camera&>(*recorded_);
+  }
+  [[nodiscard]] bool plant_has_stopped() const { return bench_ && (*bench_)->finished.load() != 0; }
+  void go_round();
+  void wait_until(std::int64_t t_ns);
+  [[nodiscard]] double time_to_play(hal::Frame& frame);
+  void tell_unusable(const hal::Frame& frame, double t_s);
+  [[nodiscard]] Seen look_at(const hal::Frame& frame);
+  void publish(const hal::Frame& frame, const rt::Observation& observation);
+  void record(const hal::Frame& frame, const Seen& seen);
+  void go_on_without(rt::ObservationSegment::NotKept what, const std::string& why);
+
+  const LiveOptions& options_;
+  std::optional<Scene> scene_;
+  bool simulated_ = false;   // the camera
+  bool truth_only_ = false;  // no picture is drawn or looked at
+  std::optional<hal::Shared<rt::ObservationSegment>> station_;
+  std::optional<hal::Shared<const sim::Bench>> bench_;
+  std::optional<hal::Shared<sim::CameraAnswers>> answers_;
+  rt::MonotonicClock monotonic_;
+  std::optional<sim::BenchClock> bench_clock_;
+  std::optional<sim::SimCamera> sim_camera_;
+  std::optional<recorded::Camera> recorded_;
+  std::optional<sim::ExposureTaker> in_place_of_camera_;  // so that virtual time knows vision is there
+  int width_ = 0, height_ = 0;
+  std::int64_t began_ns_ = 0;
+
+  std::optional<LiveTracker> tracker_;
+  std::optional<TruthComparison> comparison_;
+  std::optional<VisionLiar> liar_;
+  std::optional<sim::Truth> truth_before_;
+  rt::Phase phase_before_ = rt::Phase::free;
+
+  std::optional<ObservationCsv> csv_;
+  bool overlays_ = false;
+};
+
+Opened LiveVision::open() {
+  for (const auto step : {&LiveVision::read_scene, &LiveVision::join_station, &LiveVision::open_camera,
+                          &LiveVision::begin_tracker, &LiveVision::open_files}) {
+    if (auto opened = (this->*step)(); !opened) {
+      return opened;
+    }
+  }
+  began_ns_ = clock().now_ns();
+  return {};
+}
+
+Opened LiveVision::read_scene() {
+  auto scene = load_scene(options_.scene);
   if (!scene) {
-    return bad(scene.error());
+    return tl::unexpected(scene.error());
   }
-  if (!scene->vision) {
-    return bad(fmt::format("{}: it has no [vision]", options.scene));
+  scene_ = std::move(*scene);
+  if (!scene_->vision) {
+    return tl::unexpected(fmt::format("{}: it has no [vision]", options_.scene));
   }
-  const vision::VisionConfig& config = *scene->vision;
-  const bool simulated = !scene->recorded && scene->simulated_camera();
-  if (!simulated && !scene->recorded) {
-    return bad(fmt::format("{}: it names no camera", options.scene));
+  simulated_ = !scene_->recorded && scene_->simulated_camera();
+  if (!simulated_ && !scene_->recorded) {
+    return tl::unexpected(fmt::format("{}: it names no camera", options_.scene));
   }
-  const auto segments = HandedSegments::parse(options.segments);
+  truth_only_ = scene_->vision->method == vision::Method::truth;
+  if (truth_only_ && !simulated_) {
+    return tl::unexpected(std::string("vision.method = \"truth\" needs the simulated camera"));
+  }
+  return {};
+}
+
+Opened LiveVision::join_station() {
+  const auto segments = HandedSegments::parse(options_.segments);
   if (!segments) {
-    return bad(segments.error());
+    return tl::unexpected(segments.error());
   }
   stop_signal::watch({SIGTERM, SIGINT, SIGHUP, SIGQUIT}, on_stop_signal);
-  yield_to_core(*scene);
-
+  yield_to_core(*scene_);
   auto observations = hal::Shared<rt::ObservationSegment>::claim(kObservationSegment,
                                                                  segments->descriptor(kObservationSegment));
   if (!observations) {
-    return bad(observations.error());
+    return tl::unexpected(observations.error());
   }
-  if (!stop_signal::watch_parent((*observations)->header.owner_pid)) {
-    return bad("the program that started vision has died");
+  station_ = std::move(*observations);
+  if (!stop_signal::watch_parent((*station_)->header.owner_pid)) {
+    return tl::unexpected(std::string("the program that started vision has died"));
   }
-  std::optional<hal::Shared<const sim::Bench>> bench;
-  std::optional<hal::Shared<sim::CameraAnswers>> answers;
-  if (const int descriptor = segments->descriptor(kBenchSegment); simulated || descriptor >= 0) {
-    auto attached = hal::Shared<const sim::Bench>::attach(kBenchSegment, descriptor);
-    if (!attached) {
-      return bad(attached.error());
-    }
-    bench = std::move(*attached);
-    auto own = hal::Shared<sim::CameraAnswers>::attach(kCameraSegment, segments->descriptor(kCameraSegment));
-    if (!own) {
-      return bad(own.error());
-    }
-    answers = std::move(*own);
+  const int bench = segments->descriptor(kBenchSegment);
+  if (!simulated_ && bench < 0) {
+    return {};
   }
-  rt::MonotonicClock monotonic;
-  std::optional<sim::BenchClock> bench_clock;
-  if (bench) {
-    bench_clock.emplace(**bench);
-    waiting_clock = &*bench_clock;
+  auto attached = hal::Shared<const sim::Bench>::attach(kBenchSegment, bench);
+  if (!attached) {
+    return tl::unexpected(attached.error());
   }
-  hal::Clock& clock = bench_clock ? static_cast<hal::Clock&>(*bench_clock) : monotonic;
+  bench_ = std::move(*attached);
+  auto answers = hal::Shared<sim::CameraAnswers>::attach(kCameraSegment, segments->descriptor(kCameraSegment));
+  if (!answers) {
+    return tl::unexpected(answers.error());
+  }
+  answers_ = std::move(*answers);
+  bench_clock_.emplace(**bench_);
+  waiting_clock = &*bench_clock_;
+  return {};
+}
 
-  const bool truth_only = config.method == vision::Method::truth;
-  if (truth_only && !simulated) {
-    return bad("vision.method = \"truth\" needs the simulated camera");
+Opened LiveVision::open_camera() {
+  if (simulated_) {
+    sim_camera_.emplace(*scene_->sim, **bench_, **answers_,
+                        truth_only_ ? sim::SimCamera::Picture::none : sim::SimCamera::Picture::drawn);
+    width_ = sim_camera_->width();
+    height_ = sim_camera_->height();
+    liar_.emplace(scene_->sim->seed);
+    return {};
   }
-  std::optional<sim::SimCamera> sim_camera;
-  std::optional<recorded::Camera> recorded_camera;
-  std::optional<sim::ExposureTaker> in_place_of_camera;  // so that virtual time knows vision is there
-  int width = 0, height = 0;
-  if (simulated) {
-    sim_camera.emplace(*scene->sim, **bench, **answers,
-                       truth_only ? sim::SimCamera::Picture::none : sim::SimCamera::Picture::drawn);
-    width = sim_camera->width();
-    height = sim_camera->height();
-  } else {
-    auto opened = recorded::Camera::open(scene->recorded->frames, scene->recorded->fps);
-    if (!opened) {
-      return bad(opened.error());
-    }
-    recorded_camera = std::move(*opened);
-    width = recorded_camera->width();
-    height = recorded_camera->height();
-    if (bench) {
-      in_place_of_camera.emplace(**bench, **answers);
-      in_place_of_camera->attach();
-    }
+  auto opened = recorded::Camera::open(scene_->recorded->frames, scene_->recorded->fps);
+  if (!opened) {
+    return tl::unexpected(opened.error());
   }
-  hal::Camera& camera =
-      sim_camera ? static_cast<hal::Camera&>(*sim_camera) : static_cast<hal::Camera&>(*recorded_camera);
+  recorded_ = std::move(*opened);
+  width_ = recorded_->width();
+  height_ = recorded_->height();
+  if (bench_) {
+    in_place_of_camera_.emplace(**bench_, **answers_);
+    in_place_of_camera_->attach();
+  }
+  return {};
+}
 
-  vision::Tracker tracker(config, width, height);
+Opened LiveVision::begin_tracker() {
+  const vision::VisionConfig& config = *scene_->vision;
+  cv::Mat holder_template;
   if (config.holder && !config.holder->template_path.empty()) {
     const auto picture = recorded::read_picture(config.holder->template_path);
     if (!picture) {
-      return bad(picture.error());
+      return tl::unexpected(picture.error());
     }
-    tracker.holder_template(
-        cv::Mat(picture->height, picture->width, CV_8U, const_cast<std::uint8_t*>(picture->pixels.data())));
+    holder_template =
+        cv::Mat(picture->height, picture->width, CV_8U, const_cast<std::uint8_t*>(picture->pixels.data()))
+            .clone();
   }
-  std::optional<ObservationCsv> csv;
-  if (!options.out.empty()) {
-    auto opened = ObservationCsv::open(options.out, true, simulated);
-    if (!opened) {
-      return bad(opened.error());
-    }
-    csv = std::move(*opened);
-  }
-  bool overlays = !options.overlay.empty();
-  if (overlays) {
-    std::error_code error;
-    std::filesystem::create_directories(options.overlay, error);
-    overlays = !error;
-  }
-  TruthComparison comparison(config, width, height);
-  std::optional<VisionLiar> liar;
-  if (simulated) {
-    liar.emplace(scene->sim->seed);
-  }
-  std::optional<sim::Truth> truth_before;
-  rt::Phase phase_before = rt::Phase::free;
-  const std::int64_t began_ns = clock.now_ns();
-  ExitCode code = exit_done;
+  tracker_.emplace(config, width_, height_, holder_template);
+  comparison_.emplace(config, width_, height_);
+  return {};
+}
 
-  while (stop_signal::count() == 0) {
+// A run needs no table and no pictures: what cannot be written there keeps nobody from seeing.
+Opened LiveVision::open_files() {
+  if (!options_.out.empty()) {
+    if (auto opened = ObservationCsv::open(options_.out, true, simulated_)) {
+      csv_ = std::move(*opened);
+    } else {
+      go_on_without(rt::ObservationSegment::observations, opened.error());
+    }
+  }
+  if (!options_.overlay.empty()) {
+    std::error_code error;
+    std::filesystem::create_directories(options_.overlay, error);
+    overlays_ = !error;
+    if (error) {
+      go_on_without(rt::ObservationSegment::frames,
+                    fmt::format("{}: {}", options_.overlay, error.message()));
+    }
+  }
+  return {};
+}
+
+ExitCode LiveVision::run() {
+  while (stop_signal::count() == 0 && !(recorded_ && plant_has_stopped())) {
+    go_round();
     hal::Frame frame;
-    const hal::Status status = camera.next(frame, kFrameTimeout_ns);
+    const hal::Status status = camera().next(frame, kFrameTimeout_ns);
     if (status == hal::Status::no_data) {
       continue;
     }
     if (status == hal::Status::disconnected) {
-      const bool ended = recorded_camera || (*bench)->finished.load() != 0;
-      if (!ended) {
-        fmt::print(stderr, "the camera is gone\n");
-        code = exit_not_done;  // a restart may help
+      if (recorded_ || plant_has_stopped()) {
+        return exit_done;
       }
-      break;
+      complain("the camera is gone");
+      return exit_not_done;  // a restart may help
     }
-    const std::int64_t start_ns = simulated ? sim_camera->snapshot().start_ns : began_ns;
-    if (!simulated) {  // recorded pictures are shown at their own pace
-      frame.exposure_ns += began_ns;
-      frame.deliver_ns = 0;
-      clock.sleep_until_ns(frame.exposure_ns);
-    }
-    const double t_s = static_cast<double>(frame.exposure_ns - start_ns) * 1e-9;
+    const double t_s = time_to_play(frame);
     if (status == hal::Status::fault) {
-      if (csv) {
-        csv->row(frame.sequence, t_s, 0,
-                 recorded_camera ? recorded_camera->last_error() : "the camera delivered no usable picture");
-      }
-      camera.release(frame);
+      tell_unusable(frame, t_s);
       continue;
     }
-    const vision::Result* seen = nullptr;
-    rt::Observation observation;
-    if (truth_only) {
-      observation = observe_truth(sim_camera->truth(), frame.sequence, frame.exposure_ns, truth_before);
-      truth_before = sim_camera->truth();
-    } else {
-      seen = &tracker.process(frame);
-      observation = vision::to_observation(*seen, config, width, height);
-    }
-    TruthError error;
-    if (simulated && seen != nullptr) {
-      error = comparison.compare(*seen, *sim_camera);
-    }
-    std::optional<cv::Mat> picture;
-    if (overlays && seen != nullptr && (frame.sequence % kOverlayEvery == 0 || seen->phase != phase_before)) {
-      picture = cv::Mat(height, width, CV_8U, const_cast<std::uint8_t*>(frame.pixels),
-                        static_cast<std::size_t>(frame.stride))
-                    .clone();
-    }
-    if (frame.deliver_ns > 0) {
-      clock.sleep_until_ns(frame.deliver_ns);
-    }
-    const auto told =
-        liar ? liar->tell(sim_camera->snapshot(), observation) : std::optional<rt::Observation>(observation);
-    if (told) {
-      (*observations)->slot.push(*told);
-    }
-    camera.release(frame);
+    Seen seen = look_at(frame);
+    seen.t_s = t_s;
+    publish(frame, seen.observation);
+    record(frame, seen);
+  }
+  if (plant_has_stopped()) {
+    return exit_done;
+  }
+  complain("a signal asked it to stop before the run had ended");
+  return exit_not_done;
+}
 
-    if (seen == nullptr) {
-      continue;
-    }
-    phase_before = seen->phase;
-    if (csv) {
-      csv->row(*seen, config, t_s, cv::Point(0, 0), simulated ? &error : nullptr);
-      if (!csv->flush()) {
-        fmt::print(stderr, "{}: not complete, is the disk full? Going on without it\n", options.out);
-        csv.reset();
-      }
-    }
-    if (picture) {
-      bool written = false;
-      try {
-        written = cv::imwrite(fmt::format("{}/{:06}.png", options.overlay, frame.sequence),
-                              vision::draw_overlay(*picture, *seen, config));
-      } catch (const cv::Exception&) {
-        written = false;
-      }
-      if (!written) {
-        fmt::print(stderr, "{}: cannot be written; going on without overlays\n", options.overlay);
-        overlays = false;
-      }
+// Whoever watches vision sees that it does not hang.
+void LiveVision::go_round() {
+  hal::Word& rounds = (*station_)->rounds;
+  rounds.store(rounds.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+}
+
+void LiveVision::wait_until(std::int64_t t_ns) {
+  const bool virtual_time = bench_ && (*bench_)->virtual_time.load() != 0;
+  for (std::int64_t now_ns = clock().now_ns();
+       !virtual_time && t_ns - now_ns > kFrameTimeout_ns && stop_signal::count() == 0 && !plant_has_stopped();
+       now_ns = clock().now_ns()) {
+    go_round();
+    clock().sleep_until_ns(now_ns + kFrameTimeout_ns);
+  }
+  clock().sleep_until_ns(t_ns);
+}
+
+// Recorded pictures are shown at their own pace. Returns when this one was taken, in seconds of the run.
+double LiveVision::time_to_play(hal::Frame& frame) {
+  const std::int64_t start_ns = simulated_ ? sim_camera_->snapshot().start_ns : began_ns_;
+  if (!simulated_) {
+    frame.exposure_ns += began_ns_;
+    frame.deliver_ns = 0;
+    wait_until(frame.exposure_ns);
+  }
+  return static_cast<double>(frame.exposure_ns - start_ns) * 1e-9;
+}
+
+void LiveVision::tell_unusable(const hal::Frame& frame, double t_s) {
+  if (csv_) {
+    csv_->row(frame.sequence, t_s, 0,
+              recorded_ ? recorded_->last_error() : "the camera delivered no usable picture");
+  }
+  camera().release(frame);
+}
+
+LiveVision::Seen LiveVision::look_at(const hal::Frame& frame) {
+  Seen seen;
+  if (truth_only_) {
+    seen.observation =
+        observe_truth(sim_camera_->truth(), frame.sequence, frame.exposure_ns, truth_before_);
+    truth_before_ = sim_camera_->truth();
+    return seen;
+  }
+  const int restarts = tracker_->restarts();
+  seen.result = &tracker_->process(frame);
+  if (tracker_->restarts() != restarts) {
+    complain(fmt::format("frame {}: the first one for more than {:.1f} s, started anew", frame.sequence,
+                         static_cast<double>(LiveTracker::kLongestGap_ns) * 1e-9));
+  }
+  seen.observation = vision::to_observation(*seen.result, *scene_->vision, width_, height_);
+  if (simulated_) {
+    seen.error = comparison_->compare(*seen.result, *sim_camera_);
+  }
+  if (overlays_ && (frame.sequence % kOverlayEvery == 0 || seen.result->phase != phase_before_)) {
+    seen.picture = cv::Mat(height_, width_, CV_8U, const_cast<std::uint8_t*>(frame.pixels),
+                           static_cast<std::size_t>(frame.stride))
+                       .clone();
+  }
+  phase_before_ = seen.result->phase;
+  return seen;
+}
+
+// The frame goes back to its camera.
+void LiveVision::publish(const hal::Frame& frame, const rt::Observation& observation) {
+  if (frame.deliver_ns > 0) {
+    wait_until(frame.deliver_ns);
+  }
+  const auto told = liar_ ? liar_->tell(sim_camera_->snapshot(), observation)
+                          : std::optional<rt::Observation>(observation);
+  if (told) {
+    (*station_)->slot.push(*told);
+  }
+  camera().release(frame);
+}
+
+void LiveVision::record(const hal::Frame& frame, const Seen& seen) {
+  if (seen.result == nullptr) {
+    return;
+  }
+  if (csv_) {
+    csv_->row(*seen.result, *scene_->vision, seen.t_s, cv::Point(0, 0), simulated_ ? &seen.error : nullptr);
+    if (!csv_->flush()) {
+      go_on_without(rt::ObservationSegment::observations,
+                    fmt::format("{}: {}", options_.out, csv_->failure()));
+      csv_.reset();
     }
   }
-  waiting_clock = nullptr;
-  return code;
+  if (seen.picture) {
+    const auto written =
+        write_picture(fmt::format("{}/{:06}.png", options_.overlay, frame.sequence),
+                      vision::draw_overlay(*seen.picture, *seen.result, *scene_->vision));
+    if (!written) {
+      go_on_without(rt::ObservationSegment::frames, written.error());
+      overlays_ = false;
+    }
+  }
+}
+
+void LiveVision::go_on_without(rt::ObservationSegment::NotKept what, const std::string& why) {
+  hal::Word& not_kept = (*station_)->not_kept;
+  not_kept.store(not_kept.load(std::memory_order_relaxed) | what, std::memory_order_relaxed);
+  complain(why + "; going on without it");
+}
+
+}  // namespace
+
+int live(const LiveOptions& options) {
+  LiveVision vision(options);
+  if (const auto opened = vision.open(); !opened) {
+    complain(opened.error());
+    return exit_bad_input;
+  }
+  return vision.run();
 }
 
 }  // namespace punctum::tools

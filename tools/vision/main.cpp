@@ -1,14 +1,12 @@
 // punctum-vision: frames -> observations, live for a running station or offline on recorded frames.
-#include <fmt/format.h>
-
 #include <CLI/CLI.hpp>
-#include <cstdio>
 #include <exception>
 #include <opencv2/core/utility.hpp>
 #include <string>
 #include <vector>
 
 #include "tools/shared/exit_codes.hpp"
+#include "tools/shared/say.hpp"
 #include "tools/shared/version.hpp"
 #include "tools/vision/live_vision.hpp"
 #include "tools/vision/track.hpp"
@@ -50,9 +48,9 @@ int run(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) {
-      return app.exit(e);
+      return app.exit(e) == 0 && tools::all_was_said() ? tools::exit_done : tools::exit_not_done;
     }
-    fmt::print(stderr, "{}\n", e.what());
+    tools::complain(e.what());
     return tools::exit_bad_input;
   }
   if (track->parsed()) {
@@ -70,12 +68,13 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  punctum::tools::take_file_limits_as_errors();
   // Errors come as one line of ours, not OpenCV's own log as well.
   cv::redirectError([](int, const char*, const char*, const char*, int, void*) { return 0; });
   try {
     return run(argc, argv);
   } catch (const std::exception& e) {
-    fmt::print(stderr, "punctum-vision: {}\n", e.what());
+    punctum::tools::complain(std::string("punctum-vision: ") + e.what());
     return punctum::tools::exit_bad_input;
   }
 }

@@ -3,9 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
+#include <fstream>
 #include <string_view>
+#include <utility>
 
 #include "rt/forces/membrane.hpp"
 
@@ -30,10 +30,10 @@ constexpr std::string_view kTruthColumns =
 
 class Row {
  public:
-  explicit Row(std::FILE* file) : file_(file) {}
+  explicit Row(RowFile& file) : file_(file) {}
   ~Row() {
     line_ += '\n';
-    (void)std::fwrite(line_.data(), 1, line_.size(), file_);  // flush() tells
+    file_.append(line_);
   }
   Row(const Row&) = delete;
   Row& operator=(const Row&) = delete;
@@ -77,7 +77,7 @@ class Row {
     }
     first_ = false;
   }
-  std::FILE* file_;
+  RowFile& file_;
   std::string line_;
   bool first_ = true;
 };
@@ -89,19 +89,19 @@ tl::expected<ObservationCsv, std::string> ObservationCsv::open(const std::string
   const std::string head = std::string(kColumns) + (with_truth ? std::string(kTruthColumns) : std::string());
   bool same = false;
   if (append) {
-    if (std::unique_ptr<std::FILE, Close> old{std::fopen(path.c_str(), "r")}) {
-      std::string first(head.size() + 1, '\0');
-      same = std::fread(first.data(), 1, first.size(), old.get()) == first.size() && first == head + "\n";
-    }
+    std::ifstream old(path, std::ios::binary);
+    std::string first;
+    same = std::getline(old, first) && !old.eof() && first == head;
+  }
+  auto rows = RowFile::open(path, same ? RowFile::Begin::after : RowFile::Begin::empty);
+  if (!rows) {
+    return tl::unexpected(rows.error());
   }
   ObservationCsv csv;
-  csv.file_.reset(std::fopen(path.c_str(), same ? "a" : "w"));
-  if (!csv.file_) {
-    return tl::unexpected(fmt::format("{}: cannot be written: {}", path, std::strerror(errno)));
-  }
+  csv.rows_ = std::move(*rows);
   csv.with_truth_ = with_truth;
   if (!same) {
-    (void)std::fputs((head + "\n").c_str(), csv.file_.get());
+    csv.rows_.append(head + "\n");
   }
   return csv;
 }
@@ -121,7 +121,7 @@ std::optional<double> ObservationCsv::force_N(const vision::Result& r, const vis
 }
 
 void ObservationCsv::row(std::uint64_t frame, double t_s, double total_us, const std::string& verdict) {
-  Row row(file_.get());
+  Row row(rows_);
   row.text(std::to_string(frame));
   row.number(t_s, 6);
   row.nothing(8);
@@ -145,7 +145,7 @@ void ObservationCsv::row(const vision::Result& r, const vision::VisionConfig& co
   const auto some = [](bool known, const vision::Point& p) {
     return known ? std::optional<vision::Point>(p) : std::nullopt;
   };
-  Row row(file_.get());
+  Row row(rows_);
   row.text(std::to_string(r.frame));
   row.number(t_s, 6);
   row.text(rt::name(r.phase));
@@ -204,15 +204,19 @@ void ObservationCsv::row(const vision::Result& r, const vision::VisionConfig& co
   }
 }
 
-bool ObservationCsv::flush() { return std::fflush(file_.get()) == 0 && std::ferror(file_.get()) == 0; }
+bool ObservationCsv::flush() {
+  rows_.flush();
+  return rows_.failure().empty();
+}
 
 tl::expected<ContoursCsv, std::string> ContoursCsv::open(const std::string& path) {
-  ContoursCsv csv;
-  csv.file_.reset(std::fopen(path.c_str(), "w"));
-  if (!csv.file_) {
-    return tl::unexpected(fmt::format("{}: cannot be written: {}", path, std::strerror(errno)));
+  auto rows = RowFile::open(path, RowFile::Begin::empty);
+  if (!rows) {
+    return tl::unexpected(rows.error());
   }
-  (void)std::fputs("frame,membrane,node,x_px,y_px\n", csv.file_.get());
+  ContoursCsv csv;
+  csv.rows_ = std::move(*rows);
+  csv.rows_.append("frame,membrane,node,x_px,y_px\n");
   return csv;
 }
 
@@ -222,13 +226,15 @@ void ContoursCsv::rows(const vision::Result& r, cv::Point offset) {
       continue;
     }
     for (std::size_t i = 0; i < m->contour.size(); ++i) {
-      const std::string line = fmt::format("{},{},{},{:.3f},{:.3f}\n", r.frame, name, i,
-                                           m->contour[i].x + offset.x, m->contour[i].y + offset.y);
-      (void)std::fwrite(line.data(), 1, line.size(), file_.get());
+      rows_.append(fmt::format("{},{},{},{:.3f},{:.3f}\n", r.frame, name, i, m->contour[i].x + offset.x,
+                               m->contour[i].y + offset.y));
     }
   }
 }
 
-bool ContoursCsv::flush() { return std::fflush(file_.get()) == 0 && std::ferror(file_.get()) == 0; }
+bool ContoursCsv::flush() {
+  rows_.flush();
+  return rows_.failure().empty();
+}
 
 }  // namespace punctum::tools

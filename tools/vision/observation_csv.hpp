@@ -1,13 +1,12 @@
 // obs.csv: the result of vision, one row per frame; contours.csv: its contours, one row per node.
 #pragma once
 
-#include <cstdio>
-#include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <tl/expected.hpp>
 
+#include "tools/shared/row_file.hpp"
 #include "vision/result.hpp"
 
 namespace punctum::tools {
@@ -33,16 +32,14 @@ class ObservationCsv {
   // A frame that could not be used.
   void row(std::uint64_t frame, double t_s, double total_us, const std::string& verdict);
   [[nodiscard]] bool flush();  // false: something could not be written, now or before
+  [[nodiscard]] const std::string& failure() const noexcept { return rows_.failure(); }
 
   // Eq. 5 at the measured dimple; empty where w_d or a is not known.
   [[nodiscard]] static std::optional<double> force_N(const vision::Result& result,
                                                      const vision::VisionConfig& config);
 
  private:
-  struct Close {
-    void operator()(std::FILE* f) const noexcept { std::fclose(f); }
-  };
-  std::unique_ptr<std::FILE, Close> file_;
+  RowFile rows_;
   bool with_truth_ = false;
 };
 
@@ -51,12 +48,10 @@ class ContoursCsv {
   [[nodiscard]] static tl::expected<ContoursCsv, std::string> open(const std::string& path);
   void rows(const vision::Result& result, cv::Point offset);
   [[nodiscard]] bool flush();
+  [[nodiscard]] const std::string& failure() const noexcept { return rows_.failure(); }
 
  private:
-  struct Close {
-    void operator()(std::FILE* f) const noexcept { std::fclose(f); }
-  };
-  std::unique_ptr<std::FILE, Close> file_;
+  RowFile rows_;
 };
 
 }  // namespace punctum::tools

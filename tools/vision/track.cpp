@@ -4,10 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <system_error>
 #include <tl/expected.hpp>
@@ -16,7 +14,9 @@
 #include "hal/recorded/picture.hpp"
 #include "hal/recorded/recorded_camera.hpp"
 #include "tools/scene/scene.hpp"
+#include "tools/shared/say.hpp"
 #include "tools/vision/observation_csv.hpp"
+#include "tools/vision/picture_file.hpp"
 #include "vision/events/scene_change.hpp"
 #include "vision/overlay.hpp"
 #include "vision/tracker.hpp"
@@ -177,14 +177,8 @@ void Output::write_overlay(const cv::Mat& grey, const vision::Result& result,
   }
   const std::string stem = std::filesystem::path(picture_name).stem().string();
   const std::string path = fmt::format("{}/{:06}_{}.png", overlay_folder, result.frame, stem);
-  bool written = false;
-  try {
-    written = cv::imwrite(path, vision::draw_overlay(grey, result, config));
-  } catch (const cv::Exception&) {
-    written = false;
-  }
-  if (!written) {
-    fmt::print(stderr, "{}: cannot be written; going on without overlays\n", path);
+  if (const auto written = write_picture(path, vision::draw_overlay(grey, result, config)); !written) {
+    complain(written.error() + "; going on without overlays");
     overlay_folder.clear();
   }
 }
@@ -219,7 +213,7 @@ Counts track_all(Input& input, Output& output) {
     // Stills of different scenes may share a folder. What was learnt from one does not hold for the next.
     if (!before.empty() && vision::similarity(before, grey) < vision::kSameScene) {
       tracker = input.new_tracker();
-      fmt::print(stderr, "{}: another scene, started afresh\n", input.camera.name());
+      complain(fmt::format("{}: another scene, started afresh", input.camera.name()));
     }
     grey.copyTo(before);
     const vision::Result& result = tracker.process(part);
@@ -232,7 +226,7 @@ Counts track_all(Input& input, Output& output) {
     }
     output.write_overlay(grey, result, input.config, input.camera.name());
     if (counts.frames == 1 && !result.outer.ok && !result.inner.ok) {
-      fmt::print(stderr, "first frame: {}\n", result.verdict);
+      complain("first frame: " + result.verdict);
     }
     input.camera.release(frame);
   }
@@ -243,28 +237,28 @@ Counts track_all(Input& input, Output& output) {
 int track(const TrackOptions& options) {
   auto input = open_input(options);
   if (!input) {
-    fmt::print(stderr, "{}\n", input.error());
+    complain(input.error());
     return kBadInput;
   }
   auto output = open_output(options);
   if (!output) {
-    fmt::print(stderr, "{}\n", output.error());
+    complain(output.error());
     return kBadInput;
   }
   const Counts counts = track_all(*input, *output);
   int code = kDone;
-  const auto check_complete = [&code](bool written, const std::string& file) {
+  const auto check_complete = [&code](bool written, const std::string& file, const std::string& why) {
     if (!written) {
-      fmt::print(stderr, "{}: not complete, is the disk full?\n", file);
+      complain(fmt::format("{}: not complete: {}", file, why));
       code = kNotWritten;
     }
   };
-  check_complete(output->observations.flush(), options.out);
+  check_complete(output->observations.flush(), options.out, output->observations.failure());
   if (output->contours) {
-    check_complete(output->contours->flush(), options.contours);
+    check_complete(output->contours->flush(), options.contours, output->contours->failure());
   }
-  fmt::print("{} frames, outer membrane in {}, inner in {}, unusable {}\n", counts.frames, counts.outer,
-             input->config.inner ? fmt::format("{}", counts.inner) : "-", counts.unusable);
+  say(fmt::format("{} frames, outer membrane in {}, inner in {}, unusable {}\n", counts.frames, counts.outer,
+                  input->config.inner ? fmt::format("{}", counts.inner) : "-", counts.unusable));
   return code;
 }
 

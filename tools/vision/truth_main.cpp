@@ -1,6 +1,5 @@
 // punctum-vision of a build without OpenCV: it observes the truth of the simulated world and draws no
 // picture. Enough for runs with vision.method = "truth".
-#include <fmt/format.h>
 #include <signal.h>
 
 #include <atomic>
@@ -16,6 +15,7 @@
 #include "rt/station/station.hpp"
 #include "tools/scene/scene.hpp"
 #include "tools/shared/exit_codes.hpp"
+#include "tools/shared/say.hpp"
 #include "tools/shared/station_segments.hpp"
 #include "tools/shared/stop_signal.hpp"
 #include "tools/shared/truth_observer.hpp"
@@ -39,7 +39,7 @@ void on_stop_signal(int) noexcept {
 }
 
 int bad(const std::string& text) {
-  fmt::print(stderr, "punctum-vision: {}\n", text);
+  tools::complain("punctum-vision: " + text);
   return tools::exit_bad_input;
 }
 
@@ -54,9 +54,10 @@ std::string option(int argc, char** argv, std::string_view name) {
 }
 
 int observe(sim::SimCamera& camera, sim::BenchClock& clock, const sim::Bench& bench,
-            rt::ObservationSlot& slot, tools::VisionLiar liar) {
+            rt::ObservationSegment& station, tools::VisionLiar liar) {
   std::optional<sim::Truth> truth_before;
   while (stop_signal::count() == 0) {
+    station.rounds.store(station.rounds.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
     hal::Frame frame;
     const hal::Status status = camera.next(frame, kFrameTimeout_ns);
     if (status == hal::Status::disconnected) {
@@ -73,18 +74,18 @@ int observe(sim::SimCamera& camera, sim::BenchClock& clock, const sim::Bench& be
         clock.sleep_until_ns(frame.deliver_ns);
       }
       if (told) {
-        slot.push(*told);
+        station.slot.push(*told);
       }
     }
     camera.release(frame);
   }
-  return tools::exit_done;
+  return bench.finished.load() != 0 ? tools::exit_done : tools::exit_not_done;
 }
 
 int run(int argc, char** argv) {
   if (argc == 2 && std::string_view(argv[1]) == "--version") {
-    fmt::print("{}\n", tools::version_line("punctum-vision"));
-    return tools::exit_done;
+    tools::say(tools::version_line("punctum-vision") + "\n");
+    return tools::all_was_said() ? tools::exit_done : tools::exit_not_done;
   }
   if (argc < 2 || std::string_view(argv[1]) != "live") {
     return bad("this build has no OpenCV, allowed: live --scene FILE --segments NAME=DESCRIPTOR,...");
@@ -123,7 +124,7 @@ int run(int argc, char** argv) {
   waiting_clock = &clock;
   sim::SimCamera camera(*scene->sim, **bench, **answers, sim::SimCamera::Picture::none);
   const int code =
-      observe(camera, clock, **bench, (*observations)->slot, tools::VisionLiar(scene->sim->seed));
+      observe(camera, clock, **bench, **observations, tools::VisionLiar(scene->sim->seed));
   waiting_clock = nullptr;
   return code;
 }
@@ -131,6 +132,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  tools::take_file_limits_as_errors();
   try {
     return run(argc, argv);
   } catch (const std::exception& e) {

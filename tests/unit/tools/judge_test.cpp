@@ -49,6 +49,44 @@ TEST_F(JudgeTest, an_injection_that_delivered_nothing_is_not_done_whatever_the_c
   EXPECT_EQ(judged(), RunEnd::not_injected);
 }
 
+TEST_F(JudgeTest, a_cell_that_got_less_than_was_asked_is_not_done_whatever_the_core_says) {
+  core_says(rt::Phase::clear, RunEnd::done);
+  measures->cells_underdosed = 1;
+  EXPECT_EQ(judged(), RunEnd::underdosed);
+}
+
+TEST_F(JudgeTest, a_limit_before_the_injection_is_a_time_limit_although_the_cell_is_clear_and_got_nothing) {
+  core_says(rt::Phase::clear, RunEnd::time_limit);
+  measures->cells_without_injection = 1;
+  EXPECT_EQ(judged(), RunEnd::time_limit);
+}
+
+TEST_F(JudgeTest, a_task_that_ended_well_after_a_fault_that_was_reset_says_so) {
+  core_says(rt::Phase::clear, RunEnd::done);
+  core->faults_latched.store(1U << static_cast<unsigned>(rt::Fault::estop));
+  EXPECT_EQ(judged(), RunEnd::after_fault);
+  facts.has_task = false;
+  EXPECT_EQ(judged(), RunEnd::after_fault);
+  core->faults_latched.store(1U << static_cast<unsigned>(rt::Fault::command_stop));
+  EXPECT_EQ(judged(), RunEnd::done) << "a commanded stop is no fault";
+}
+
+TEST_F(JudgeTest, a_run_without_a_task_that_saw_nothing_most_of_its_time_was_without_vision) {
+  core_says(rt::Phase::free, RunEnd::done);
+  facts.has_task = false;
+  facts.has_vision = true;
+  measures->ticks = 6200;
+  measures->blind_ticks = 5900;
+  EXPECT_EQ(judged(), RunEnd::blind);
+  facts.stop_was_asked = true;
+  EXPECT_EQ(judged(), RunEnd::blind) << "also when somebody ended it";
+  measures->blind_ticks = 300;
+  EXPECT_EQ(judged(), RunEnd::done);
+  facts.has_vision = false;
+  measures->blind_ticks = 6200;
+  EXPECT_EQ(judged(), RunEnd::done) << "nobody was to look";
+}
+
 TEST_F(JudgeTest, a_core_that_was_killed_died_even_after_a_fault) {
   core_says(rt::Phase::indentation, RunEnd::running, rt::Fault::estop);
   facts.core_exited = false;
@@ -107,7 +145,10 @@ TEST(RunEndTest, every_end_has_the_word_of_the_report_and_its_exit_code) {
                {RunEnd::stopped, "stopped", 1},
                {RunEnd::fault, "fault", 3},
                {RunEnd::core_died, "core died", 3},
-               {RunEnd::invalid_setup, "invalid set-up", 2}};
+               {RunEnd::invalid_setup, "invalid set-up", 2},
+               {RunEnd::underdosed, "injected in part", 1},
+               {RunEnd::after_fault, "done after a fault", 3},
+               {RunEnd::blind, "without vision", 1}};
   for (const auto& row : table) {
     EXPECT_EQ(rt::name(row.end), row.word);
     EXPECT_EQ(exit_code(row.end), row.code) << row.word;

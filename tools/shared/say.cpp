@@ -1,0 +1,45 @@
+#include "tools/shared/say.hpp"
+
+#include <signal.h>
+
+#include <cerrno>
+#include <cstring>
+
+namespace punctum::tools {
+namespace {
+
+void write(std::FILE* to, std::string_view text) noexcept {
+  (void)std::fwrite(text.data(), 1, text.size(), to);
+}
+
+}  // namespace
+
+void say(std::string_view text) noexcept {
+  write(stdout, text);
+  (void)std::fflush(stdout);
+}
+
+void complain(std::string_view text) noexcept {
+  write(stderr, text);
+  write(stderr, "\n");
+  (void)std::fflush(stderr);
+}
+
+bool all_was_said() noexcept {
+  errno = 0;
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) {
+    return true;
+  }
+  const int why = errno;
+  write(stderr, "the standard output cannot be written");
+  if (why != 0) {
+    write(stderr, ": ");
+    write(stderr, std::strerror(why));
+  }
+  complain("");
+  return false;
+}
+
+void take_file_limits_as_errors() noexcept { (void)signal(SIGXFSZ, SIG_IGN); }
+
+}  // namespace punctum::tools

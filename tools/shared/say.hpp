@@ -1,0 +1,21 @@
+// Words for whoever has started the program. What cannot be written (the disk is full, nobody reads the pipe)
+// is dropped: no program ends for want of a listener. Nothing here throws.
+#pragma once
+
+#include <cstdio>
+#include <string_view>
+
+namespace punctum::tools {
+
+void say(std::string_view text) noexcept;       // on the standard output, as it is
+void complain(std::string_view text) noexcept;  // on the standard error output, as a line of its own
+
+// For programs whose words are their result: whether all of them were taken. Where they were not, one line on
+// the standard error output says so.
+[[nodiscard]] bool all_was_said() noexcept;
+
+// A file that may grow no further (ulimit -f) is an error of the write, as a full disk is, and no signal that
+// kills. Children inherit it.
+void take_file_limits_as_errors() noexcept;
+
+}  // namespace punctum::tools

@@ -1,0 +1,94 @@
+#include "tools/shared/whole_file.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+
+namespace punctum::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+tl::unexpected<std::string> not_written(const fs::path& path, int error) {
+  return tl::unexpected(fmt::format("{}: cannot be written: {}", path.string(), std::strerror(error)));
+}
+
+// The first error, 0 if there is none. The descriptor is closed.
+int write_all(int file, std::string_view content) {
+  int error = 0;
+  while (!content.empty() && error == 0) {
+    const ssize_t n = write(file, content.data(), content.size());
+    if (n >= 0) {
+      content.remove_prefix(static_cast<std::size_t>(n));
+    } else if (errno != EINTR) {
+      error = errno;
+    }
+  }
+  if (close(file) != 0 && error == 0) {
+    error = errno;
+  }
+  return error;
+}
+
+// 0, or the error. EINVAL: what lies there keeps nothing that could be brought to a disk.
+int bring_to_disk(const fs::path& path, int flags) {
+  const int file = open(path.c_str(), flags | O_CLOEXEC);
+  if (file < 0) {
+    return errno;
+  }
+  const int error = fsync(file) == 0 ? 0 : errno;
+  (void)close(file);
+  return error == EINVAL ? 0 : error;
+}
+
+}  // namespace
+
+fs::path unfinished(const fs::path& path) {
+  fs::path name = path.stem();
+  name += ".part";
+  name += path.extension();
+  return path.parent_path() / name;
+}
+
+tl::expected<void, std::string> put_in_place(const fs::path& path, Sync sync) {
+  const fs::path part = unfinished(path);
+  int error = sync == Sync::to_disk ? bring_to_disk(part, O_RDONLY) : 0;
+  if (error == 0 && std::rename(part.c_str(), path.c_str()) != 0) {
+    error = errno;
+  }
+  if (error != 0) {
+    (void)unlink(part.c_str());
+    return not_written(path, error);
+  }
+  if (sync == Sync::later) {
+    return {};
+  }
+  // The new name is in its folder after a crash, too. Where that cannot be had, the file is whole still.
+  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  (void)bring_to_disk(folder, O_RDONLY | O_DIRECTORY);
+  return {};
+}
+
+tl::expected<void, std::string> write_whole(const fs::path& path, std::string_view content, Sync sync) {
+  std::error_code ec;
+  const fs::file_status there = fs::status(path, ec);
+  const bool plain = !fs::exists(there) || fs::is_regular_file(there);
+  const fs::path place = plain ? unfinished(path) : path;
+  const int file = open(place.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (file < 0) {
+    return not_written(path, errno);
+  }
+  if (const int error = write_all(file, content); error != 0) {
+    if (plain) {
+      (void)unlink(place.c_str());
+    }
+    return not_written(path, error);
+  }
+  return plain ? put_in_place(path, sync) : tl::expected<void, std::string>{};
+}
+
+}  // namespace punctum::tools

@@ -1,0 +1,30 @@
+// Files that are there as a whole or not at all: written beside their place, brought to the disk, and moved
+// there in one step. Whoever reads meanwhile, or after a crash, finds the old file or the new one.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <tl/expected.hpp>
+
+namespace punctum::tools {
+
+// Where a file is written until it is whole: beside its place, with the same suffix.
+[[nodiscard]] std::filesystem::path unfinished(const std::filesystem::path& path);
+
+enum class Sync : std::uint8_t {
+  to_disk,  // whole also after the power fails: waits for the disk, for seconds where it is busy
+  later,    // whole for every reader on this machine: for those that must not wait
+};
+
+// Moves what was written to unfinished(path) to its place. The errors are one line; nothing is left then.
+[[nodiscard]] tl::expected<void, std::string> put_in_place(const std::filesystem::path& path,
+                                                           Sync sync = Sync::to_disk);
+
+// A pipe, a terminal or another device is written directly.
+[[nodiscard]] tl::expected<void, std::string> write_whole(const std::filesystem::path& path,
+                                                          std::string_view content,
+                                                          Sync sync = Sync::to_disk);
+
+}  // namespace punctum::tools

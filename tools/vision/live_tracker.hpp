@@ -1,0 +1,68 @@
+// The tracker of a live camera, which starts anew after a gap in time. What it knew of needle and cell, and of
+// where they were going, is then of another moment: followed from there, a needle that has moved away may never
+// be found again.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <opencv2/core.hpp>
+#include <utility>
+
+#include "vision/tracker.hpp"
+
+namespace punctum::tools {
+
+class LiveTracker {
+ public:
+  // The needle is looked for within some 25 pixels of where it was. Drawn back at 100 um/s it leaves them in
+  // a quarter of a second, and the search widens while it is lost. Within a second it has been found so far;
+  // after three it was not.
+  static constexpr std::int64_t kLongestGap_ns = 1'000'000'000;
+  // A camera may be slow: so many of its own intervals are no gap either.
+  static constexpr std::int64_t kLongestGap_intervals = 5;
+
+  // An empty template: it is cut from the first frame.
+  LiveTracker(const vision::VisionConfig& config, int width, int height, cv::Mat holder_template)
+      : config_(config),
+        width_(width),
+        height_(height),
+        holder_template_(std::move(holder_template)),
+        tracker_(begun()) {}
+
+  // As vision::Tracker::process.
+  const vision::Result& process(const hal::Frame& frame) {
+    if (last_ns_ != kNever) {
+      const std::int64_t interval_ns = frame.exposure_ns - last_ns_;
+      if (interval_ns > kLongestGap_ns && interval_ns / kLongestGap_intervals >= shortest_ns_) {
+        tracker_ = begun();
+        ++restarts_;
+      }
+      shortest_ns_ = interval_ns > 0 ? std::min(shortest_ns_, interval_ns) : shortest_ns_;
+    }
+    last_ns_ = frame.exposure_ns;
+    return tracker_.process(frame);
+  }
+  [[nodiscard]] int restarts() const noexcept { return restarts_; }
+
+ private:
+  static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
+
+  [[nodiscard]] vision::Tracker begun() const {
+    vision::Tracker tracker(config_, width_, height_);
+    if (!holder_template_.empty()) {
+      tracker.holder_template(holder_template_);
+    }
+    return tracker;
+  }
+
+  vision::VisionConfig config_;
+  int width_, height_;
+  cv::Mat holder_template_;
+  vision::Tracker tracker_;
+  std::int64_t last_ns_ = kNever;
+  std::int64_t shortest_ns_ = std::numeric_limits<std::int64_t>::max();
+  int restarts_ = 0;
+};
+
+}  // namespace punctum::tools

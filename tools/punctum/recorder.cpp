@@ -5,11 +5,15 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
+#include <cstddef>
 #include <cstring>
 #include <iterator>
 #include <string>
+#include <utility>
 
 #include "rt/forces/list.hpp"
+#include "tools/punctum/event_log.hpp"
 
 namespace punctum::tools {
 namespace {
@@ -43,6 +47,8 @@ std::string columns() {
 // In virtual time the core may be as fast as the recorder: the caller has other work between two rounds.
 constexpr std::uint64_t kMostTicksPerRound = 4096;
 
+constexpr std::size_t kBuffer = 64 * 1024;
+constexpr std::chrono::milliseconds kFlushed{500};  // so long at most a row waits for its file
 constexpr double kBeforeFault_s = 2;
 constexpr double kAfterFault_s = 0.5;
 constexpr int kMostFaultsKept = 20;  // a station that is reset again and again fills no disk
@@ -72,7 +78,14 @@ Recorder::Recorder(std::FILE* file, const std::string& folder, const Scene& scen
       every_(every > 0 ? every : 1),
       half_period_s_(0.5 / scene.servo.rate_Hz),
       ticks_after_fault_(static_cast<std::uint64_t>(kAfterFault_s * scene.servo.rate_Hz)) {
+  // Whole rows only: whoever reads while the table grows finds no row that is cut off.
+  (void)std::setvbuf(file, nullptr, _IOFBF, kBuffer);
   std::fputs(columns().c_str(), file);
+  waiting_ = columns().size();
+  if (auto opened = RowFile::open(folder + "/events.csv", RowFile::Begin::empty)) {
+    event_rows_ = std::move(*opened);
+    event_rows_.append(kEventColumns);
+  }
   if (bench != nullptr) {
     taker_ = std::make_unique<sim::SnapshotTaker>(*bench);
     taker_->attach();
@@ -88,8 +101,10 @@ std::uint64_t Recorder::drain(bool to_the_end) {
   rt::Event event;
   while (event_ring_.next(event) == hal::Read::ok) {
     events_.add(event);
+    event_rows_.append(event_line(event));
   }
   events_.lost = event_ring_.lost();
+  flush_now_and_then();
   if (taker_ && to_the_end) {
     while (taker_->next(world_)) {
     }
@@ -115,6 +130,19 @@ const sim::Snapshot* Recorder::world_of(const rt::TelemetrySample& s) {
       return &world_;
     }
   }
+}
+
+void Recorder::flush_now_and_then() {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < flushed_ + kFlushed) {
+    return;
+  }
+  flushed_ = now;
+  waiting_ = 0;
+  if (std::fflush(file_.get()) != 0) {
+    failed_ = true;
+  }
+  event_rows_.flush();
 }
 
 void Recorder::record(const rt::TelemetrySample& s, const sim::Snapshot* world) {
@@ -228,6 +256,13 @@ void Recorder::row(std::FILE* file, const rt::TelemetrySample& s, const sim::Sna
     put(s.effect_N[i]);
   }
   out.data()[out.size() - 1] = '\n';  // in place of the last comma
+  if (file == file_.get()) {
+    if (waiting_ + out.size() > kBuffer) {
+      failed_ = failed_ || std::fflush(file) != 0;
+      waiting_ = 0;
+    }
+    waiting_ += out.size();
+  }
   if (std::fwrite(out.data(), 1, out.size(), file) != out.size()) {
     failed_ = true;
   }
@@ -235,6 +270,7 @@ void Recorder::row(std::FILE* file, const rt::TelemetrySample& s, const sim::Sna
 
 void Recorder::finish() {
   drain(true);
+  event_rows_.flush();
   measures_.finish();
   for (std::FILE* file : {file_.get(), fault_file_.get()}) {
     if (file != nullptr && std::fflush(file) != 0) {

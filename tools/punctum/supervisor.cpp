@@ -9,6 +9,7 @@
 #include <cctype>
 #include <chrono>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <thread>
 #include <vector>
@@ -20,15 +21,17 @@
 #include "rt/station/station.hpp"
 #include "tools/punctum/core_process.hpp"
 #include "tools/punctum/judge.hpp"
+#include "tools/punctum/lab_report.hpp"
+#include "tools/punctum/provenance.hpp"
 #include "tools/punctum/recorder.hpp"
 #include "tools/punctum/report_folder.hpp"
-#include "tools/punctum/run_figure.hpp"
 #include "tools/punctum/run_report.hpp"
 #include "tools/punctum/terminal.hpp"
 #include "tools/punctum/vision_process.hpp"
 #include "tools/shared/exit_codes.hpp"
 #include "tools/shared/station_segments.hpp"
 #include "tools/shared/stop_signal.hpp"
+#include "tools/shared/whole_file.hpp"
 
 namespace punctum::tools {
 namespace {
@@ -239,8 +242,10 @@ class Run {
   std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
   bool vision_was_refused_ = false;
   bool rights_told_ = false;
+  std::size_t faults_told_ = 0;
   double next_progress_s_ = 0;
   RunResult result_;
+  const nlohmann::ordered_json begun_facts_ = provenance(scene_);
 };
 
 int Run::run() {
@@ -248,6 +253,8 @@ int Run::run() {
                 scene_.title.empty() ? scene_.source : scene_.title, scene_.servo.rate_Hz,
                 scene_.clock == ClockKind::real ? "real" : "virtual", scene_.sim ? scene_.sim->seed : 0);
   terminal_.say("report: {}", folder_);
+  (void)write_whole(folder_ + "/" + kBegun, begun_facts_.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n",
+                    Sync::later);
 
   // Recorded frames play from the core's first tick on; a camera is there before it.
   const bool vision_follows_core = scene_.recorded && scene_.clock == ClockKind::real;
@@ -337,9 +344,13 @@ void Run::tell_progress() {
     rights_told_ = true;
     if (core.degraded.load() != 0 && scene_.clock == ClockKind::real) {
       if (const std::string text = missing_rights(core); !text.empty()) {
-        terminal_.say("{}", text);
+        terminal_.say("{}", painted(Colour::warning, text, terminal_.coloured()));
       }
     }
+  }
+  for (const Measures::Fault* f = recorder_.measures().faults.data();
+       faults_told_ < recorder_.measures().faults.size(); ++faults_told_) {
+    terminal_.say("{}", painted(Colour::bad, fault_text(f[faults_told_].fault, f[faults_told_].t_s), terminal_.coloured()));
   }
   if (settings_.quiet || now_s() < next_progress_s_) {
     return;
@@ -347,7 +358,7 @@ void Run::tell_progress() {
   next_progress_s_ = now_s() + terminal_.progress_every_s();
   const Measures& m = recorder_.measures();
   if (m.ticks > 0) {
-    terminal_.progress(progress_line(scene_, m.last, core));
+    terminal_.progress(progress_line(scene_, m.last, core, terminal_.line_style()));
   }
 }
 
@@ -401,28 +412,22 @@ int Run::report() {
   result_.rows_every = recorder_.every();
   result_.samples_lost = recorder_.lost();
   const auto contour = read_contour_error(folder_ + "/obs.csv");
-  const std::string path = folder_ + "/report.json";
   bool complete = true;
   std::string places;
-  if (auto written = write_report(path, scene_, result_, m, recorder_.events(), status(), contour);
+  if (auto written = write_lab_report(
+          folder_, begun_facts_, report_facts(scene_, result_, m, recorder_.events(), status(), contour),
+          settings_.figure);
       !written) {
     terminal_.complain(written.error());
     complete = false;
   } else {
-    places = fmt::format("report          {}\n", path);
+    places = fmt::format("report          {}/report.html\n", folder_);
   }
   if (recorder_.write_failed()) {
     terminal_.complain(fmt::format("{}: samples are not complete, is the disk full?", folder_));
     complete = false;
   }
-  if (settings_.figure) {
-    if (auto drawn = draw_run(folder_, scene_, m, result_.rows); !drawn) {
-      terminal_.complain(fmt::format("no figure: {}", drawn.error()));
-    } else {
-      places = fmt::format("figure          {}\n", *drawn) + places;
-    }
-  }
-  terminal_.print("\n" + summary(scene_, result_, m, status(), contour) + places);
+  terminal_.print("\n" + summary(scene_, result_, m, status(), contour, terminal_.coloured()) + places);
   if (vision_was_refused_) {
     return exit_bad_input;
   }

@@ -64,14 +64,23 @@ Done write_page(const std::string& folder, const Json& facts, const std::optiona
 
 }  // namespace
 
-Done write_lab_report(const std::string& folder, const Json& begun, Json facts, bool figure) {
+Json whole_facts(const Json& begun, Json facts) {
   if (begun.is_object()) {
     facts.update(begun);
   }
   write_numbers_as_people_do(facts);
-  if (auto written = write_whole(fs::path(folder) / "report.json", text_of(facts)); !written) {
-    return written;
-  }
+  return facts;
+}
+
+Done write_begun(const std::string& folder, const Json& begun) {
+  return write_whole(fs::path(folder) / kBegun, text_of(begun), Sync::later);
+}
+
+Done write_report_json(const std::string& folder, const Json& facts) {
+  return write_whole(fs::path(folder) / "report.json", text_of(facts));
+}
+
+Done write_report_page(const std::string& folder, const Json& facts, bool figure) {
   return write_page(folder, facts, figure ? std::optional(chart_of_run(folder, facts)) : std::nullopt);
 }
 
@@ -86,11 +95,9 @@ int report_folders(const std::vector<std::string>& folders, const std::string& o
     }
     Json facts = read_json(path / "report.json");
     if (facts.is_null()) {
-      facts = rebuilt_facts(path.string());
-      facts.update(read_json(path / kBegun).is_object() ? read_json(path / kBegun) : Json::object());
+      facts = whole_facts(read_json(path / kBegun), rebuilt_facts(path.string()));
       facts["sentence"] = run_sentence(facts);
-      write_numbers_as_people_do(facts);
-      if (auto written = write_whole(path / "report.json", text_of(facts)); !written) {
+      if (auto written = write_report_json(path.string(), facts); !written) {
         complain(written.error());
         return exit_not_done;
       }

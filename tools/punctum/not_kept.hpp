@@ -8,7 +8,7 @@ namespace punctum::tools {
 // A file that was not written, or not to its end.
 struct NotKept {
   std::string file;  // without its folder
-  double t_s = 0;    // of the run: what came before is in the file
+  double t_s = 0;    // of the run, when it was noticed: rows of the moment before may be missing, too
   std::string why;
 };
 

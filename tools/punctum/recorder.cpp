@@ -4,10 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <cstddef>
-#include <cstring>
 #include <iterator>
 #include <string>
 #include <utility>
@@ -47,7 +45,6 @@ std::string columns() {
 // In virtual time the core may be as fast as the recorder: the caller has other work between two rounds.
 constexpr std::uint64_t kMostTicksPerRound = 4096;
 
-constexpr std::size_t kBuffer = 64 * 1024;
 constexpr std::chrono::milliseconds kFlushed{500};  // so long at most a row waits for its file
 constexpr double kBeforeFault_s = 2;
 constexpr double kAfterFault_s = 0.5;
@@ -58,18 +55,16 @@ constexpr int kMostFaultsKept = 20;  // a station that is reset again and again 
 tl::expected<Recorder, std::string> Recorder::create(const std::string& folder, const Scene& scene,
                                                      const rt::CoreSegment& core, sim::Bench* bench,
                                                      std::uint64_t every) {
-  const std::string csv_path = folder + "/samples.csv";
-  std::FILE* file = std::fopen(csv_path.c_str(), "we");
-  if (file == nullptr) {
-    return tl::unexpected(fmt::format("{}: {}", csv_path, std::strerror(errno)));
+  auto file = RowFile::open(folder + "/samples.csv", RowFile::Begin::empty);
+  if (!file) {
+    return tl::unexpected(file.error());
   }
-  return Recorder(file, folder, scene, core, bench, every);
+  return Recorder(std::move(*file), folder, scene, core, bench, every);
 }
 
-Recorder::Recorder(std::FILE* file, const std::string& folder, const Scene& scene,
-                   const rt::CoreSegment& core, sim::Bench* bench, std::uint64_t every)
-    : file_(file),
-      fault_path_(folder + "/fault.csv"),
+Recorder::Recorder(RowFile file, const std::string& folder, const Scene& scene, const rt::CoreSegment& core,
+                   sim::Bench* bench, std::uint64_t every)
+    : folder_(folder),
       recent_(static_cast<std::size_t>(kBeforeFault_s * scene.servo.rate_Hz)),
       sim_(scene.sim.value_or(sim::SimConfig{})),
       measures_(scene),
@@ -78,13 +73,12 @@ Recorder::Recorder(std::FILE* file, const std::string& folder, const Scene& scen
       every_(every > 0 ? every : 1),
       half_period_s_(0.5 / scene.servo.rate_Hz),
       ticks_after_fault_(static_cast<std::uint64_t>(kAfterFault_s * scene.servo.rate_Hz)) {
-  // Whole rows only: whoever reads while the table grows finds no row that is cut off.
-  (void)std::setvbuf(file, nullptr, _IOFBF, kBuffer);
-  std::fputs(columns().c_str(), file);
-  waiting_ = columns().size();
+  samples_.file = std::move(file);
+  samples_.file.append(columns());
+  // Without it the run loses nothing but what a crash would leave.
   if (auto opened = RowFile::open(folder + "/events.csv", RowFile::Begin::empty)) {
-    event_rows_ = std::move(*opened);
-    event_rows_.append(kEventColumns);
+    events_table_.file = std::move(*opened);
+    events_table_.file.append(kEventColumns);
   }
   if (bench != nullptr) {
     taker_ = std::make_unique<sim::SnapshotTaker>(*bench);
@@ -101,7 +95,7 @@ std::uint64_t Recorder::drain(bool to_the_end) {
   rt::Event event;
   while (event_ring_.next(event) == hal::Read::ok) {
     events_.add(event);
-    event_rows_.append(event_line(event));
+    events_table_.file.append(event_line(event));
   }
   events_.lost = event_ring_.lost();
   flush_now_and_then();
@@ -138,20 +132,17 @@ void Recorder::flush_now_and_then() {
     return;
   }
   flushed_ = now;
-  waiting_ = 0;
-  if (std::fflush(file_.get()) != 0) {
-    failed_ = true;
-  }
-  event_rows_.flush();
+  flush(samples_, before_.t_s);
+  flush(events_table_, before_.t_s);
 }
 
 void Recorder::record(const rt::TelemetrySample& s, const sim::Snapshot* world) {
   measures_.tick(s, world);
-  const bool change = rows_ == 0 || s.phase != before_.phase || s.fault != before_.fault ||
+  const bool change = measures_.ticks == 1 || s.phase != before_.phase || s.fault != before_.fault ||
                       s.stop != before_.stop || s.estop != before_.estop || s.cell != before_.cell;
   if (change || s.tick % every_ == 0) {
-    row(file_.get(), s, world);
-    ++rows_;
+    row(samples_, s, world);
+    rows_ += samples_.failed ? 0 : 1;
   }
   record_fault(s, world);
   before_ = s;
@@ -159,7 +150,7 @@ void Recorder::record(const rt::TelemetrySample& s, const sim::Snapshot* world) 
 
 void Recorder::record_fault(const rt::TelemetrySample& s, const sim::Snapshot* world) {
   if (after_fault_ > 0) {
-    row(fault_file_.get(), s, world);
+    row(fault_, s, world);
     --after_fault_;
     return;
   }
@@ -180,27 +171,38 @@ void Recorder::keep_last_seconds() {
     return;
   }
   ++faults_kept_;
-  if (!fault_file_) {
-    std::FILE* const opened = std::fopen(fault_path_.c_str(), "we");
-    if (opened == nullptr) {
-      failed_ = true;
-      return;
+  if (!fault_.file.is_open() && !fault_.failed) {
+    if (auto opened = RowFile::open(folder_ + "/" + fault_.name, RowFile::Begin::empty)) {
+      fault_.file = std::move(*opened);
+      fault_.file.append(columns());
+    } else {
+      note_failure(fault_, opened.error(), before_.t_s);
     }
-    fault_file_ = File(opened);
-    std::fputs(columns().c_str(), fault_file_.get());
   }
   for (std::uint64_t i = recent_end_ - recent_count_; i < recent_end_; ++i) {
     const Tick& tick = recent_[i % recent_.size()];
-    row(fault_file_.get(), tick.sample, tick.has_world ? &tick.world : nullptr);
+    row(fault_, tick.sample, tick.has_world ? &tick.world : nullptr);
   }
   recent_count_ = 0;
   after_fault_ = ticks_after_fault_;
-  if (std::fflush(fault_file_.get()) != 0) {
-    failed_ = true;
+  flush(fault_, before_.t_s);
+}
+
+void Recorder::flush(Table& table, double t_s) {
+  table.file.flush();
+  if (!table.file.failure().empty()) {
+    note_failure(table, table.file.failure(), t_s);
   }
 }
 
-void Recorder::row(std::FILE* file, const rt::TelemetrySample& s, const sim::Snapshot* world) {
+void Recorder::note_failure(Table& table, const std::string& why, double t_s) {
+  if (!table.failed) {
+    table.failed = true;
+    not_kept_.push_back({table.name, t_s, why});
+  }
+}
+
+void Recorder::row(Table& table, const rt::TelemetrySample& s, const sim::Snapshot* world) {
   fmt::basic_memory_buffer<char, 1024> out;
   const auto put = [&out](double v) { fmt::format_to(std::back_inserter(out), FMT_COMPILE("{:.9g},"), v); };
   const auto count = [&out](std::uint64_t v) {
@@ -256,27 +258,18 @@ void Recorder::row(std::FILE* file, const rt::TelemetrySample& s, const sim::Sna
     put(s.effect_N[i]);
   }
   out.data()[out.size() - 1] = '\n';  // in place of the last comma
-  if (file == file_.get()) {
-    if (waiting_ + out.size() > kBuffer) {
-      failed_ = failed_ || std::fflush(file) != 0;
-      waiting_ = 0;
-    }
-    waiting_ += out.size();
-  }
-  if (std::fwrite(out.data(), 1, out.size(), file) != out.size()) {
-    failed_ = true;
+  table.file.append({out.data(), out.size()});
+  if (!table.file.failure().empty()) {
+    note_failure(table, table.file.failure(), s.t_s);
   }
 }
 
 void Recorder::finish() {
   drain(true);
-  event_rows_.flush();
   measures_.finish();
-  for (std::FILE* file : {file_.get(), fault_file_.get()}) {
-    if (file != nullptr && std::fflush(file) != 0) {
-      failed_ = true;
-    }
-  }
+  flush(samples_, measures_.last_s);
+  flush(fault_, measures_.last_s);
+  flush(events_table_, measures_.last_s);
 }
 
 }  // namespace punctum::tools

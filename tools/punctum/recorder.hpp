@@ -5,9 +5,7 @@
 #pragma once
 
 #include <chrono>
-#include <cstddef>
 #include <cstdint>
-#include <cstdio>
 #include <memory>
 #include <string>
 #include <tl/expected.hpp>
@@ -18,6 +16,7 @@
 #include "rt/station/station.hpp"
 #include "tools/punctum/event_list.hpp"
 #include "tools/punctum/measures.hpp"
+#include "tools/punctum/not_kept.hpp"
 #include "tools/shared/row_file.hpp"
 
 namespace punctum::tools {
@@ -41,30 +40,36 @@ class Recorder {
   // Samples that were overwritten before they were read.
   [[nodiscard]] std::uint64_t lost() const noexcept { return telemetry_.lost(); }
   [[nodiscard]] std::uint64_t every() const noexcept { return every_; }
-  [[nodiscard]] bool write_failed() const noexcept { return failed_; }
+  // What could not be written so far: of each file the first failure. The run goes on without.
+  [[nodiscard]] const std::vector<NotKept>& not_kept() const noexcept { return not_kept_; }
   void finish();
 
  private:
-  struct Close {
-    void operator()(std::FILE* f) const noexcept { std::fclose(f); }
+  // A table of the report, and what the report must tell of it.
+  struct Table {
+    const char* name;
+    RowFile file;
+    bool failed = false;
   };
   struct Tick {
     rt::TelemetrySample sample;
     sim::Snapshot world;
     bool has_world = false;
   };
-  Recorder(std::FILE* file, const std::string& folder, const Scene& scene, const rt::CoreSegment& core,
+  Recorder(RowFile file, const std::string& folder, const Scene& scene, const rt::CoreSegment& core,
            sim::Bench* bench, std::uint64_t every);
   [[nodiscard]] const sim::Snapshot* world_of(const rt::TelemetrySample& s);  // null: there is none
   void record(const rt::TelemetrySample& s, const sim::Snapshot* world);
   void flush_now_and_then();
   void record_fault(const rt::TelemetrySample& s, const sim::Snapshot* world);
-  void row(std::FILE* file, const rt::TelemetrySample& s, const sim::Snapshot* world);
+  void row(Table& table, const rt::TelemetrySample& s, const sim::Snapshot* world);
+  void flush(Table& table, double t_s);
+  void note_failure(Table& table, const std::string& why, double t_s);
 
-  using File = std::unique_ptr<std::FILE, Close>;
-  File file_;
-  std::string fault_path_;
-  File fault_file_;           // from the first fault on
+  std::string folder_;
+  Table samples_{.name = "samples.csv", .file = {}};
+  Table fault_{.name = "fault.csv", .file = {}};  // open from the first fault on
+  std::vector<NotKept> not_kept_;
   std::vector<Tick> recent_;  // a ring of two seconds
   std::uint64_t recent_end_ = 0, recent_count_ = 0;
   std::uint64_t after_fault_ = 0;  // rows that are still to be written after it
@@ -74,15 +79,13 @@ class Recorder {
   hal::Follower<rt::TelemetryRing> telemetry_;
   hal::Follower<rt::EventRing> event_ring_;
   EventList events_;
-  RowFile event_rows_;  // events.csv
-  std::size_t waiting_ = 0;  // bytes of whole rows that are not in samples.csv yet
+  Table events_table_{.name = "events.csv", .file = {}};
   std::chrono::steady_clock::time_point flushed_{};
   std::unique_ptr<sim::SnapshotTaker> taker_;
   std::uint64_t every_;
   std::uint64_t rows_ = 0;
   double half_period_s_;
   std::uint64_t ticks_after_fault_;
-  bool failed_ = false;
   bool world_pending_ = false;  // world_ is of a tick whose sample has not come yet
   rt::TelemetrySample sample_, before_;
   sim::Snapshot world_;

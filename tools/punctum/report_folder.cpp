@@ -12,6 +12,8 @@
 #include <fstream>
 #include <vector>
 
+#include "tools/shared/whole_file.hpp"
+
 namespace punctum::tools {
 namespace {
 
@@ -19,8 +21,9 @@ namespace fs = std::filesystem;
 
 // What a run writes, or has written in earlier versions.
 constexpr const char* kReportFiles[] = {
-    "report.html", "begun.json", "events.csv", "samples.csv", "fault.csv", "obs.csv",    "contours.csv", "report.json", "scene.toml", "figure.png",
-    "figure.svg",  "figure.gp", "figure.log", "core.log",     "vision.log",  "gnuplot.log"};
+    "report.html", "begun.json",  "events.csv",  "samples.csv", "fault.csv", "obs.csv",   "contours.csv", "report.json",
+    "scene.toml",  "figure.png",  "figure.svg",  "figure.gp",   "figure.log", "core.log", "vision.log",   "gnuplot.log",
+    "reserve"};
 constexpr const char* kFrames = "frames";
 
 // A run that has written anything has written its resolved scene first.
@@ -30,15 +33,27 @@ bool is_report(const fs::path& folder) {
   return std::getline(in, line) && line.starts_with("# ") && line.ends_with(kResolvedScene);
 }
 
-fs::path dated_folder(const std::string& scene) {
+std::string dated_name(const std::string& scene) {
+  return fmt::format("reports/{}-{:%Y%m%d-%H%M%S}", scene, fmt::localtime(std::time(nullptr)));
+}
+
+// Makes NAME, or NAME-2, NAME-3, ...: one that was not there before, so that two runs never get the same.
+tl::expected<fs::path, std::string> new_folder(const fs::path& name, int first) {
   std::error_code ec;
-  const std::string base =
-      fmt::format("reports/{}-{:%Y%m%d-%H%M%S}", scene, fmt::localtime(std::time(nullptr)));
-  fs::path folder = base;
-  for (int n = 2; fs::exists(folder, ec); ++n) {
-    folder = fmt::format("{}-{}", base, n);
+  if (name.has_parent_path()) {
+    fs::create_directories(name.parent_path(), ec);
   }
-  return folder;
+  for (int n = first; !ec; ++n) {
+    const fs::path folder = n < 2 ? name : fs::path(fmt::format("{}-{}", name.string(), n));
+    if (fs::create_directory(folder, ec)) {
+      return folder;
+    }
+    if (ec && fs::exists(folder)) {
+      ec.clear();  // a file of that name
+    }
+  }
+  return tl::unexpected(
+      fmt::format("{}: cannot be used as report folder: {}", name.string(), ec.message()));
 }
 
 // The first file that has the name of a report's; empty if there is none.
@@ -71,39 +86,48 @@ bool is_annotated_frame(const fs::path& file) {
          std::all_of(stem.begin(), stem.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 
-void clear(const fs::path& folder) {
+// What a run has written there, without its folder.
+std::vector<fs::path> files_of_report(const fs::path& folder) {
   std::error_code ec;
+  std::vector<fs::path> files;
   for (const char* file : kReportFiles) {
-    fs::remove(folder / file, ec);
-  }
-  const fs::path frames = folder / kFrames;
-  std::vector<fs::path> pictures;
-  for (auto it = fs::directory_iterator(frames, ec); !ec && it != fs::directory_iterator();
-       it.increment(ec)) {
-    if (is_annotated_frame(it->path())) {
-      pictures.push_back(it->path());
+    for (const fs::path& name : {fs::path(file), unfinished(file)}) {
+      if (fs::exists(fs::symlink_status(folder / name, ec))) {
+        files.push_back(name);
+      }
     }
   }
-  for (const fs::path& picture : pictures) {
-    fs::remove(picture, ec);
+  for (auto it = fs::directory_iterator(folder / kFrames, ec); !ec && it != fs::directory_iterator();
+       it.increment(ec)) {
+    if (is_annotated_frame(it->path())) {
+      files.push_back(fs::path(kFrames) / it->path().filename());
+    }
   }
-  fs::remove(frames, ec);  // if nothing else is in it
+  return files;
+}
+
+void clear(const fs::path& folder) {
+  std::error_code ec;
+  for (const fs::path& file : files_of_report(folder)) {
+    fs::remove(folder / file, ec);
+  }
+  fs::remove(folder / kFrames, ec);  // if nothing else is in it
 }
 
 }  // namespace
 
-tl::expected<std::string, std::string> prepare_report_folder(const Scene& scene, const std::string& wanted) {
+tl::expected<ReportFolder, std::string> prepare_report_folder(const Scene& scene, const std::string& wanted,
+                                                              bool overwrite) {
   std::error_code ec;
-  const fs::path folder = wanted.empty() ? dated_folder(scene.name) : fs::path(wanted);
-  fs::create_directories(folder, ec);
-  if (ec || !fs::is_directory(folder)) {
-    return tl::unexpected(fmt::format("{}: cannot be used as report folder: {}", folder.string(),
-                                      ec ? ec.message() : "it is not a folder"));
+  ReportFolder report;
+  const fs::path name = (wanted.empty() ? fs::path(dated_name(scene.name)) : fs::path(wanted)).lexically_normal();
+  fs::path folder = name.has_filename() ? name : name.parent_path();
+  const bool there = fs::exists(fs::symlink_status(folder, ec));
+  if (there && !fs::is_directory(folder, ec)) {
+    return tl::unexpected(
+        fmt::format("{}: cannot be used as report folder: it is not a folder", folder.string()));
   }
-  if (access(folder.c_str(), W_OK | X_OK) != 0) {
-    return tl::unexpected(fmt::format("{}: cannot be written to: {}", folder.string(), std::strerror(errno)));
-  }
-  if (!is_report(folder)) {
+  if (there && !wanted.empty() && !is_report(folder)) {
     if (const fs::path file = foreign_file(folder); !file.empty()) {
       return tl::unexpected(
           fmt::format("{}: is there, but no run has written it; allowed: a folder of its own for the report",
@@ -114,8 +138,52 @@ tl::expected<std::string, std::string> prepare_report_folder(const Scene& scene,
     return tl::unexpected(fmt::format("{}: the recorded frames come from there; allowed: another --report",
                                       (folder / kFrames).string()));
   }
-  clear(folder);
-  return fs::absolute(folder).string();
+  if (!there || wanted.empty() || is_report(folder)) {
+    const bool taken = there && !wanted.empty();
+    const auto made = new_folder(folder, taken ? 2 : 1);
+    if (!made) {
+      return tl::unexpected(made.error());
+    }
+    if (taken && overwrite) {
+      report.replaces = fs::absolute(folder).string();
+    } else if (taken) {
+      report.note = fmt::format("{} holds an earlier report and is left alone; --overwrite replaces it",
+                                folder.string());
+    }
+    folder = *made;
+    report.is_new = true;
+  }
+  if (access(folder.c_str(), W_OK | X_OK) != 0) {
+    return tl::unexpected(fmt::format("{}: cannot be written to: {}", folder.string(), std::strerror(errno)));
+  }
+  report.folder = fs::absolute(folder).string();
+  return report;
+}
+
+tl::expected<std::string, std::string> take_place(const ReportFolder& report) {
+  const fs::path from = report.folder, to = report.replaces;
+  std::error_code ec;
+  clear(to);
+  fs::create_directory(to / kFrames, ec);
+  for (const fs::path& file : files_of_report(from)) {
+    fs::rename(from / file, to / file, ec);
+    if (ec) {
+      return tl::unexpected(fmt::format("{}: cannot be moved to {}: {}; the rest of the report stays there",
+                                        (from / file).string(), to.string(), ec.message()));
+    }
+  }
+  fs::remove(to / kFrames, ec);  // where there are none
+  fs::remove(from / kFrames, ec);
+  fs::remove(from, ec);
+  return to.string();
+}
+
+void discard(const ReportFolder& report) {
+  std::error_code ec;
+  clear(report.folder);
+  if (report.is_new) {
+    fs::remove(report.folder, ec);  // if nothing else is in it
+  }
 }
 
 }  // namespace punctum::tools

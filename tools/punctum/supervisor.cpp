@@ -8,10 +8,10 @@
 #include <algorithm>
 #include <cctype>
 #include <chrono>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "hal/ipc/rendezvous.hpp"
@@ -20,6 +20,7 @@
 #include "hal/sim/world.hpp"
 #include "rt/station/station.hpp"
 #include "tools/punctum/core_process.hpp"
+#include "tools/punctum/disk_space.hpp"
 #include "tools/punctum/judge.hpp"
 #include "tools/punctum/lab_report.hpp"
 #include "tools/punctum/provenance.hpp"
@@ -205,17 +206,21 @@ std::vector<std::string> vision_arguments(const Scene& scene, const std::string&
 // One run, from the first process to the report.
 class Run {
  public:
-  Run(const Scene& scene, const RunSettings& settings, const std::string& folder, Segments& segments,
-      Recorder& recorder, Terminal& terminal)
+  Run(const Scene& scene, const RunSettings& settings, const ReportFolder& report_folder, Segments& segments,
+      Recorder& recorder, SpaceReserve& reserve, Terminal& terminal)
       : scene_(scene),
         settings_(settings),
-        folder_(folder),
+        report_folder_(report_folder),
+        folder_(report_folder.folder),
+        reserve_(reserve),
         segments_(segments),
         recorder_(recorder),
         terminal_(terminal),
         core_(*segments.core, segments.commands.front()->queue, scene.clock == ClockKind::real, terminal),
-        vision_(vision_arguments(scene, folder, for_vision(segments), settings.frames),
-                for_vision(segments).descriptors(), folder + "/vision.log", terminal) {}
+        vision_(vision_arguments(scene, folder_, for_vision(segments), settings.frames),
+                for_vision(segments).descriptors(), folder_ + "/vision.log",
+                segments.observation ? &(*segments.observation)->rounds : nullptr,
+                scene.clock == ClockKind::real, terminal) {}
 
   int run();
 
@@ -226,6 +231,7 @@ class Run {
   [[nodiscard]] const rt::CoreStatus& status() const { return segments_.core->status; }
   void watch_vision();
   void tell_progress();
+  void tell_what_is_not_kept();
   Ended watch_until_the_core_ends();
   void judge_end(const Ended& core);
   void let_devices_come_to_rest();
@@ -233,7 +239,9 @@ class Run {
 
   const Scene& scene_;
   const RunSettings& settings_;
-  const std::string& folder_;
+  const ReportFolder& report_folder_;
+  std::string folder_;
+  SpaceReserve& reserve_;
   Segments& segments_;
   Recorder& recorder_;
   Terminal& terminal_;
@@ -244,6 +252,8 @@ class Run {
   bool rights_told_ = false;
   std::size_t faults_told_ = 0;
   double next_progress_s_ = 0;
+  std::size_t recorder_failures_ = 0;        // told so far
+  std::uint64_t vision_does_not_keep_ = 0;  // likewise
   RunResult result_;
   const nlohmann::ordered_json begun_facts_ = provenance(scene_);
 };
@@ -252,9 +262,14 @@ int Run::run() {
   terminal_.say("{}: {} ({} Hz, {} clock, seed {})", scene_.name,
                 scene_.title.empty() ? scene_.source : scene_.title, scene_.servo.rate_Hz,
                 scene_.clock == ClockKind::real ? "real" : "virtual", scene_.sim ? scene_.sim->seed : 0);
-  terminal_.say("report: {}", folder_);
-  (void)write_whole(folder_ + "/" + kBegun, begun_facts_.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n",
-                    Sync::later);
+  terminal_.say("report: {}{}", folder_,
+                report_folder_.replaces.empty()
+                    ? ""
+                    : fmt::format(" (takes the place of {} once it is whole)", report_folder_.replaces));
+  if (!report_folder_.note.empty()) {
+    terminal_.say("{}", report_folder_.note);
+  }
+  (void)write_begun(folder_, begun_facts_);
 
   // Recorded frames play from the core's first tick on; a camera is there before it.
   const bool vision_follows_core = scene_.recorded && scene_.clock == ClockKind::real;
@@ -279,6 +294,7 @@ int Run::run() {
     terminal_.complain(fmt::format("punctum-core: {}", last_line(core_.log())));
     vision_.send(SIGTERM);
     vision_.end();
+    discard(report_folder_);
     return exit_bad_input;
   }
   judge_end(core);
@@ -286,6 +302,7 @@ int Run::run() {
     (*segments_.bench)->finished.store(1);  // a camera that still waits for the plant ends
   }
   vision_.end();
+  tell_what_is_not_kept();
   return report();
 }
 
@@ -298,6 +315,7 @@ Ended Run::watch_until_the_core_ends() {
     segments_.rendezvous.serve();
     watch_vision();
     core_.watch(now_s(), stop_signal::count());
+    tell_what_is_not_kept();
     tell_progress();
     if (taken < kBusyRound) {
       std::this_thread::sleep_for(std::chrono::microseconds(scene_.clock == ClockKind::real ? 2000 : 100));
@@ -336,6 +354,30 @@ void Run::watch_vision() {
       stop_signal::request();
       break;
   }
+}
+
+// At once: whoever stands at the station may still make room, or end the run.
+void Run::tell_what_is_not_kept() {
+  const auto tell = [this](const NotKept& n) {
+    terminal_.complain(
+        fmt::format("{:.3f} s: {} is not kept from here on: {}; the run goes on", n.t_s, n.file, n.why));
+    result_.not_kept.push_back(n);
+  };
+  const std::vector<NotKept>& failures = recorder_.not_kept();
+  for (; recorder_failures_ < failures.size(); ++recorder_failures_) {
+    tell(failures[recorder_failures_]);
+  }
+  if (!segments_.observation) {
+    return;
+  }
+  const std::uint64_t now = (*segments_.observation)->not_kept.load() & ~vision_does_not_keep_;
+  for (const auto& [what, file] : {std::pair{rt::ObservationSegment::observations, "obs.csv"},
+                                   {rt::ObservationSegment::frames, "frames"}}) {
+    if ((now & what) != 0) {
+      tell({file, recorder_.measures().last_s, "vision could not write it"});
+    }
+  }
+  vision_does_not_keep_ |= now;
 }
 
 void Run::tell_progress() {
@@ -412,36 +454,36 @@ int Run::report() {
   result_.rows_every = recorder_.every();
   result_.samples_lost = recorder_.lost();
   const auto contour = read_contour_error(folder_ + "/obs.csv");
-  bool complete = true;
-  std::string places;
-  if (auto written = write_lab_report(
-          folder_, begun_facts_, report_facts(scene_, result_, m, recorder_.events(), status(), contour),
-          settings_.figure);
-      !written) {
+  reserve_.give_back();
+  const auto facts = [&] {
+    return whole_facts(begun_facts_, report_facts(scene_, result_, m, recorder_.events(), status(), contour));
+  };
+  auto written = write_report_json(folder_, facts());
+  if (auto page = write_report_page(folder_, facts(), settings_.figure); !page) {
+    terminal_.complain(page.error());
+    result_.not_kept.push_back({"report.html", m.last_s, page.error()});
+    written = write_report_json(folder_, facts());  // it tells that, too
+  }
+  if (!written) {
     terminal_.complain(written.error());
-    complete = false;
-  } else {
-    places = fmt::format("report          {}/report.html\n", folder_);
   }
-  if (recorder_.write_failed()) {
-    terminal_.complain(fmt::format("{}: samples are not complete, is the disk full?", folder_));
-    complete = false;
+  std::string folder = folder_;
+  if (written && !report_folder_.replaces.empty()) {
+    if (auto moved = take_place(report_folder_)) {
+      folder = *moved;
+    } else {
+      terminal_.complain(moved.error());
+      written = tl::unexpected(moved.error());
+    }
   }
+  const std::string places = written ? fmt::format("report          {}/report.html\n", folder) : "";
   terminal_.print("\n" + summary(scene_, result_, m, status(), contour, terminal_.coloured()) + places);
   if (vision_was_refused_) {
     return exit_bad_input;
   }
+  const bool complete = written && result_.not_kept.empty();
   const ExitCode code = exit_code(result_.end);
   return code == exit_done && !complete ? exit_not_done : code;
-}
-
-tl::expected<void, std::string> write_resolved(const Scene& scene, const std::string& folder) {
-  std::ofstream out(folder + "/scene.toml");
-  out << to_toml(scene);
-  if (!out.flush()) {
-    return tl::unexpected(fmt::format("{}/scene.toml: cannot be written", folder));
-  }
-  return {};
 }
 
 }  // namespace
@@ -452,26 +494,42 @@ int run_scene(const Scene& scene, const RunSettings& settings) {
     terminal.complain(why);
     return exit_bad_input;
   };
-  const auto folder = prepare_report_folder(scene, settings.report);
-  if (!folder) {
-    return refuse(folder.error());
+  const auto report = prepare_report_folder(scene, settings.report, settings.overwrite);
+  if (!report) {
+    return refuse(report.error());
   }
-  if (auto written = write_resolved(scene, *folder); !written) {
-    return refuse(written.error());
+  const std::string& folder = report->folder;
+  const auto refuse_and_leave_nothing = [&](const std::string& why) {
+    discard(*report);
+    return refuse(why);
+  };
+  const std::uint64_t every = rows_every(scene, settings);
+  const auto space = look_for_space(
+      folder, bytes_written(scene, {.seconds = scene.seconds > 0 ? scene.seconds : kOpenEnded_s,
+                                    .rows_every = every,
+                                    .frames = settings.frames && !is_long(scene)}));
+  if (!space) {
+    return refuse_and_leave_nothing(space.error());
   }
+  if (!space->empty()) {
+    terminal.complain(*space);
+  }
+  if (auto written = write_whole(folder + "/scene.toml", to_toml(scene)); !written) {
+    return refuse_and_leave_nothing(written.error());
+  }
+  SpaceReserve reserve(folder);
   auto segments = create_segments(scene);
   if (!segments) {
-    return refuse(segments.error());
+    return refuse_and_leave_nothing(segments.error());
   }
   auto recorder =
-      Recorder::create(*folder, scene, *segments->core, segments->bench ? segments->bench->get() : nullptr,
-                       rows_every(scene, settings));
+      Recorder::create(folder, scene, *segments->core, segments->bench ? segments->bench->get() : nullptr, every);
   if (!recorder) {
-    return refuse(recorder.error());
+    return refuse_and_leave_nothing(recorder.error());
   }
   stop_signal::watch({SIGINT, SIGTERM, SIGHUP, SIGQUIT});
   signal(SIGPIPE, SIG_IGN);
-  Run run(scene, settings, *folder, *segments, *recorder, terminal);
+  Run run(scene, settings, *report, *segments, *recorder, reserve, terminal);
   return run.run();
 }
 

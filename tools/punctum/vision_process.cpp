@@ -21,11 +21,13 @@ constexpr std::chrono::seconds kTimeToEnd{5};
 }  // namespace
 
 VisionProcess::VisionProcess(std::vector<std::string> args, std::vector<int> descriptors, std::string log,
-                             Terminal& terminal)
+                             const std::atomic<std::uint64_t>* rounds, bool real_time, Terminal& terminal)
     : args_(std::move(args)),
       descriptors_(std::move(descriptors)),
       log_(std::move(log)),
-      terminal_(terminal) {}
+      terminal_(terminal),
+      rounds_(rounds),
+      watchdog_(real_time) {}
 
 tl::expected<void, std::string> VisionProcess::start() {
   started_ = true;
@@ -35,7 +37,23 @@ tl::expected<void, std::string> VisionProcess::start() {
     return tl::unexpected(child.error());
   }
   child_ = std::move(*child);
+  is_watched_ = false;
   return {};
+}
+
+void VisionProcess::kill_if_it_hangs(double now_s) {
+  if (rounds_ == nullptr || !child_.running() || !killed_because_.empty()) {
+    return;
+  }
+  const std::uint64_t rounds = rounds_->load(std::memory_order_relaxed);
+  if (!is_watched_) {
+    watchdog_.started(now_s, rounds);
+    is_watched_ = true;
+  }
+  if (watchdog_.hangs(now_s, rounds)) {
+    killed_because_ = fmt::format("hung for {:.0f} s and was killed", watchdog_.silent_s());
+    child_.send(SIGKILL);
+  }
 }
 
 void VisionProcess::start_again() {
@@ -54,6 +72,7 @@ VisionProcess::News VisionProcess::watch(double now_s, double run_s) {
   if (start_is_planned_ && now_s >= next_start_s_) {
     start_again();
   }
+  kill_if_it_hangs(now_s);
   Ended how;
   if (!child_.ended(how)) {
     return News::none;
@@ -62,7 +81,8 @@ VisionProcess::News VisionProcess::watch(double now_s, double run_s) {
     over_ = true;
     return News::frames_ended;
   }
-  const std::string why = how.text() + (how.exited ? ": " + last_line(log_) : "");
+  const std::string why = !killed_because_.empty() ? std::exchange(killed_because_, {})
+                                                   : how.text() + (how.exited ? ": " + last_line(log_) : "");
   if (how.exited && how.code == exit_bad_input) {
     terminal_.complain("vision " + why);
     over_ = true;
@@ -106,7 +126,7 @@ void VisionProcess::end() {
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
-  if (!how.exited || how.code != exit_done) {
+  if (!asked && (!how.exited || how.code != exit_done)) {
     terminal_.complain(fmt::format("vision {}{}", how.text(), how.exited ? ": " + last_line(log_) : ""));
   }
 }

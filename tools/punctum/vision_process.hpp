@@ -1,12 +1,14 @@
-// Vision as its parent sees it: started, and started again when it dies, at once and then ever slower.
+// Vision as its parent sees it: started, and started again when it dies or hangs, at once and then ever slower.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <string>
 #include <tl/expected.hpp>
 #include <vector>
 
 #include "tools/punctum/terminal.hpp"
+#include "tools/punctum/vision_watchdog.hpp"
 #include "tools/shared/child.hpp"
 
 namespace punctum::tools {
@@ -25,8 +27,9 @@ class VisionProcess {
     refused,       // its input is bad: it is over, and so is the run
   };
 
+  // `rounds`: as vision counts them in its segment; null: nobody does.
   VisionProcess(std::vector<std::string> args, std::vector<int> descriptors, std::string log,
-                Terminal& terminal);
+                const std::atomic<std::uint64_t>* rounds, bool real_time, Terminal& terminal);
 
   [[nodiscard]] tl::expected<void, std::string> start();
   // Once per round of the parent; run_s is the time of the run, for the record of restarts.
@@ -41,12 +44,17 @@ class VisionProcess {
 
  private:
   void start_again();
+  void kill_if_it_hangs(double now_s);
 
   std::vector<std::string> args_;
   std::vector<int> descriptors_;
   std::string log_;
   Terminal& terminal_;
   Child child_;
+  const std::atomic<std::uint64_t>* rounds_;
+  VisionWatchdog watchdog_;
+  bool is_watched_ = false;  // since its newest start
+  std::string killed_because_;
   bool started_ = false, over_ = false;
   bool start_is_planned_ = false;
   double next_start_s_ = 0;

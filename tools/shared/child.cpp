@@ -82,6 +82,7 @@ tl::expected<Child, std::string> Child::start(const std::string& program,
   sigset_t none, all;
   sigemptyset(&none);
   sigfillset(&all);
+  sigdelset(&all, SIGXFSZ);  // a limit of a file's size stays an error of the write (say.hpp)
   posix_spawnattr_setsigmask(&attributes, &none);
   posix_spawnattr_setsigdefault(&attributes, &all);
   posix_spawnattr_setpgroup(&attributes, 0);

@@ -7,12 +7,14 @@
 #include <chrono>
 #include <cmath>
 #include <fstream>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <thread>
 #include <utility>
 
 #include "tools/shared/child.hpp"
+#include "tools/shared/whole_file.hpp"
 
 namespace punctum::tools {
 namespace {
@@ -411,6 +413,19 @@ class PanelScript {
 
 }  // namespace
 
+namespace {
+
+// By its last bytes.
+bool is_whole_picture(const fs::path& picture) {
+  std::ifstream in(picture, std::ios::binary);
+  constexpr std::streamoff kTail = 12;
+  in.seekg(-kTail, std::ios::end);
+  const std::string tail{std::istreambuf_iterator<char>(in), {}};
+  return tail.find(picture.extension() == ".png" ? "IEND" : "</svg>") != std::string::npos;
+}
+
+}  // namespace
+
 std::string gnuplot_script(const Figure& figure, const fs::path& picture) {
   const int panels = static_cast<int>(figure.panels.size());
   const int columns = std::clamp(figure.columns, 1, std::max(panels, 1));
@@ -447,12 +462,10 @@ tl::expected<void, std::string> draw(const Figure& figure, const fs::path& pictu
   if (find_program("gnuplot").empty()) {
     return tl::unexpected(std::string("gnuplot is not installed (package gnuplot-nox)"));
   }
-  std::ofstream file(script);
-  file << gnuplot_script(figure, picture);
-  if (!file.flush()) {
-    return tl::unexpected(script.string() + ": cannot be written");
+  const fs::path part = unfinished(picture);
+  if (auto written = write_whole(script, gnuplot_script(figure, part), Sync::later); !written) {
+    return written;
   }
-  file.close();
   auto gnuplot = Child::start("gnuplot", {script.string()}, log.string());
   if (!gnuplot) {
     return tl::unexpected(gnuplot.error());
@@ -466,14 +479,18 @@ tl::expected<void, std::string> draw(const Figure& figure, const fs::path& pictu
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
-  if (!how.exited || how.code != 0 || !fs::exists(picture, ec)) {
-    fs::remove(picture, ec);
+  if (how.exited && how.code == 0 && fs::exists(part, ec) && !is_whole_picture(part)) {
+    fs::remove(part, ec);  // gnuplot does not notice a full disk
+    return tl::unexpected(picture.string() + ": cannot be written: it is not complete");
+  }
+  if (!how.exited || how.code != 0 || !fs::exists(part, ec)) {
+    fs::remove(part, ec);
     return tl::unexpected(
         fmt::format("gnuplot {}: {}, {}", script.string(), how.text(), last_line(log.string())));
   }
   fs::remove(script, ec);
   fs::remove(log, ec);
-  return {};
+  return put_in_place(picture);
 }
 
 }  // namespace punctum::tools

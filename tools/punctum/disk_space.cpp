@@ -1,0 +1,73 @@
+#include "tools/punctum/disk_space.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <system_error>
+
+namespace punctum::tools {
+namespace {
+
+// Measured on scene icsi: a row of samples.csv, a row of obs.csv, an annotated frame.
+constexpr double kRow_bytes = 620, kObservation_bytes = 420, kFrame_bytes = 330e3;
+constexpr double kFramesPerAnnotated = 12;
+constexpr double kRest_bytes = 4e6;  // the report, the figure and its script, the logs
+
+double frame_rate(const Scene& scene) {
+  return scene.recorded            ? scene.recorded->fps
+         : scene.simulated_camera() ? scene.sim->microscope->fps
+                                    : 0;
+}
+
+}  // namespace
+
+double bytes_written(const Scene& scene, const ExpectedRecording& recording) {
+  const double rows = recording.seconds * scene.servo.rate_Hz / static_cast<double>(recording.rows_every);
+  const double frames = scene.vision ? recording.seconds * frame_rate(scene) : 0;
+  return kRest_bytes + rows * kRow_bytes + frames * kObservation_bytes +
+         (recording.frames ? frames / kFramesPerAnnotated * kFrame_bytes : 0);
+}
+
+tl::expected<std::string, std::string> look_for_space(const std::string& folder, double bytes_wanted) {
+  std::error_code ec;
+  const std::filesystem::space_info space = std::filesystem::space(folder, ec);
+  if (ec) {
+    return std::string();
+  }
+  const auto free = static_cast<double>(space.available);
+  if (free < kRest_bytes) {
+    return tl::unexpected(fmt::format("{}: {:.1f} MB are free on its disk, needed: {:.0f} MB for the report alone",
+                                      folder, free * 1e-6, kRest_bytes * 1e-6));
+  }
+  if (free >= bytes_wanted) {
+    return std::string();
+  }
+  return fmt::format(
+      "{:.0f} MB are free on the disk of the report, and a run up to its time limit writes about {:.0f} MB: "
+      "what finds no room will be missing",
+      free * 1e-6, bytes_wanted * 1e-6);
+}
+
+SpaceReserve::SpaceReserve(const std::string& folder) : file_(folder + "/reserve") {
+  const int file = open(file_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+  if (file < 0) {
+    file_.clear();
+    return;
+  }
+  const bool kept = posix_fallocate(file, 0, kBytes) == 0;
+  (void)close(file);
+  if (!kept) {
+    give_back();
+  }
+}
+
+void SpaceReserve::give_back() noexcept {
+  if (!file_.empty()) {
+    (void)unlink(file_.c_str());
+    file_.clear();
+  }
+}
+
+}  // namespace punctum::tools

@@ -1,0 +1,42 @@
+// Space on the disk that takes the report: looked at before a run, and a little of it kept back so that the
+// report itself can still be written when everything else has filled the disk.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <tl/expected.hpp>
+
+#include "tools/scene/scene.hpp"
+
+namespace punctum::tools {
+
+struct ExpectedRecording {
+  double seconds = 0;
+  std::uint64_t rows_every = 1;
+  bool frames = false;  // annotated ones
+};
+
+// Bytes that a run writes into its folder, at most or nearly so.
+[[nodiscard]] double bytes_written(const Scene& scene, const ExpectedRecording& recording);
+
+// The error, one line: not even the report itself finds room. The value, one line: what may not find room; empty
+// where everything does, or where nobody knows.
+[[nodiscard]] tl::expected<std::string, std::string> look_for_space(const std::string& folder,
+                                                                    double bytes_wanted);
+
+// A file of some size in the folder until it is given back.
+class SpaceReserve {
+ public:
+  static constexpr std::int64_t kBytes = 1 << 20;  // report.json of a long run with thousands of events
+
+  explicit SpaceReserve(const std::string& folder);  // where that is not possible, there is none
+  SpaceReserve(const SpaceReserve&) = delete;
+  SpaceReserve& operator=(const SpaceReserve&) = delete;
+  ~SpaceReserve() { give_back(); }
+  void give_back() noexcept;
+
+ private:
+  std::string file_;
+};
+
+}  // namespace punctum::tools

@@ -21,11 +21,12 @@ namespace {
 
 using namespace punctum::tools;
 
-const std::vector<std::pair<int, const char*>> kExitCodes = {
-    {exit_done, "the task ended well"},
-    {exit_not_done, "it ended without a fault, but is not done, or its report is not complete"},
-    {exit_bad_input, "bad input: nothing was started"},
-    {exit_fault, "a latched fault, or a control core that died"}};
+std::vector<std::pair<int, const char*>> exit_codes_of_run() {
+  return {{exit_done, "the task ended well"},
+          {exit_not_done, "it ended without a fault, but is not done, or its report is not complete"},
+          {exit_bad_input, "bad input: nothing was started"},
+          {exit_fault, "a latched fault, or a control core that died"}};
+}
 
 int bad(const std::string& text) {
   complain(text);
@@ -43,7 +44,7 @@ int main_or_throw(int argc, char** argv) {
        {"punctum run my.toml --set servo.rate_hz=2000", "a scene of your own, one number changed"},
        {"punctum explain zebrafish", "what would run, and what is left out"},
        {"punctum report reports/a reports/b", "their reports once more, and the two compared"}},
-      kExitCodes));
+      exit_codes_of_run()));
   std::string scene_name;
   std::vector<std::string> overrides;
   std::string clock, seed, rate, seconds;
@@ -99,7 +100,7 @@ int main_or_throw(int argc, char** argv) {
   run->footer(help_footer({{"punctum run icsi --report reports/mine", "the report goes to that folder"},
                            {"punctum run recorded --set camera.frames=my/pictures", "vision on your own pictures"},
                            {"NO_COLOR=1 punctum run icsi", "without colour on the terminal"}},
-                          kExitCodes));
+                          exit_codes_of_run()));
   explaining->footer(help_footer({{"punctum explain icsi --keys", "every number that can be set"}}, {{exit_done, "explained"}, {exit_bad_input, "bad input"}}));
   checking->footer(help_footer({{"punctum check my.toml", "before the first run on a machine"}}, {{exit_done, "it can run"}, {exit_bad_input, "it cannot; the text says why"}}));
   reporting->footer(help_footer({{"punctum report reports/icsi-20260101-120000", "after a crash, or from an older version"},

@@ -144,9 +144,11 @@ std::string origin_html(const Json& facts) {
                                    number_in(facts, "seed") ? fmt::format(", seed {:.0f}", *number_in(facts, "seed"))
                                                             : "")
                      : "");
-  if (machine.is_object()) {
+  if (!text_in(machine, "name").empty()) {
     f.row("machine", fmt::format("{}: {}, {} cores, {}", text_in(machine, "name"), text_in(machine, "processor"),
                                  whole(number_in(machine, "cores")), text_in(machine, "architecture")));
+  }
+  if (!text_in(machine, "kernel").empty()) {
     f.row("kernel", fmt::format("{} ({})", text_in(machine, "kernel"),
                                 flag_in(machine, "real_time_kernel") ? "PREEMPT_RT" : "not a real-time kernel"));
   }
@@ -337,7 +339,7 @@ std::string timing_html(const Json& facts) {
     const Json& p = fact(facts, name);
     return number_in(p, "p50") ? fmt::format("p50 {}, p99 {}, p99.9 {}, longest {} us", shown(number_in(p, "p50")),
                                              shown(number_in(p, "p99")), shown(number_in(p, "p99_9")),
-                                             shown(number_in(p, "max"), "", 1, 4))
+                                             whole(number_in(p, "max")))
                                : std::string();
   };
   const bool real = text_in(facts, "clock") == "real";

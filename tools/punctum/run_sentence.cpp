@@ -85,7 +85,7 @@ std::string after_or_before(std::optional<double> delay_ms, const char* what) {
     return "-";
   }
   if (std::abs(*delay_ms) < kSameTime_ms) {
-    return fmt::format("together with {}", what);
+    return fmt::format("just as {}", what);
   }
   return fmt::format("{:.3g} ms {} {}", std::abs(*delay_ms), *delay_ms > 0 ? "after" : "before", what);
 }

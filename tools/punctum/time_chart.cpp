@@ -19,8 +19,8 @@ constexpr std::size_t kMostBands = 400, kMostLabels = 40, kMostInstants = 60;
 // Told apart by people of all colour visions.
 constexpr std::array<const char*, 9> kLines = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00",
                                                "#56b4e9", "#7a4a1e", "#222222", "#8c8c00"};
-constexpr std::array<const char*, 7> kBands = {"#f6f6f6", "#fff3cc", "#ffe0b3", "#ffc9c0",
-                                               "#cfe8cf", "#d8e6f7", "#ececec"};
+constexpr std::array<const char*, 7> kBands = {"#f8f8f8", "#fff8e0", "#ffeed6", "#ffe1dc",
+                                               "#e2f2e2", "#e7f0fb", "#f2f2f2"};
 
 struct Range {
   double low = 0, high = 1;

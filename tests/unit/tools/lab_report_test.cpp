@@ -146,7 +146,7 @@ TEST(Numbers, are_written_as_people_write_them) {
 TEST(Sentence, a_time_is_never_negative) {
   EXPECT_EQ(after_or_before(20, "the needle touched"), "20 ms after the needle touched");
   EXPECT_EQ(after_or_before(-20, "the needle touched"), "20 ms before the needle touched");
-  EXPECT_EQ(after_or_before(0.1, "the needle touched"), "together with the needle touched");
+  EXPECT_EQ(after_or_before(0.1, "the needle touched"), "just as the needle touched");
   EXPECT_EQ(after_or_before(std::nullopt, "x"), "-");
 }
 

@@ -87,7 +87,7 @@ class Drawing {
       body += panel_at(panel, y);
       y += kPanel + kGap;
     }
-    double bottom = y - kGap;
+    double bottom = y - 8;  // below the key of the last panel
     if (!c_.lanes.empty()) {
       body += lanes_at(y - 6);
       bottom = y - 6 + kLane * static_cast<double>(c_.lanes.size());

@@ -19,11 +19,15 @@ constexpr std::size_t kColumn = 30;
 
 class PlainHelp : public CLI::Formatter {
  public:
-  PlainHelp() { column_width(kColumn); }
+  PlainHelp() {
+    column_width(kColumn);
+    label("Positionals", "Arguments");
+  }
   // The meaning of the value alone: no type, no default in brackets, no REQUIRED.
   std::string make_option_opts(const CLI::Option* option) const override {
-    const std::string type = option->get_type_size() == 0 ? std::string() : option->get_type_name();
-    return type.empty() ? std::string() : " " + type;
+    // What checks the value stands behind a colon; that of a positional is its own name.
+    const std::string full = option->get_type_name(), type = full.substr(0, full.find(':'));
+    return option->get_positional() || option->get_type_size() == 0 || type.empty() ? std::string() : " " + type;
   }
   std::string make_usage(const CLI::App* app, std::string name) const override {
     std::string usage = "Usage: " + name;

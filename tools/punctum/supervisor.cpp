@@ -230,6 +230,7 @@ class Run {
   }
   [[nodiscard]] const rt::CoreStatus& status() const { return segments_.core->status; }
   void watch_vision();
+  void tell_faults();
   void tell_progress();
   void tell_what_is_not_kept();
   Ended watch_until_the_core_ends();
@@ -289,6 +290,7 @@ int Run::run() {
   begun_ = std::chrono::steady_clock::now();
   const Ended core = watch_until_the_core_ends();
   recorder_.finish();
+  tell_faults();
   terminal_.clear_progress();
   if (core.exited && core.code == exit_bad_input) {  // it has not begun
     terminal_.complain(fmt::format("punctum-core: {}", last_line(core_.log())));
@@ -380,6 +382,14 @@ void Run::tell_what_is_not_kept() {
   vision_does_not_keep_ |= now;
 }
 
+// As each is latched: what it means and what to do.
+void Run::tell_faults() {
+  for (const auto& faults = recorder_.measures().faults; faults_told_ < faults.size(); ++faults_told_) {
+    const Measures::Fault& f = faults[faults_told_];
+    terminal_.say("{}", painted(Colour::bad, fault_text(f.fault, f.t_s), terminal_.coloured()));
+  }
+}
+
 void Run::tell_progress() {
   const rt::CoreStatus& core = status();
   if (!rights_told_ && core.started.load() != 0) {
@@ -390,10 +400,7 @@ void Run::tell_progress() {
       }
     }
   }
-  for (const Measures::Fault* f = recorder_.measures().faults.data();
-       faults_told_ < recorder_.measures().faults.size(); ++faults_told_) {
-    terminal_.say("{}", painted(Colour::bad, fault_text(f[faults_told_].fault, f[faults_told_].t_s), terminal_.coloured()));
-  }
+  tell_faults();
   if (settings_.quiet || now_s() < next_progress_s_) {
     return;
   }

@@ -108,7 +108,7 @@ std::string outcome_html(const Json& facts) {
     if (const auto fault = fault_named(text_in(f, "name"))) {
       const FaultAdvice& advice = kFaultAdvice[static_cast<std::size_t>(*fault)];
       s += fmt::format(
-          "<div class=\"outcome bad\"><b>fault {} at {:.3f} s</b>{}. What to do: {}. It is cleared {}.</div>\n",
+          "<div class=\"outcome bad\"><b>fault {} at {:.3f} s</b>Cause: {}. What to do: {}. It is cleared {}.</div>\n",
           escaped(rt::name(*fault)), number_in(f, "t_s").value_or(0), escaped(advice.cause), escaped(advice.next),
           escaped(clearing_condition(*fault)));
     }
@@ -337,8 +337,8 @@ std::string timing_html(const Json& facts) {
   Facts f;
   const auto percentiles = [&facts](const char* name) {
     const Json& p = fact(facts, name);
-    return number_in(p, "p50") ? fmt::format("p50 {}, p99 {}, p99.9 {}, longest {} us", shown(number_in(p, "p50")),
-                                             shown(number_in(p, "p99")), shown(number_in(p, "p99_9")),
+    return number_in(p, "p50") ? fmt::format("p50 {}, p99 {}, p99.9 {}, longest {} us", whole(number_in(p, "p50")),
+                                             whole(number_in(p, "p99")), whole(number_in(p, "p99_9")),
                                              whole(number_in(p, "max")))
                                : std::string();
   };

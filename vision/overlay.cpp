@@ -53,7 +53,8 @@ class Canvas {
     const int length = static_cast<int>(std::lround(um / um_per_px * scale_));
     const double font = std::clamp(picture_.cols / 1100.0, 0.35, 1.0);
     const int right = picture_.cols - 16, y = picture_.rows - 14, high = std::max(3, picture_.cols / 250);
-    cv::rectangle(picture_, {right - length - 1, y - 1}, {right + 1, y + high + 1}, cv::Scalar(0, 0, 0), cv::FILLED);
+    cv::rectangle(picture_, {right - length - 1, y - 1}, {right + 1, y + high + 1}, cv::Scalar(0, 0, 0),
+                  cv::FILLED);
     cv::rectangle(picture_, {right - length, y}, {right, y + high}, kWhite, cv::FILLED);
     char label[32];
     std::snprintf(label, sizeof label, "%g um", um);

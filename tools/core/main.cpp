@@ -44,7 +44,8 @@ constexpr std::int64_t kSetUp_ns = 200'000'000;  // from the start of the device
 constexpr int kSignalsToInsist = 3;  // this many end the loop at once; the first is a commanded stop
 
 constexpr const char* kHelp =
-    "The control core: reads hand and stage, computes the force, moves the needle, at the rate of the scene.\n"
+    "The control core: reads hand and stage, computes the force, moves the needle, at the rate of the "
+    "scene.\n"
     "`punctum run` starts it and gives it its segments of shared memory; nobody starts it by hand.\n"
     "Usage: punctum-core --scene FILE --segments NAME=DESCRIPTOR,... --clock real|virtual\n"
     "\n"

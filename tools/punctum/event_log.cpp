@@ -70,8 +70,8 @@ std::string event_line(const rt::Event& e) {
     return v ? fmt::format("{}", *v) : std::string();
   };
   const Json& writer = fact(row, "writer");
-  return fmt::format("{:.6f},{},{},{},{},{},{},{}\n", e.t_s, e.tick, text_in(row, "event"), text_in(row, "what"),
-                     number("cell"), number("value"), text_in(row, "target"),
+  return fmt::format("{:.6f},{},{},{},{},{},{},{}\n", e.t_s, e.tick, text_in(row, "event"),
+                     text_in(row, "what"), number("cell"), number("value"), text_in(row, "target"),
                      writer.is_string() ? writer.get<std::string>() : number("writer"));
 }
 

@@ -1,5 +1,5 @@
-// Reading report.json: of whatever version of this program, cut off or edited by hand. What is not there, or is
-// of another kind, is absent, and nothing throws.
+// Reading report.json: of whatever version of this program, cut off or edited by hand. What is not there, or
+// is of another kind, is absent, and nothing throws.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -90,7 +90,8 @@ int report_folders(const std::vector<std::string>& folders, const std::string& o
     const fs::path path = fs::path(folder).lexically_normal();
     std::error_code ec;
     if (!fs::is_regular_file(path / "samples.csv", ec) && !fs::is_regular_file(path / "report.json", ec)) {
-      complain(fmt::format("{}: no report of a run, allowed: a folder with samples.csv or report.json", folder));
+      complain(
+          fmt::format("{}: no report of a run, allowed: a folder with samples.csv or report.json", folder));
       return exit_bad_input;
     }
     Json facts = read_json(path / "report.json");
@@ -107,7 +108,8 @@ int report_folders(const std::vector<std::string>& folders, const std::string& o
       complain(written.error());
       return exit_not_done;
     }
-    say(fmt::format("{}: {}\n{}\n", (path / "report.html").string(), text_in(facts, "outcome"), run_sentence(facts)));
+    say(fmt::format("{}: {}\n{}\n", (path / "report.html").string(), text_in(facts, "outcome"),
+                    run_sentence(facts)));
     const fs::path named = path.has_filename() ? path : path.parent_path();
     runs.push_back({named.filename().string(), std::move(facts), std::move(chart)});
   }

@@ -34,7 +34,8 @@ int bad(const std::string& text) {
 }
 
 int main_or_throw(int argc, char** argv) {
-  CLI::App app{"Haptic cell injection: runs a scene on control core, station and vision, and reports.", "punctum"};
+  CLI::App app{"Haptic cell injection: runs a scene on control core, station and vision, and reports.",
+               "punctum"};
   set_help_style(app);
   app.require_subcommand(1);
   app.set_version_flag("--version", version_line("punctum"), "version and commit");
@@ -95,17 +96,25 @@ int main_or_throw(int argc, char** argv) {
   std::vector<std::string> folders;
   std::string comparison;
   reporting->add_option("FOLDER", folders, "report folders of runs")->required();
-  reporting->add_option("--out", comparison, "where the comparison goes (default: reports/comparison-DATE.html)")
+  reporting
+      ->add_option("--out", comparison, "where the comparison goes (default: reports/comparison-DATE.html)")
       ->type_name("FILE");
-  run->footer(help_footer({{"punctum run icsi --report reports/mine", "the report goes to that folder"},
-                           {"punctum run recorded --set camera.frames=my/pictures", "vision on your own pictures"},
-                           {"NO_COLOR=1 punctum run icsi", "without colour on the terminal"}},
-                          exit_codes_of_run()));
-  explaining->footer(help_footer({{"punctum explain icsi --keys", "every number that can be set"}}, {{exit_done, "explained"}, {exit_bad_input, "bad input"}}));
-  checking->footer(help_footer({{"punctum check my.toml", "before the first run on a machine"}}, {{exit_done, "it can run"}, {exit_bad_input, "it cannot; the text says why"}}));
-  reporting->footer(help_footer({{"punctum report reports/icsi-20260101-120000", "after a crash, or from an older version"},
-                                 {"punctum report reports/icsi-*", "all of them, compared in a table with figures"}},
-                                {{exit_done, "written"}, {exit_not_done, "a report could not be written"}, {exit_bad_input, "bad input"}}));
+  run->footer(
+      help_footer({{"punctum run icsi --report reports/mine", "the report goes to that folder"},
+                   {"punctum run recorded --set camera.frames=my/pictures", "vision on your own pictures"},
+                   {"NO_COLOR=1 punctum run icsi", "without colour on the terminal"}},
+                  exit_codes_of_run()));
+  explaining->footer(help_footer({{"punctum explain icsi --keys", "every number that can be set"}},
+                                 {{exit_done, "explained"}, {exit_bad_input, "bad input"}}));
+  checking->footer(
+      help_footer({{"punctum check my.toml", "before the first run on a machine"}},
+                  {{exit_done, "it can run"}, {exit_bad_input, "it cannot; the text says why"}}));
+  reporting->footer(
+      help_footer({{"punctum report reports/icsi-20260101-120000", "after a crash, or from an older version"},
+                   {"punctum report reports/icsi-*", "all of them, compared in a table with figures"}},
+                  {{exit_done, "written"},
+                   {exit_not_done, "a report could not be written"},
+                   {exit_bad_input, "bad input"}}));
 
   if (const auto code = parse_command_line(app, argc, argv)) {
     return *code;

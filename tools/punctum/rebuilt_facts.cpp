@@ -134,11 +134,13 @@ Json rebuilt_facts(const std::string& folder) {
   result.rows = rows;
   result.needle = truth.needle(measures.whereabouts());
   const auto no_core = std::make_unique<rt::CoreStatus>();
-  Json j = report_facts(scene, result, measures, EventList{}, *no_core, read_contour_error(folder + "/obs.csv"));
+  Json j =
+      report_facts(scene, result, measures, EventList{}, *no_core, read_contour_error(folder + "/obs.csv"));
   j["rebuilt"] = true;
   j["outcome"] = "unknown";
-  j["outcome_detail"] = rows > 0 ? fmt::format("the recording ends in phase {}", rt::name(measures.last.phase))
-                                 : "nothing was recorded";
+  j["outcome_detail"] = rows > 0
+                            ? fmt::format("the recording ends in phase {}", rt::name(measures.last.phase))
+                            : "nothing was recorded";
   j["events"] = read_events(folder + "/events.csv");
   for (const Json& e : j["events"]) {
     if (text_in(e, "event") == "ended") {
@@ -147,14 +149,34 @@ Json rebuilt_facts(const std::string& folder) {
     }
   }
   // Nobody is left to ask.
-  for (const char* unknown : {"wall_s", "missed", "ticks", "worst_lateness_us", "wake_us", "tick_us", "slots_us",
-                              "page_faults", "switches", "allocations", "degraded", "rights", "dose", "cells",
-                              "observations", "stale_s", "without_vision_s", "commands_refused", "wake_histogram",
-                              "tick_histogram", "tremor_ratio", "tremor_hand_um", "tremor_tip_um"}) {
+  for (const char* unknown : {"wall_s",
+                              "missed",
+                              "ticks",
+                              "worst_lateness_us",
+                              "wake_us",
+                              "tick_us",
+                              "slots_us",
+                              "page_faults",
+                              "switches",
+                              "allocations",
+                              "degraded",
+                              "rights",
+                              "dose",
+                              "cells",
+                              "observations",
+                              "stale_s",
+                              "without_vision_s",
+                              "commands_refused",
+                              "wake_histogram",
+                              "tick_histogram",
+                              "tremor_ratio",
+                              "tremor_hand_um",
+                              "tremor_tip_um"}) {
     j[unknown] = nullptr;
   }
   j["cell_list"] = Json::array();
-  j["samples"] = {{"rows", rows}, {"cut_off", cut_off}, {"every", nullptr}, {"lost", nullptr}, {"gaps", nullptr}};
+  j["samples"] = {
+      {"rows", rows}, {"cut_off", cut_off}, {"every", nullptr}, {"lost", nullptr}, {"gaps", nullptr}};
   if (truth.any) {
     j["peak_force_N"] = truth.peak_force_N;
     j["max_depth_um"] = truth.max_depth_m * 1e6;

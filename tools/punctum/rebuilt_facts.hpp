@@ -6,7 +6,8 @@
 
 namespace punctum::tools {
 
-// What only the running programs knew (times on the machine, page faults, rights) is null, and `rebuilt` is true.
+// What only the running programs knew (times on the machine, page faults, rights) is null, and `rebuilt` is
+// true.
 [[nodiscard]] nlohmann::ordered_json rebuilt_facts(const std::string& folder);
 
 }  // namespace punctum::tools

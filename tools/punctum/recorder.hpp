@@ -1,7 +1,8 @@
 // Writes samples.csv and feeds the measures: takes the telemetry and the events of the core and, when the
 // world is simulated, the snapshots of the bench, tick by tick. Under the virtual clock the same seed gives
 // the same bytes. However thin samples.csv is, fault.csv has every tick from two seconds before a fault to
-// half a second after it. samples.csv and events.csv grow by whole rows, and are never more than half a second old.
+// half a second after it. samples.csv and events.csv grow by whole rows, and are never more than half a
+// second old.
 #pragma once
 
 #include <chrono>

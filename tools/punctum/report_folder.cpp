@@ -21,9 +21,9 @@ namespace fs = std::filesystem;
 
 // What a run writes, or has written in earlier versions.
 constexpr const char* kReportFiles[] = {
-    "report.html", "begun.json",  "events.csv",  "samples.csv", "fault.csv", "obs.csv",   "contours.csv", "report.json",
-    "scene.toml",  "figure.png",  "figure.svg",  "figure.gp",   "figure.log", "core.log", "vision.log",   "gnuplot.log",
-    "reserve"};
+    "report.html",  "begun.json",  "events.csv", "samples.csv", "fault.csv",  "obs.csv",
+    "contours.csv", "report.json", "scene.toml", "figure.png",  "figure.svg", "figure.gp",
+    "figure.log",   "core.log",    "vision.log", "gnuplot.log", "reserve"};
 constexpr const char* kFrames = "frames";
 
 // A run that has written anything has written its resolved scene first.
@@ -52,8 +52,7 @@ tl::expected<fs::path, std::string> new_folder(const fs::path& name, int first) 
       ec.clear();  // a file of that name
     }
   }
-  return tl::unexpected(
-      fmt::format("{}: cannot be used as report folder: {}", name.string(), ec.message()));
+  return tl::unexpected(fmt::format("{}: cannot be used as report folder: {}", name.string(), ec.message()));
 }
 
 // The first file that has the name of a report's; empty if there is none.
@@ -120,7 +119,8 @@ tl::expected<ReportFolder, std::string> prepare_report_folder(const Scene& scene
                                                               bool overwrite) {
   std::error_code ec;
   ReportFolder report;
-  const fs::path name = (wanted.empty() ? fs::path(dated_name(scene.name)) : fs::path(wanted)).lexically_normal();
+  const fs::path name =
+      (wanted.empty() ? fs::path(dated_name(scene.name)) : fs::path(wanted)).lexically_normal();
   fs::path folder = name.has_filename() ? name : name.parent_path();
   const bool there = fs::exists(fs::symlink_status(folder, ec));
   if (there && !fs::is_directory(folder, ec)) {

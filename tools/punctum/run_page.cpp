@@ -24,8 +24,8 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr std::size_t kOpenEvents = 25;      // a longer list of events is folded
-constexpr std::size_t kMostEvents = 2000;    // report.json has them all
+constexpr std::size_t kOpenEvents = 25;    // a longer list of events is folded
+constexpr std::size_t kMostEvents = 2000;  // report.json has them all
 constexpr std::size_t kMostCells = 200;
 constexpr std::uintmax_t kLargestFrame = 4U << 20U;
 constexpr std::uintmax_t kLargestScene = 1U << 20U;
@@ -102,24 +102,27 @@ const char* kind_of(const std::string& outcome) {
 
 std::string outcome_html(const Json& facts) {
   const std::string outcome = text_in(facts, "outcome");
-  std::string s = fmt::format("<div class=\"outcome {}\"><b>{}</b>{}</div>\n", kind_of(outcome), escaped(outcome),
-                              escaped(run_sentence(facts)));
+  std::string s = fmt::format("<div class=\"outcome {}\"><b>{}</b>{}</div>\n", kind_of(outcome),
+                              escaped(outcome), escaped(run_sentence(facts)));
   for (const Json& f : list_in(facts, "faults")) {
     if (const auto fault = fault_named(text_in(f, "name"))) {
       const FaultAdvice& advice = kFaultAdvice[static_cast<std::size_t>(*fault)];
       s += fmt::format(
-          "<div class=\"outcome bad\"><b>fault {} at {:.3f} s</b>Cause: {}. What to do: {}. It is cleared {}.</div>\n",
-          escaped(rt::name(*fault)), number_in(f, "t_s").value_or(0), escaped(advice.cause), escaped(advice.next),
-          escaped(clearing_condition(*fault)));
+          "<div class=\"outcome bad\"><b>fault {} at {:.3f} s</b>Cause: {}. What to do: {}. It is cleared "
+          "{}.</div>\n",
+          escaped(rt::name(*fault)), number_in(f, "t_s").value_or(0), escaped(advice.cause),
+          escaped(advice.next), escaped(clearing_condition(*fault)));
     }
   }
   if (flag_in(facts, "rebuilt")) {
-    s += "<div class=\"outcome fair\"><b>rebuilt</b>The run left no report of its own. This one was made from its "
+    s += "<div class=\"outcome fair\"><b>rebuilt</b>The run left no report of its own. This one was made "
+         "from its "
          "samples and events; what only the running programs knew is missing.</div>\n";
   }
   for (const Json& n : list_in(facts, "not_kept")) {
-    s += fmt::format("<div class=\"outcome fair\"><b>not kept</b>{} from {:.3f} s on: {}</div>\n",
-                     escaped(text_in(n, "file")), number_in(n, "t_s").value_or(0), escaped(text_in(n, "why")));
+    s +=
+        fmt::format("<div class=\"outcome fair\"><b>not kept</b>{} from {:.3f} s on: {}</div>\n",
+                    escaped(text_in(n, "file")), number_in(n, "t_s").value_or(0), escaped(text_in(n, "why")));
   }
   return s;
 }
@@ -130,27 +133,31 @@ std::string origin_html(const Json& facts) {
   f.row("begun", text_in(facts, "begun_at"));
   f.row("lasted", fmt::format("{:.1f} s, {}", number_in(facts, "seconds").value_or(0),
                               text_in(facts, "clock") == "virtual"
-                                  ? "of virtual time" + (number_in(facts, "wall_s")
-                                                             ? fmt::format(" ({:.1f} s real)", *number_in(facts, "wall_s"))
-                                                             : std::string())
+                                  ? "of virtual time" +
+                                        (number_in(facts, "wall_s")
+                                             ? fmt::format(" ({:.1f} s real)", *number_in(facts, "wall_s"))
+                                             : std::string())
                                   : "real time"));
   f.row("program", text_in(facts, "program"));
   f.row("command", text_in(facts, "command_line"));
-  f.row("scene", text_in(facts, "scene") + (text_in(facts, "scene_source").empty()
-                                                ? ""
-                                                : " (" + text_in(facts, "scene_source") + ")"));
-  f.row("servo", number_in(facts, "rate_hz")
-                     ? fmt::format("{:g} Hz{}", *number_in(facts, "rate_hz"),
-                                   number_in(facts, "seed") ? fmt::format(", seed {:.0f}", *number_in(facts, "seed"))
-                                                            : "")
-                     : "");
+  f.row("scene",
+        text_in(facts, "scene") +
+            (text_in(facts, "scene_source").empty() ? "" : " (" + text_in(facts, "scene_source") + ")"));
+  f.row("servo",
+        number_in(facts, "rate_hz")
+            ? fmt::format(
+                  "{:g} Hz{}", *number_in(facts, "rate_hz"),
+                  number_in(facts, "seed") ? fmt::format(", seed {:.0f}", *number_in(facts, "seed")) : "")
+            : "");
   if (!text_in(machine, "name").empty()) {
-    f.row("machine", fmt::format("{}: {}, {} cores, {}", text_in(machine, "name"), text_in(machine, "processor"),
-                                 whole(number_in(machine, "cores")), text_in(machine, "architecture")));
+    f.row("machine",
+          fmt::format("{}: {}, {} cores, {}", text_in(machine, "name"), text_in(machine, "processor"),
+                      whole(number_in(machine, "cores")), text_in(machine, "architecture")));
   }
   if (!text_in(machine, "kernel").empty()) {
-    f.row("kernel", fmt::format("{} ({})", text_in(machine, "kernel"),
-                                flag_in(machine, "real_time_kernel") ? "PREEMPT_RT" : "not a real-time kernel"));
+    f.row("kernel",
+          fmt::format("{} ({})", text_in(machine, "kernel"),
+                      flag_in(machine, "real_time_kernel") ? "PREEMPT_RT" : "not a real-time kernel"));
   }
   std::string missing;
   for (const Json& r : list_in(facts, "rights")) {
@@ -176,8 +183,8 @@ struct KeyFrame {
 std::vector<KeyFrame> key_frames(const std::string& folder, const Json& facts) {
   std::map<long, fs::path> pictures;
   std::error_code ec;
-  for (auto it = fs::directory_iterator(fs::path(folder) / "frames", ec); !ec && it != fs::directory_iterator();
-       it.increment(ec)) {
+  for (auto it = fs::directory_iterator(fs::path(folder) / "frames", ec);
+       !ec && it != fs::directory_iterator(); it.increment(ec)) {
     const std::string stem = it->path().stem().string();
     const std::string ending = it->path().extension().string();
     if ((ending == ".png" || ending == ".jpg") && !stem.empty() && stem.size() <= 12 &&
@@ -230,14 +237,18 @@ std::string frames_html(const std::string& folder, const Json& facts) {
       continue;
     }
     const std::string caption = fmt::format("{}: t = {:.3f} s, frame {}", k.what, k.t_s, k.number);
-    s += fmt::format("<figure><span>t = {:.3f} s</span><img alt=\"{}\" src=\"data:image/{};base64,{}\"><figcaption>{}</figcaption></figure>\n",
-                     k.t_s, escaped(caption), k.file.ends_with(".png") ? "png" : "jpeg", base64(bytes), escaped(caption));
+    s += fmt::format(
+        "<figure><span>t = {:.3f} s</span><img alt=\"{}\" "
+        "src=\"data:image/{};base64,{}\"><figcaption>{}</figcaption></figure>\n",
+        k.t_s, escaped(caption), k.file.ends_with(".png") ? "png" : "jpeg", base64(bytes), escaped(caption));
   }
   if (s.empty()) {
     return {};
   }
-  return "<h2>What the camera saw</h2>\n<p class=\"about\">Drawn in by vision: outer membrane green, inner cyan, "
-         "undeformed circle dashed, needle yellow, tip red, contact points magenta, dimple orange, holding pipette "
+  return "<h2>What the camera saw</h2>\n<p class=\"about\">Drawn in by vision: outer membrane green, inner "
+         "cyan, "
+         "undeformed circle dashed, needle yellow, tip red, contact points magenta, dimple orange, holding "
+         "pipette "
          "blue.</p>\n<div class=\"frames\">\n" +
          s + "</div>\n";
 }
@@ -249,7 +260,8 @@ std::string phases_text(const Json& facts) {
     if (++n > 14) {
       return s + " > ...";
     }
-    s += fmt::format("{}{} {:.2f} s", s.empty() ? "" : " > ", text_in(p, "name"), number_in(p, "start_s").value_or(0));
+    s += fmt::format("{}{} {:.2f} s", s.empty() ? "" : " > ", text_in(p, "name"),
+                     number_in(p, "start_s").value_or(0));
   }
   return s;
 }
@@ -259,10 +271,11 @@ std::string measures_html(const Json& facts) {
   const auto n = [&facts](const char* name) { return number_in(facts, name); };
   const Json& needle = fact(facts, "needle_at_end");
   f.row("phases begin at", phases_text(facts));
-  f.row("needle at the end", text_in(needle, "in_words") +
-                                 (text_in(needle, "known_from").empty() || text_in(needle, "known_from") == "nobody"
-                                      ? ""
-                                      : " (known from: " + text_in(needle, "known_from") + ")"));
+  f.row("needle at the end",
+        text_in(needle, "in_words") +
+            (text_in(needle, "known_from").empty() || text_in(needle, "known_from") == "nobody"
+                 ? ""
+                 : " (known from: " + text_in(needle, "known_from") + ")"));
   const Json& dose = fact(facts, "dose");
   f.row("dose", dose.is_object() ? fmt::format("{} given of {} asked", shown(number_in(dose, "given_s"), "s"),
                                                shown(number_in(dose, "asked_s"), "s"))
@@ -279,11 +292,12 @@ std::string measures_html(const Json& facts) {
     }
     f.row("beside the axis", shown(n("lateral_error_um"), "um where the membrane gave way"));
     f.row("peak needle force", shown(n("peak_force_N"), "uN", 1e6));
-    f.row("force estimate", n("force_error_rms_N")
-                                ? fmt::format("{} rms error of {} rms true force", shown(n("force_error_rms_N"), "uN", 1e6),
-                                              shown(n("true_force_rms_N"), "uN", 1e6))
-                                : std::string());
-    f.row("deepest", shown(n("max_depth_um"), "um") + ", beyond the puncture " + shown(n("depth_beyond_puncture_um"), "um"));
+    f.row("force estimate", n("force_error_rms_N") ? fmt::format("{} rms error of {} rms true force",
+                                                                 shown(n("force_error_rms_N"), "uN", 1e6),
+                                                                 shown(n("true_force_rms_N"), "uN", 1e6))
+                                                   : std::string());
+    f.row("deepest", shown(n("max_depth_um"), "um") + ", beyond the puncture " +
+                         shown(n("depth_beyond_puncture_um"), "um"));
     f.row("withdrawal", shown(n("withdrawal_s"), "s"));
   }
   f.row("peak force at the hand", shown(n("peak_hand_force_N"), "N"));
@@ -298,7 +312,8 @@ std::string measures_html(const Json& facts) {
   if (list.size() < 2) {
     return s;
   }
-  s += "<div class=\"wide\"><table>\n<tr><th>cell</th><th>came to</th><th>beside the axis [um]</th><th>peak force "
+  s += "<div class=\"wide\"><table>\n<tr><th>cell</th><th>came to</th><th>beside the axis [um]</th><th>peak "
+       "force "
        "[uN]</th><th>deepest [um]</th><th>given [s]</th><th>asked [s]</th></tr>\n";
   for (std::size_t i = 0; i < std::min(list.size(), kMostCells); ++i) {
     const Json& c = list[i];
@@ -306,7 +321,9 @@ std::string measures_html(const Json& facts) {
       return "<td class=\"number\">" + shown(number_in(c, name), "", scale) + "</td>";
     };
     s += fmt::format("<tr><td class=\"number\">{:.0f}</td><td>{}</td>", number_in(c, "cell").value_or(0) + 1,
-                     flag_in(c, "lost") ? "lost" : flag_in(c, "done") ? "done" : "not done") +
+                     flag_in(c, "lost")   ? "lost"
+                     : flag_in(c, "done") ? "done"
+                                          : "not done") +
          cell("lateral_error_um") + cell("peak_force_N", 1e6) + cell("max_depth_um") + cell("injected_s") +
          cell("asked_s") + "</tr>\n";
   }
@@ -337,9 +354,9 @@ std::string timing_html(const Json& facts) {
   Facts f;
   const auto percentiles = [&facts](const char* name) {
     const Json& p = fact(facts, name);
-    return number_in(p, "p50") ? fmt::format("p50 {}, p99 {}, p99.9 {}, longest {} us", whole(number_in(p, "p50")),
-                                             whole(number_in(p, "p99")), whole(number_in(p, "p99_9")),
-                                             whole(number_in(p, "max")))
+    return number_in(p, "p50") ? fmt::format("p50 {}, p99 {}, p99.9 {}, longest {} us",
+                                             whole(number_in(p, "p50")), whole(number_in(p, "p99")),
+                                             whole(number_in(p, "p99_9")), whole(number_in(p, "max")))
                                : std::string();
   };
   const bool real = text_in(facts, "clock") == "real";
@@ -385,10 +402,11 @@ std::string alarms_html(const Json& facts) {
   for (std::size_t i = 0; i < std::min(events.size(), kMostEvents); ++i) {
     const Json& e = events[i];
     const bool cell = number_in(e, "cell") && number_in(e, "cell") > 0;
-    s += fmt::format("<tr><td class=\"number\">{:.3f}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
-                     number_in(e, "t_s").value_or(0), escaped(text_in(e, "event")),
-                     escaped(text_in(e, "what") + (cell ? fmt::format(", cell {:.0f}", *number_in(e, "cell") + 1) : "")),
-                     escaped(text_in(e, "writer")));
+    s += fmt::format(
+        "<tr><td class=\"number\">{:.3f}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+        number_in(e, "t_s").value_or(0), escaped(text_in(e, "event")),
+        escaped(text_in(e, "what") + (cell ? fmt::format(", cell {:.0f}", *number_in(e, "cell") + 1) : "")),
+        escaped(text_in(e, "writer")));
   }
   s += "</table>\n";
   if (events.size() > kMostEvents) {
@@ -399,9 +417,10 @@ std::string alarms_html(const Json& facts) {
 
 std::string scene_html(const std::string& folder) {
   const std::string text = read_small(fs::path(folder) / "scene.toml", kLargestScene);
-  return text.empty() ? std::string()
-                      : "<h2>Scene</h2>\n<details><summary>the whole scene as it ran (scene.toml)</summary>\n<pre>" +
-                            escaped(text) + "</pre></details>\n";
+  return text.empty()
+             ? std::string()
+             : "<h2>Scene</h2>\n<details><summary>the whole scene as it ran (scene.toml)</summary>\n<pre>" +
+                   escaped(text) + "</pre></details>\n";
 }
 
 // What a comparison shows of each run.
@@ -518,17 +537,20 @@ std::string run_page(const std::string& folder, const Json& facts, const std::st
   if (!drawing.empty()) {
     s += "<h2>Force, depth, phases and alarms over time</h2>\n<figure>" + drawing + "</figure>\n";
   }
-  s += frames_html(folder, facts) + measures_html(facts) + timing_html(facts) + alarms_html(facts) + scene_html(folder);
+  s += frames_html(folder, facts) + measures_html(facts) + timing_html(facts) + alarms_html(facts) +
+       scene_html(folder);
   return s +
-         "<p class=\"about\">All numbers are in report.json, every recorded tick in samples.csv. What a simulated "
+         "<p class=\"about\">All numbers are in report.json, every recorded tick in samples.csv. What a "
+         "simulated "
          "station measures is no measurement on cells.</p>\n</body>\n</html>\n";
 }
 
 std::string comparison_page(const std::vector<ComparedRun>& runs) {
   std::string s = head(fmt::format("punctum: {} runs compared", runs.size())) +
-                  fmt::format("<h1>{} runs compared</h1>\n<div class=\"wide\"><table>\n<tr><th>run</th><th>scene</th>"
-                              "<th>outcome</th>",
-                              runs.size());
+                  fmt::format(
+                      "<h1>{} runs compared</h1>\n<div class=\"wide\"><table>\n<tr><th>run</th><th>scene</th>"
+                      "<th>outcome</th>",
+                      runs.size());
   std::vector<Compared> columns;
   for (const Compared& c : kCompared) {
     if (shown_at_all(runs, c)) {
@@ -538,8 +560,8 @@ std::string comparison_page(const std::vector<ComparedRun>& runs) {
   }
   s += "</tr>\n";
   for (const ComparedRun& run : runs) {
-    s += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td>", escaped(run.name), escaped(text_in(run.facts, "scene")),
-                     escaped(text_in(run.facts, "outcome")));
+    s += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td>", escaped(run.name),
+                     escaped(text_in(run.facts, "scene")), escaped(text_in(run.facts, "outcome")));
     for (const Compared& c : columns) {
       s += "<td class=\"number\">" + shown(value_of(run.facts, c), "", 1, c.digits) + "</td>";
     }
@@ -566,8 +588,8 @@ std::string comparison_text(const std::vector<ComparedRun>& runs) {
   for (const ComparedRun& run : runs) {
     longest = std::max(longest, run.name.size());
   }
-  std::string s = fmt::format("{:<{}}  {:<18} {:>8} {:>6} {:>12} {:>10} {:>9}\n", "run", longest, "outcome", "seconds",
-                              "cells", "beside [um]", "peak [uN]", "deep [um]");
+  std::string s = fmt::format("{:<{}}  {:<18} {:>8} {:>6} {:>12} {:>10} {:>9}\n", "run", longest, "outcome",
+                              "seconds", "cells", "beside [um]", "peak [uN]", "deep [um]");
   for (const ComparedRun& run : runs) {
     const auto n = [&run](const char* name) { return number_in(run.facts, name); };
     s += fmt::format("{:<{}}  {:<18} {:>8} {:>6} {:>12} {:>10} {:>9}\n", run.name, longest,

@@ -1,5 +1,5 @@
-// report.html: everything a lab keeps of a run, on one page that needs nothing beside itself, no network and no
-// script.
+// report.html: everything a lab keeps of a run, on one page that needs nothing beside itself, no network and
+// no script.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -10,7 +10,8 @@
 
 namespace punctum::tools {
 
-// From the facts of report.json; FOLDER gives the frames and the scene's text. An empty drawing: none was made.
+// From the facts of report.json; FOLDER gives the frames and the scene's text. An empty drawing: none was
+// made.
 [[nodiscard]] std::string run_page(const std::string& folder, const nlohmann::ordered_json& facts,
                                    const std::string& drawing);
 

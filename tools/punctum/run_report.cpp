@@ -1,6 +1,7 @@
 #include "tools/punctum/run_report.hpp"
 
 #include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -293,13 +294,12 @@ nlohmann::ordered_json report_facts(const Scene& scene, const RunResult& result,
 }
 
 std::string summary(const Scene& scene, const RunResult& result, const Measures& m,
-                    const rt::CoreStatus& core, const std::optional<ContourError>& contour,
-                    bool coloured) {
+                    const rt::CoreStatus& core, const std::optional<ContourError>& contour, bool coloured) {
   std::string s;
   const auto line = [&s](const char* what, const std::string& text) {
     s += fmt::format("{:<16}{}\n", what, text);
   };
-  const Colour mood = exit_code(result.end) == exit_done     ? Colour::good
+  const Colour mood = exit_code(result.end) == exit_done    ? Colour::good
                       : exit_code(result.end) == exit_fault ? Colour::bad
                                                             : Colour::warning;
   line("outcome", fmt::format("{}{} after {:.1f} s{}", painted(mood, rt::name(result.end), coloured),
@@ -324,7 +324,8 @@ std::string summary(const Scene& scene, const RunResult& result, const Measures&
     line("cells",
          fmt::format(
              "{} done, {} lost, {}{} tried", m.cells_done, m.cells_lost,
-             (m.cells_without_injection > 0 ? fmt::format("{} got nothing, ", m.cells_without_injection) : "") +
+             (m.cells_without_injection > 0 ? fmt::format("{} got nothing, ", m.cells_without_injection)
+                                            : "") +
                  (m.cells_underdosed > 0 ? fmt::format("{} got too little, ", m.cells_underdosed) : ""),
              m.cell_count));
     if (scene.servo.injector) {
@@ -389,7 +390,9 @@ std::string summary(const Scene& scene, const RunResult& result, const Measures&
     line("alarms", alarms);
   }
   for (std::size_t i = 0; i < std::min<std::size_t>(m.faults.size(), 5); ++i) {
-    line("fault", painted(Colour::bad, fmt::format("{} at {:.3f} s", rt::name(m.faults[i].fault), m.faults[i].t_s), coloured));
+    line("fault",
+         painted(Colour::bad, fmt::format("{} at {:.3f} s", rt::name(m.faults[i].fault), m.faults[i].t_s),
+                 coloured));
   }
   for (const NotKept& n : result.not_kept) {
     line("not kept", fmt::format("{} from {:.3f} s on: {}", n.file, n.t_s, n.why));

@@ -38,8 +38,9 @@ struct RunResult {
 };
 
 // All of report.json but what was run and where, which lab_report.hpp adds.
-[[nodiscard]] nlohmann::ordered_json report_facts(const Scene& scene, const RunResult& result, const Measures& m,
-                                                  const EventList& events, const rt::CoreStatus& core,
+[[nodiscard]] nlohmann::ordered_json report_facts(const Scene& scene, const RunResult& result,
+                                                  const Measures& m, const EventList& events,
+                                                  const rt::CoreStatus& core,
                                                   const std::optional<ContourError>& contour);
 // "inside the cell, 23.1 um past its membrane", "outside the cell", ...
 [[nodiscard]] std::string in_words(const Whereabouts& needle);

@@ -24,13 +24,15 @@ std::string ending(const Json& facts) {
   const std::string after = fmt::format("after {:.1f} s", number_in(facts, "seconds").value_or(0));
   const auto is = [&word](RunEnd end) { return word == rt::name(end); };
   if (is(RunEnd::done)) {
-    return tried > 0 ? fmt::format("The task ended well {}: {:.0f} of {:.0f} cells injected.", after, done, tried)
-                     : fmt::format("The run ended well {}.", after);
+    return tried > 0
+               ? fmt::format("The task ended well {}: {:.0f} of {:.0f} cells injected.", after, done, tried)
+               : fmt::format("The run ended well {}.", after);
   }
   if (is(RunEnd::fault)) {
     const auto fault = fault_named(detail);
-    return fmt::format("The station stopped {} with a latched fault, {}{}.", after, detail,
-                       fault ? fmt::format(": {}", kFaultAdvice[static_cast<std::size_t>(*fault)].cause) : "");
+    return fmt::format(
+        "The station stopped {} with a latched fault, {}{}.", after, detail,
+        fault ? fmt::format(": {}", kFaultAdvice[static_cast<std::size_t>(*fault)].cause) : "");
   }
   if (is(RunEnd::core_died)) {
     return fmt::format("The control core {} {}; the needle was left to the drive and the relay.",

@@ -253,7 +253,7 @@ class Run {
   bool rights_told_ = false;
   std::size_t faults_told_ = 0;
   double next_progress_s_ = 0;
-  std::size_t recorder_failures_ = 0;        // told so far
+  std::size_t recorder_failures_ = 0;       // told so far
   std::uint64_t vision_does_not_keep_ = 0;  // likewise
   RunResult result_;
   const nlohmann::ordered_json begun_facts_ = provenance(scene_);
@@ -429,8 +429,7 @@ void Run::judge_end(const Ended& core) {
     recorder_.keep_last_seconds();
     let_devices_come_to_rest();
   }
-  result_.needle =
-      recorder_.measures().whereabouts(result_.unattended ? &result_.unattended->last : nullptr);
+  result_.needle = recorder_.measures().whereabouts(result_.unattended ? &result_.unattended->last : nullptr);
 }
 
 // The core is dead: what the simulated devices do by themselves.
@@ -529,8 +528,8 @@ int run_scene(const Scene& scene, const RunSettings& settings) {
   if (!segments) {
     return refuse_and_leave_nothing(segments.error());
   }
-  auto recorder =
-      Recorder::create(folder, scene, *segments->core, segments->bench ? segments->bench->get() : nullptr, every);
+  auto recorder = Recorder::create(folder, scene, *segments->core,
+                                   segments->bench ? segments->bench->get() : nullptr, every);
   if (!recorder) {
     return refuse_and_leave_nothing(recorder.error());
   }

@@ -152,7 +152,8 @@ std::string progress_line(const Scene& scene, const rt::TelemetrySample& newest,
     parts.push_back(part(fmt::format("missed {}", core.missed.load()), 1, Colour::warning));
   }
   if (scene.seconds > 0) {
-    parts.push_back(part(fmt::format("{:.0f} s left", std::max(0.0, scene.seconds - newest.t_s)), 5, Colour::faint));
+    parts.push_back(
+        part(fmt::format("{:.0f} s left", std::max(0.0, scene.seconds - newest.t_s)), 5, Colour::faint));
   }
   if ((newest.alarms & rt::alarm_degraded) != 0 && scene.clock == ClockKind::real) {
     parts.push_back(part("degraded", 1, Colour::warning));

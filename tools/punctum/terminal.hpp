@@ -23,8 +23,8 @@ enum class Colour : std::uint8_t { plain, good, warning, bad, faint };
 
 struct LineStyle {
   bool coloured = false;
-  bool blocks = false;       // the bar from Unicode's blocks, which not every terminal has
-  std::size_t columns = 0;   // what does not fit is left out, the least important first; 0: all fits
+  bool blocks = false;      // the bar from Unicode's blocks, which not every terminal has
+  std::size_t columns = 0;  // what does not fit is left out, the least important first; 0: all fits
 };
 
 class Terminal {

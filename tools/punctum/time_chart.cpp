@@ -55,29 +55,31 @@ std::string text(double x, double y, const char* anchor, std::string_view words,
 }
 
 std::string line(double x1, double y1, double x2, double y2, const char* colour, const char* more = "") {
-  return fmt::format("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"{}\"{}/>\n", x1, y1,
-                     x2, y2, colour, more);
+  return fmt::format("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" stroke=\"{}\"{}/>\n", x1,
+                     y1, x2, y2, colour, more);
 }
 
-std::string box(double x, double y, double width, double height, const char* fill, std::string_view title = {}) {
-  const std::string head = fmt::format("<rect x=\"{:.2f}\" y=\"{:.1f}\" width=\"{:.2f}\" height=\"{:.1f}\" fill=\"{}\"",
-                                       x, y, width, height, fill);
+std::string box(double x, double y, double width, double height, const char* fill,
+                std::string_view title = {}) {
+  const std::string head =
+      fmt::format("<rect x=\"{:.2f}\" y=\"{:.1f}\" width=\"{:.2f}\" height=\"{:.1f}\" fill=\"{}\"", x, y,
+                  width, height, fill);
   return title.empty() ? head + "/>\n" : head + "><title>" + escaped(title) + "</title></rect>\n";
 }
 
 std::string open_svg(double height, std::string_view title) {
   return fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {:.0f} {:.0f}\" width=\"{:.0f}\" height=\"{:.0f}\" "
-      "role=\"img\" font-family=\"system-ui, sans-serif\" font-size=\"12\" fill=\"#222\">\n<title>{}</title>\n"
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {:.0f} {:.0f}\" width=\"{:.0f}\" "
+      "height=\"{:.0f}\" "
+      "role=\"img\" font-family=\"system-ui, sans-serif\" font-size=\"12\" "
+      "fill=\"#222\">\n<title>{}</title>\n"
       "<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n",
       kWidth, height, kWidth, height, escaped(title));
 }
 
 class Drawing {
  public:
-  explicit Drawing(const TimeChart& c) : c_(c) {
-    length_s_ = c.end_s > c.begin_s ? c.end_s - c.begin_s : 1;
-  }
+  explicit Drawing(const TimeChart& c) : c_(c) { length_s_ = c.end_s > c.begin_s ? c.end_s - c.begin_s : 1; }
 
   std::string text_of() {
     double y = kTop + (c_.instants.empty() ? 0 : 24);
@@ -148,8 +150,9 @@ class Drawing {
       s += line(kLeft, at(v), kLeft + kPlot, at(v), v == 0 ? "#999" : "#ddd") +
            text(kLeft - 6, at(v) + 4, "end", number_text(v, step));
     }
-    s += fmt::format("<text transform=\"translate(16 {:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
-                     y + kPanel / 2, escaped(p.y_label));
+    s +=
+        fmt::format("<text transform=\"translate(16 {:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
+                    y + kPanel / 2, escaped(p.y_label));
     std::size_t n = 0;
     double key = kLeft + 4;
     for (const Curve& curve : p.curves) {
@@ -158,8 +161,9 @@ class Drawing {
       }
       const char* const colour = kLines[n++ % kLines.size()];
       for (const auto& stroke : curve.strokes()) {
-        s += fmt::format("<polyline fill=\"none\" stroke=\"{}\" stroke-width=\"1.3\" stroke-linejoin=\"round\" points=\"",
-                         colour);
+        s += fmt::format(
+            "<polyline fill=\"none\" stroke=\"{}\" stroke-width=\"1.3\" stroke-linejoin=\"round\" points=\"",
+            colour);
         for (const Curve::Point& point : stroke) {
           s += fmt::format("{:.1f},{:.1f} ", x(point.t_s), at(point.value));
         }
@@ -175,9 +179,10 @@ class Drawing {
       s += text(kLeft + kPlot / 2, y + kPanel / 2, "middle", "nothing was recorded", " fill=\"#777\"");
     }
     return s + labels_ +
-           fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"none\" "
-                       "stroke=\"#888\"/>\n",
-                       kLeft, y, kPlot, kPanel);
+           fmt::format(
+               "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"none\" "
+               "stroke=\"#888\"/>\n",
+               kLeft, y, kPlot, kPanel);
   }
 
   [[nodiscard]] std::string lanes_at(double y) const {
@@ -200,7 +205,8 @@ class Drawing {
     const double step = step_of(length_s_, 12);
     std::string s = line(kLeft, bottom, kLeft + kPlot, bottom, "#888");
     for (const double t : ticks_of(r, 12)) {
-      s += line(x(t), bottom, x(t), bottom + 5, "#888") + text(x(t), bottom + 18, "middle", number_text(t, step));
+      s += line(x(t), bottom, x(t), bottom + 5, "#888") +
+           text(x(t), bottom + 18, "middle", number_text(t, step));
     }
     return s + text(kLeft + kPlot / 2, bottom + 35, "middle", c_.time_label);
   }
@@ -213,7 +219,8 @@ class Drawing {
       const Instant& e = c_.instants[i];
       const char* const colour = e.bad ? "#c0392b" : "#5b3f9e";
       s += fmt::format(
-          "<line x1=\"{0:.1f}\" y1=\"{1:.1f}\" x2=\"{0:.1f}\" y2=\"{2:.1f}\" stroke=\"{3}\" stroke-dasharray=\"4 "
+          "<line x1=\"{0:.1f}\" y1=\"{1:.1f}\" x2=\"{0:.1f}\" y2=\"{2:.1f}\" stroke=\"{3}\" "
+          "stroke-dasharray=\"4 "
           "3\"><title>{4:.3f} s: {5}</title></line>\n",
           x(e.t_s), first - 6, bottom, colour, e.t_s, escaped(e.label));
       const double width = 6.6 * static_cast<double>(e.label.size()) + 8;
@@ -296,17 +303,20 @@ std::string svg(const TimesHistogram& h) {
   const Range r{0, width_us * static_cast<double>(bars)};
   const auto x = [&r](double us) { return kLeft + kPlot * std::min(1.0, us / r.high); };
   // A count of one has a height, too.
-  const auto y = [&](double n) { return n > 0 ? base - kHigh * (std::log10(n) + 0.15) / (top + 0.15) : base; };
+  const auto y = [&](double n) {
+    return n > 0 ? base - kHigh * (std::log10(n) + 0.15) / (top + 0.15) : base;
+  };
   std::string s = open_svg(kHeight, h.title) + text(kLeft, 18, "start", h.title, " font-weight=\"600\"");
   for (double decade = 0; decade <= top; ++decade) {
     const double n = std::pow(10.0, decade);
-    s += line(kLeft, y(n), kLeft + kPlot, y(n), "#ddd") + text(kLeft - 6, y(n) + 4, "end", fmt::format("{:.0f}", n));
+    s += line(kLeft, y(n), kLeft + kPlot, y(n), "#ddd") +
+         text(kLeft - 6, y(n) + 4, "end", fmt::format("{:.0f}", n));
   }
   for (std::size_t i = 0; i < bars; ++i) {
     if (bar[i] > 0) {
       const double from = width_us * static_cast<double>(i);
-      s += box(x(from), y(bar[i]), std::max(0.5, kPlot / static_cast<double>(bars) - 0.6), base - y(bar[i]), "#5b8db8",
-               fmt::format("{:g} to {:g} us: {:.0f}", from, from + width_us, bar[i]));
+      s += box(x(from), y(bar[i]), std::max(0.5, kPlot / static_cast<double>(bars) - 0.6), base - y(bar[i]),
+               "#5b8db8", fmt::format("{:g} to {:g} us: {:.0f}", from, from + width_us, bar[i]));
     }
   }
   const double step = step_of(r.high, 12);
@@ -320,7 +330,8 @@ std::string svg(const TimesHistogram& h) {
     if (us > 0 && us <= r.high) {
       s += line(x(us), kTop - 4, x(us), base, "#c0392b", " stroke-dasharray=\"4 3\"") +
            text(x(us) + (x(us) > kWidth - 140 ? -4 : 4), label[1] == '5' ? kTop + 8 : kTop + 22,
-                x(us) > kWidth - 140 ? "end" : "start", fmt::format("{} {:.0f} us", label, us), " fill=\"#c0392b\"");
+                x(us) > kWidth - 140 ? "end" : "start", fmt::format("{} {:.0f} us", label, us),
+                " fill=\"#c0392b\"");
     }
   }
   return s + text(kWidth - kRight, 18, "end", fmt::format("{:.0f} ticks, longest {:.0f} us", all, h.max_us)) +

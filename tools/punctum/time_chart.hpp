@@ -1,6 +1,6 @@
-// A drawing of a run over its time: panels of curves on one time axis, the phases as bands behind them, alarms
-// as bars in lanes below, and single events as marks. One <svg> element that needs nothing beside itself; also
-// the histogram that stands beside it.
+// A drawing of a run over its time: panels of curves on one time axis, the phases as bands behind them,
+// alarms as bars in lanes below, and single events as marks. One <svg> element that needs nothing beside
+// itself; also the histogram that stands beside it.
 #pragma once
 
 #include <array>
@@ -10,8 +10,8 @@
 
 namespace punctum::tools {
 
-// A curve thinned to what can be seen: of each column of the drawing the least and the greatest value, so that
-// no peak is lost however long the run is. Values that are not finite leave a gap.
+// A curve thinned to what can be seen: of each column of the drawing the least and the greatest value, so
+// that no peak is lost however long the run is. Values that are not finite leave a gap.
 class Curve {
  public:
   static constexpr std::size_t kColumns = 1100;

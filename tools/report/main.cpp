@@ -109,21 +109,28 @@ int main_or_throw(int argc, char** argv) {
   app.footer(punctum::tools::help_footer(
       {{"punctum-report all --quick", "every topic within a minute, into reports/report-DATE"},
        {"punctum-report force --out mine", "one topic, into the folder `mine`"},
-       {"punctum-report force --input pairs.csv --output out.csv", "the paper's membrane law on rows of your own"}},
-      {{0, "all topics were measured"}, {kTopicFailed, "a topic failed, the others are there"}, {kBadInput, "bad input"}}));
+       {"punctum-report force --input pairs.csv --output out.csv",
+        "the paper's membrane law on rows of your own"}},
+      {{0, "all topics were measured"},
+       {kTopicFailed, "a topic failed, the others are there"},
+       {kBadInput, "bad input"}}));
   std::vector<std::string> wanted;
   std::string folder, input, output;
   bool quick = false;
   app.add_option("TOPIC", wanted, "one or more of: " + names)->required();
-  const auto* to_folder = app.add_option(
-      "--out", folder, "folder of tables, figures and index.html (default: reports/report-DATE)")->type_name("FOLDER");
+  const auto* to_folder =
+      app.add_option("--out", folder,
+                     "folder of tables, figures and index.html (default: reports/report-DATE)")
+          ->type_name("FOLDER");
   app.add_flag("--quick", quick, "fewer points and cells, all together within a minute");
   CLI::Option* in = nullptr;
   if (evaluates != topics().end()) {
     in = app.add_option("--input", input,
-                        std::string(evaluates->name) + " only: a CSV file of rows to evaluate")->type_name("FILE");
+                        std::string(evaluates->name) + " only: a CSV file of rows to evaluate")
+             ->type_name("FILE");
     auto* to =
-        app.add_option("--output", output, "where they go with their result appended; nothing else is done")->type_name("FILE");
+        app.add_option("--output", output, "where they go with their result appended; nothing else is done")
+            ->type_name("FILE");
     in->needs(to);
     to->needs(in);
   }
@@ -135,7 +142,8 @@ int main_or_throw(int argc, char** argv) {
   for (const std::string& w : wanted) {
     if (w != "all" &&
         std::none_of(topics().begin(), topics().end(), [&w](const Topic& t) { return t.name == w; })) {
-      return bad(fmt::format("{}TOPIC: {}: there is no such topic{}, allowed: {}", kLeftOut, w, meant(w), names));
+      return bad(
+          fmt::format("{}TOPIC: {}: there is no such topic{}, allowed: {}", kLeftOut, w, meant(w), names));
     }
   }
   if (in != nullptr && in->count() > 0) {

@@ -32,7 +32,8 @@ int run(int argc, char** argv) {
     fmt::print(
         "Runs the servo of a scene through recorded ticks, once per variant, for counting instructions.\n"
         "Usage: punctum-tick-cost TAPE SCENE VARIANT...\n\n"
-        "Examples:\n  punctum-report scenes\n      records the tape and starts this program under callgrind\n\n"
+        "Examples:\n  punctum-report scenes\n      records the tape and starts this program under "
+        "callgrind\n\n"
         "Exit codes:\n  0  all variants were run\n  2  bad input\n");
     return 0;
   }

@@ -119,7 +119,8 @@ class Storing {
     }
     const auto it = given ? std::find(c.names.begin(), c.names.end(), *given) : c.names.end();
     if (it == c.names.end()) {
-      return shown(node_) + " is not one of the choices" + (given && c.quoted ? suggestion(*given, c.names) : "");
+      return shown(node_) + " is not one of the choices" +
+             (given && c.quoted ? suggestion(*given, c.names) : "");
     }
     c.set(static_cast<int>(it - c.names.begin()));
     return {};

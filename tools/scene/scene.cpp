@@ -163,8 +163,8 @@ tl::expected<Scene, std::string> load_scene(std::string_view name_or_path,
     Scene scene;
     scene.name = name_or_path;
     scene.source = "built-in";
-    return read_all(std::move(scene), *text, fmt::format("{}.toml", name_or_path), overrides,
-                    shipped_files(), known_backends());
+    return read_all(std::move(scene), *text, fmt::format("{}.toml", name_or_path), overrides, shipped_files(),
+                    known_backends());
   }
   const fs::path path(name_or_path);
   const auto text = text_of(path, name_or_path);

@@ -27,14 +27,17 @@ class PlainHelp : public CLI::Formatter {
   std::string make_option_opts(const CLI::Option* option) const override {
     // What checks the value stands behind a colon; that of a positional is its own name.
     const std::string full = option->get_type_name(), type = full.substr(0, full.find(':'));
-    return option->get_positional() || option->get_type_size() == 0 || type.empty() ? std::string() : " " + type;
+    return option->get_positional() || option->get_type_size() == 0 || type.empty() ? std::string()
+                                                                                    : " " + type;
   }
   std::string make_usage(const CLI::App* app, std::string name) const override {
     std::string usage = "Usage: " + name;
-    for (const CLI::Option* o : app->get_options([](const CLI::Option* one) { return one->get_positional(); })) {
+    for (const CLI::Option* o :
+         app->get_options([](const CLI::Option* one) { return one->get_positional(); })) {
       usage += " " + o->get_name(true) + (o->get_expected_max() > 1 ? "..." : "");
     }
-    usage += app->get_subcommands([](const CLI::App*) { return true; }).empty() ? " [options]" : " COMMAND ...";
+    usage +=
+        app->get_subcommands([](const CLI::App*) { return true; }).empty() ? " [options]" : " COMMAND ...";
     return usage + "\n";
   }
 };
@@ -73,7 +76,8 @@ std::string unknown_option(const CLI::App& app, int argc, char** argv) {
       break;
     }
     if (name.starts_with("--") && std::find(known.begin(), known.end(), name) == known.end()) {
-      return fmt::format("{}: unknown option{}, allowed: {}", name, suggestion(name, known), fmt::join(known, ", "));
+      return fmt::format("{}: unknown option{}, allowed: {}", name, suggestion(name, known),
+                         fmt::join(known, ", "));
     }
   }
   return {};
@@ -84,9 +88,10 @@ std::string what_is_wrong(const CLI::App& app, const CLI::ParseError& error, int
   const std::string first = argc > 1 ? argv[1] : "";
   if (!commands.empty() && (first.empty() || first[0] != '-') &&
       std::find(commands.begin(), commands.end(), first) == commands.end()) {
-    return first.empty() ? fmt::format("a command is missing, allowed: {}; --help tells more", fmt::join(commands, ", "))
-                         : fmt::format("{}: unknown command{}, allowed: {}", first, suggestion(first, commands),
-                                       fmt::join(commands, ", "));
+    return first.empty() ? fmt::format("a command is missing, allowed: {}; --help tells more",
+                                       fmt::join(commands, ", "))
+                         : fmt::format("{}: unknown command{}, allowed: {}", first,
+                                       suggestion(first, commands), fmt::join(commands, ", "));
   }
   if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr ||
       dynamic_cast<const CLI::RequiredError*>(&error) != nullptr) {

@@ -1,5 +1,5 @@
-// The command line of every program: help in plain words with examples and exit codes, one line for a mistake,
-// and the option or command that was probably meant.
+// The command line of every program: help in plain words with examples and exit codes, one line for a
+// mistake, and the option or command that was probably meant.
 #pragma once
 
 #include <CLI/CLI.hpp>

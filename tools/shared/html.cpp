@@ -11,7 +11,12 @@ constexpr const char* kNoText = "\xEF\xBF\xBD";  // U+FFFD
 // The length of the UTF-8 letter at the start of s; 0 if there is none.
 std::size_t letter_length(std::string_view s) {
   const auto first = static_cast<unsigned char>(s[0]);
-  const std::size_t n = first < 0x80 ? 1 : first < 0xC2 ? 0 : first < 0xE0 ? 2 : first < 0xF0 ? 3 : first < 0xF5 ? 4 : 0;
+  const std::size_t n = first < 0x80   ? 1
+                        : first < 0xC2 ? 0
+                        : first < 0xE0 ? 2
+                        : first < 0xF0 ? 3
+                        : first < 0xF5 ? 4
+                                       : 0;
   if (n > s.size()) {
     return 0;
   }
@@ -22,8 +27,8 @@ std::size_t letter_length(std::string_view s) {
   }
   // Overlong forms, surrogates and what lies beyond Unicode.
   const auto second = n > 1 ? static_cast<unsigned char>(s[1]) : 0U;
-  if ((first == 0xE0 && second < 0xA0) || (first == 0xED && second > 0x9F) || (first == 0xF0 && second < 0x90) ||
-      (first == 0xF4 && second > 0x8F)) {
+  if ((first == 0xE0 && second < 0xA0) || (first == 0xED && second > 0x9F) ||
+      (first == 0xF0 && second < 0x90) || (first == 0xF4 && second > 0x8F)) {
     return 0;
   }
   return n;

@@ -64,8 +64,8 @@ void yield_to_core(const Scene& scene) {
   }
 }
 
-// One vision process: the camera of a scene, what is made of its frames, and who gets it. Set up once, part by
-// part; then one round per frame.
+// One vision process: the camera of a scene, what is made of its frames, and who gets it. Set up once, part
+// by part; then one round per frame.
 class LiveVision {
  public:
   explicit LiveVision(const LiveOptions& options) : options_(options) {}
@@ -189,7 +189,8 @@ Opened LiveVision::join_station() {
     return tl::unexpected(attached.error());
   }
   bench_ = std::move(*attached);
-  auto answers = hal::Shared<sim::CameraAnswers>::attach(kCameraSegment, segments->descriptor(kCameraSegment));
+  auto answers =
+      hal::Shared<sim::CameraAnswers>::attach(kCameraSegment, segments->descriptor(kCameraSegment));
   if (!answers) {
     return tl::unexpected(answers.error());
   }
@@ -253,8 +254,7 @@ Opened LiveVision::open_files() {
     std::filesystem::create_directories(options_.overlay, error);
     overlays_ = !error;
     if (error) {
-      go_on_without(rt::ObservationSegment::frames,
-                    fmt::format("{}: {}", options_.overlay, error.message()));
+      go_on_without(rt::ObservationSegment::frames, fmt::format("{}: {}", options_.overlay, error.message()));
     }
   }
   return {};
@@ -331,8 +331,7 @@ void LiveVision::tell_unusable(const hal::Frame& frame, double t_s) {
 LiveVision::Seen LiveVision::look_at(const hal::Frame& frame) {
   Seen seen;
   if (truth_only_) {
-    seen.observation =
-        observe_truth(sim_camera_->truth(), frame.sequence, frame.exposure_ns, truth_before_);
+    seen.observation = observe_truth(sim_camera_->truth(), frame.sequence, frame.exposure_ns, truth_before_);
     truth_before_ = sim_camera_->truth();
     return seen;
   }
@@ -360,8 +359,8 @@ void LiveVision::publish(const hal::Frame& frame, const rt::Observation& observa
   if (frame.deliver_ns > 0) {
     wait_until(frame.deliver_ns);
   }
-  const auto told = liar_ ? liar_->tell(sim_camera_->snapshot(), observation)
-                          : std::optional<rt::Observation>(observation);
+  const auto told =
+      liar_ ? liar_->tell(sim_camera_->snapshot(), observation) : std::optional<rt::Observation>(observation);
   if (told) {
     (*station_)->slot.push(*told);
   }
@@ -381,9 +380,8 @@ void LiveVision::record(const hal::Frame& frame, const Seen& seen) {
     }
   }
   if (seen.picture) {
-    const auto written =
-        write_picture(fmt::format("{}/{:06}.jpg", options_.overlay, frame.sequence),
-                      vision::draw_overlay(*seen.picture, *seen.result, *scene_->vision));
+    const auto written = write_picture(fmt::format("{}/{:06}.jpg", options_.overlay, frame.sequence),
+                                       vision::draw_overlay(*seen.picture, *seen.result, *scene_->vision));
     if (!written) {
       go_on_without(rt::ObservationSegment::frames, written.error());
       overlays_ = false;

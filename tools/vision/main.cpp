@@ -34,40 +34,39 @@ int run(int argc, char** argv) {
   std::vector<int> roi;
   std::vector<double> seed;
   CLI::App* track = app.add_subcommand("track", "follow recorded frames");
-  track->add_option("--frames", t.frames, "folder, glob, picture or video file")->required()
+  track->add_option("--frames", t.frames, "folder, glob, picture or video file")
+      ->required()
       ->type_name("FOLDER|GLOB|FILE");
-  track->add_option("--scene", t.scene, "built-in name or scene file")->required()
-      ->type_name("SCENE");
-  track->add_option("--set", t.overrides, "change the scene; may be repeated")->take_all()
+  track->add_option("--scene", t.scene, "built-in name or scene file")->required()->type_name("SCENE");
+  track->add_option("--set", t.overrides, "change the scene; may be repeated")
+      ->take_all()
       ->type_name("TABLE.KEY=VALUE");
-  track->add_option("--out", t.out, "table of what was found, a row per frame (obs.csv)")->required()
+  track->add_option("--out", t.out, "table of what was found, a row per frame (obs.csv)")
+      ->required()
       ->type_name("FILE");
-  track->add_option("--contours", t.contours, "table of the contours (contours.csv)")
-      ->type_name("FILE");
-  track->add_option("--overlay", t.overlay, "folder for annotated frames")
-      ->type_name("FOLDER");
-  track->add_option("--fps", t.fps, "frames per second, where the file does not say")->check(CLI::Range(0.001, 1e6))
+  track->add_option("--contours", t.contours, "table of the contours (contours.csv)")->type_name("FILE");
+  track->add_option("--overlay", t.overlay, "folder for annotated frames")->type_name("FOLDER");
+  track->add_option("--fps", t.fps, "frames per second, where the file does not say")
+      ->check(CLI::Range(0.001, 1e6))
       ->type_name("RATE");
-  track->add_option("--roi", roi, "the part of the picture to look at, in pixels")->delimiter(',')->expected(4)
+  track->add_option("--roi", roi, "the part of the picture to look at, in pixels")
+      ->delimiter(',')
+      ->expected(4)
       ->type_name("X,Y,WIDTH,HEIGHT");
   track->add_option("--seed-circle", seed, "where the outer membrane is, in pixels")
       ->delimiter(',')
       ->expected(3)
       ->type_name("X,Y,R");
-  track->add_option("--template", t.holder_template, "picture of the holding pipette")
-      ->type_name("FILE");
+  track->add_option("--template", t.holder_template, "picture of the holding pipette")->type_name("FILE");
 
   tools::LiveOptions l;
   CLI::App* live = app.add_subcommand("live", "observe for a running station (`punctum run` starts this)");
-  live->add_option("--scene", l.scene, "resolved scene file")->required()
-      ->type_name("FILE");
+  live->add_option("--scene", l.scene, "resolved scene file")->required()->type_name("FILE");
   live->add_option("--segments", l.segments, "inherited segments of the station")
       ->required()
       ->type_name("NAME=DESCRIPTOR,...");
-  live->add_option("--out", l.out, "table of what was found (obs.csv)")
-      ->type_name("FILE");
-  live->add_option("--overlay", l.overlay, "folder for annotated frames")
-      ->type_name("FOLDER");
+  live->add_option("--out", l.out, "table of what was found (obs.csv)")->type_name("FILE");
+  live->add_option("--overlay", l.overlay, "folder for annotated frames")->type_name("FOLDER");
 
   track->footer(tools::help_footer({}, exit_codes));
   live->footer(tools::help_footer({}, exit_codes));

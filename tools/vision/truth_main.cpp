@@ -91,7 +91,8 @@ int run(int argc, char** argv) {
     tools::say(
         "Vision of a build without OpenCV: observes the truth of the simulated world.\n"
         "Usage: punctum-vision live --scene FILE --segments NAME=DESCRIPTOR,...\n\n"
-        "Examples:\n  punctum run icsi --set vision.method=truth\n      starts this program as it should be\n\n"
+        "Examples:\n  punctum run icsi --set vision.method=truth\n      starts this program as it should "
+        "be\n\n"
         "Exit codes:\n  0  the run has ended\n  1  the camera was lost\n  2  bad input\n");
     return tools::exit_done;
   }
@@ -131,8 +132,7 @@ int run(int argc, char** argv) {
   sim::BenchClock clock(**bench);
   waiting_clock = &clock;
   sim::SimCamera camera(*scene->sim, **bench, **answers, sim::SimCamera::Picture::none);
-  const int code =
-      observe(camera, clock, **bench, **observations, tools::VisionLiar(scene->sim->seed));
+  const int code = observe(camera, clock, **bench, **observations, tools::VisionLiar(scene->sim->seed));
   waiting_clock = nullptr;
   return code;
 }

@@ -1,5 +1,7 @@
-// The report that a lab keeps and the terminal's words: what they say, and that nothing in a scene or a file can
-// make a page do more than show it.
+// The report that a lab keeps and the terminal's words: what they say, and that nothing in a scene or a file
+// can make a page do more than show it.
+#include "tools/punctum/lab_report.hpp"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -14,7 +16,6 @@
 
 #include "tools/punctum/event_log.hpp"
 #include "tools/punctum/fault_advice.hpp"
-#include "tools/punctum/lab_report.hpp"
 #include "tools/punctum/rebuilt_facts.hpp"
 #include "tools/punctum/run_page.hpp"
 #include "tools/punctum/run_sentence.hpp"
@@ -46,7 +47,9 @@ class Folder {
   fs::path path_;
 };
 
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
 
 // ---- the page ----
 
@@ -97,9 +100,10 @@ TEST(Page, needs_no_network_no_script_and_no_file_beside_it) {
 }
 
 TEST(Page, of_facts_that_are_missing_or_of_another_kind_is_a_page_still) {
-  for (const char* text :
-       {"{}", R"({"phases":3,"events":"x","machine":[],"cells":null,"seconds":"long"})",
-        R"({"phases":[1,null],"events":[{}],"faults":[{"name":7}],"needle_at_end":[],"dose":1,"not_kept":{}})"}) {
+  for (
+      const char* text :
+      {"{}", R"({"phases":3,"events":"x","machine":[],"cells":null,"seconds":"long"})",
+       R"({"phases":[1,null],"events":[{}],"faults":[{"name":7}],"needle_at_end":[],"dose":1,"not_kept":{}})"}) {
     const Json facts = Json::parse(text);
     EXPECT_TRUE(contains(run_page("/nowhere", facts, ""), "</html>")) << text;
     EXPECT_TRUE(contains(comparison_page({{"a", facts, {}}, {"b", facts, {}}}), "</html>")) << text;
@@ -114,12 +118,13 @@ TEST(Page, a_comparison_gives_mean_and_standard_deviation) {
 
 TEST(Text, inside_html_loses_what_is_no_text) {
   EXPECT_EQ(escaped("a<b & \"c\" 'd'"), "a&lt;b &amp; &quot;c&quot; &#39;d&#39;");
-  EXPECT_EQ(escaped("caf\xC3\xA9 \xE2\x82\xAC \xF0\x9F\x94\xAC"), "caf\xC3\xA9 \xE2\x82\xAC \xF0\x9F\x94\xAC");
+  EXPECT_EQ(escaped("caf\xC3\xA9 \xE2\x82\xAC \xF0\x9F\x94\xAC"),
+            "caf\xC3\xA9 \xE2\x82\xAC \xF0\x9F\x94\xAC");
   const std::string no_text = "\xEF\xBF\xBD";
   EXPECT_EQ(escaped("\033[31m"), no_text + "[31m");
-  EXPECT_EQ(escaped("caf\xE9!"), "caf" + no_text + "!");                  // Latin 1
-  EXPECT_EQ(escaped("\xC0\xBC"), no_text + no_text);                      // '<' in two bytes
-  EXPECT_EQ(escaped("\xED\xA0\x80"), no_text + no_text + no_text);        // half of a surrogate pair
+  EXPECT_EQ(escaped("caf\xE9!"), "caf" + no_text + "!");            // Latin 1
+  EXPECT_EQ(escaped("\xC0\xBC"), no_text + no_text);                // '<' in two bytes
+  EXPECT_EQ(escaped("\xED\xA0\x80"), no_text + no_text + no_text);  // half of a surrogate pair
   EXPECT_EQ(escaped("cut \xE2\x82"), "cut " + no_text + no_text);
 }
 
@@ -166,10 +171,11 @@ TEST(Sentence, every_end_has_its_own) {
 }
 
 TEST(Sentence, says_where_the_needle_is_and_what_was_given) {
-  const std::string s = run_sentence({{"outcome", "stopped"},
-                                      {"seconds", 9},
-                                      {"needle_at_end", {{"where", "inside"}, {"in_words", "INSIDE THE CELL, 23.1 um"}}},
-                                      {"dose", {{"asked_s", 1.5}, {"given_s", 0.39}}}});
+  const std::string s =
+      run_sentence({{"outcome", "stopped"},
+                    {"seconds", 9},
+                    {"needle_at_end", {{"where", "inside"}, {"in_words", "INSIDE THE CELL, 23.1 um"}}},
+                    {"dose", {{"asked_s", 1.5}, {"given_s", 0.39}}}});
   EXPECT_TRUE(contains(s, "INSIDE THE CELL, 23.1 um")) << s;
   EXPECT_TRUE(contains(s, "0.39 s of 1.50 s")) << s;
 }
@@ -225,8 +231,12 @@ TEST(Drawing, a_gap_stays_a_gap) {
 }
 
 TEST(Drawing, a_histogram_counts_every_tick) {
-  const std::string s = svg(TimesHistogram{
-      .title = "t", .from_us = {0, 1, 2, 500}, .count = {10, 20, 5, 1}, .over = 4, .p50_us = 2, .max_us = 9000});
+  const std::string s = svg(TimesHistogram{.title = "t",
+                                           .from_us = {0, 1, 2, 500},
+                                           .count = {10, 20, 5, 1},
+                                           .over = 4,
+                                           .p50_us = 2,
+                                           .max_us = 9000});
   EXPECT_TRUE(contains(s, "40 ticks, longest 9000 us"));
   EXPECT_TRUE(contains(s, "4 longer ones"));
 }
@@ -235,12 +245,16 @@ TEST(Drawing, a_histogram_counts_every_tick) {
 
 TEST(Rebuilt, from_a_table_that_is_cut_off_in_the_middle_of_a_row) {
   const Folder folder;
-  const std::string columns = "t_s,phase,x_m,fx_N,fy_N,fz_N,wd_m,fault,cell,alarms,tip_force_N,true_force_N,true_gap_m,true_contact,true_punctured,true_lost\n";
-  folder.put("samples.csv", columns + "0.000,free,0,0,0,0,0,none,0,0,0,0,2e-05,0,0,0\n"
-                                      "0.001,contact,0,0.3,0,0.4,1e-06,none,0,0,1e-06,2e-06,-3e-06,1,0,0\n"
-                                      "0.002,indentation,0,0,0,0.1,5e-06,none,0,0,1e-06,3e-06,-9e-06,1,0,0\n"
-                                      "0.003,indent");
-  folder.put("events.csv", std::string(kEventColumns) + "0.001000,101,phase,contact,0,,,\n0.002000,102,alarm_on,sen");
+  const std::string columns =
+      "t_s,phase,x_m,fx_N,fy_N,fz_N,wd_m,fault,cell,alarms,tip_force_N,true_force_N,true_gap_m,true_contact,"
+      "true_punctured,true_lost\n";
+  folder.put("samples.csv", columns +
+                                "0.000,free,0,0,0,0,0,none,0,0,0,0,2e-05,0,0,0\n"
+                                "0.001,contact,0,0.3,0,0.4,1e-06,none,0,0,1e-06,2e-06,-3e-06,1,0,0\n"
+                                "0.002,indentation,0,0,0,0.1,5e-06,none,0,0,1e-06,3e-06,-9e-06,1,0,0\n"
+                                "0.003,indent");
+  folder.put("events.csv",
+             std::string(kEventColumns) + "0.001000,101,phase,contact,0,,,\n0.002000,102,alarm_on,sen");
   const Json facts = rebuilt_facts(folder.path());
   EXPECT_EQ(facts["rebuilt"], true);
   EXPECT_EQ(facts["outcome"], "unknown");
@@ -277,7 +291,9 @@ class LiveLine : public testing::Test {
     sample.obs_age_s = 0.05;
     core->missed.store(3);
   }
-  [[nodiscard]] std::string line(const LineStyle& style) const { return progress_line(scene, sample, *core, style); }
+  [[nodiscard]] std::string line(const LineStyle& style) const {
+    return progress_line(scene, sample, *core, style);
+  }
 
   Scene scene = *load_scene("icsi");
   rt::TelemetrySample sample;
@@ -286,7 +302,8 @@ class LiveLine : public testing::Test {
 
 TEST_F(LiveLine, says_phase_force_depth_vision_and_what_time_is_left) {
   const std::string s = line({});
-  for (const char* part : {"12.3 s", "indentation", "###", "1.00 N", "depth   7.5 um", "vision ok", "s left"}) {
+  for (const char* part :
+       {"12.3 s", "indentation", "###", "1.00 N", "depth   7.5 um", "vision ok", "s left"}) {
     EXPECT_TRUE(contains(s, part)) << part << " in " << s;
   }
   EXPECT_FALSE(contains(s, "\033")) << s;

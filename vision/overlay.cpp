@@ -45,15 +45,35 @@ class Canvas {
   void text(const std::string& s, const cv::Scalar& colour) {  // below the last text
     const double font = std::clamp(picture_.cols / 1100.0, 0.35, 1.0);
     next_text_y_ += next_text_y_ == 0 ? static_cast<int>(22 * font) + 4 : static_cast<int>(26 * font) + 4;
-    for (const auto& [c, width] : {std::pair{cv::Scalar(0, 0, 0), 3}, std::pair{colour, 1}}) {
-      cv::putText(picture_, s, cv::Point(6, next_text_y_), cv::FONT_HERSHEY_SIMPLEX, font, c, width,
-                  cv::LINE_AA);
-    }
+    put(s, cv::Point(6, next_text_y_), font, colour);
+  }
+  // A round length of about a fifth of the picture, at its lower right.
+  void scale_bar(double um_per_px) {
+    const double um = round_length(um_per_px * picture_.cols / scale_ / 5);
+    const int length = static_cast<int>(std::lround(um / um_per_px * scale_));
+    const double font = std::clamp(picture_.cols / 1100.0, 0.35, 1.0);
+    const int right = picture_.cols - 16, y = picture_.rows - 14, high = std::max(3, picture_.cols / 250);
+    cv::rectangle(picture_, {right - length - 1, y - 1}, {right + 1, y + high + 1}, cv::Scalar(0, 0, 0),
+                  cv::FILLED);
+    cv::rectangle(picture_, {right - length, y}, {right, y + high}, kWhite, cv::FILLED);
+    char label[32];
+    std::snprintf(label, sizeof label, "%g um", um);
+    put(label, cv::Point(right - length, y - 8), font, kWhite);
   }
   [[nodiscard]] const cv::Mat& picture() const { return picture_; }
 
  private:
   static constexpr int kShift = 4;
+  // 1, 2 or 5 times a power of ten, not above it.
+  static double round_length(double v) {
+    const double power = std::pow(10.0, std::floor(std::log10(v)));
+    return power * (v < 2 * power ? 1 : v < 5 * power ? 2 : 5);
+  }
+  void put(const std::string& s, const cv::Point& at, double font, const cv::Scalar& colour) {
+    for (const auto& [c, width] : {std::pair{cv::Scalar(0, 0, 0), 3}, std::pair{colour, 1}}) {
+      cv::putText(picture_, s, at, cv::FONT_HERSHEY_SIMPLEX, font, c, width, cv::LINE_AA);
+    }
+  }
   // The centre of pixel 0 is at (scale - 1) / 2 of the enlarged picture.
   [[nodiscard]] cv::Point at(const Point& p) const {
     const auto fixed_point = [this](double v) {
@@ -132,6 +152,9 @@ cv::Mat draw_overlay(const cv::Mat& grey, const Result& result, const VisionConf
   draw_indentation(canvas, result);
   canvas.text(measures_of(result, config.pixel_m * 1e6), kWhite);
   canvas.text(result.verdict, result.verdict == "ok" ? kGreen : kWhite);
+  if (config.pixel_m > 0) {
+    canvas.scale_bar(config.pixel_m * 1e6);
+  }
   return canvas.picture();
 }
 

@@ -43,6 +43,29 @@ constexpr double kTimeToRest_s = 2;              // after that, for the forces t
 constexpr std::int64_t kSetUp_ns = 200'000'000;  // from the start of the devices to the first tick
 constexpr int kSignalsToInsist = 3;  // this many end the loop at once; the first is a commanded stop
 
+constexpr const char* kHelp =
+    "The control core: reads hand and stage, computes the force, moves the needle, at the rate of the "
+    "scene.\n"
+    "`punctum run` starts it and gives it its segments of shared memory; nobody starts it by hand.\n"
+    "Usage: punctum-core --scene FILE --segments NAME=DESCRIPTOR,... --clock real|virtual\n"
+    "\n"
+    "Options:\n"
+    "  -h,--help                   this help\n"
+    "  --version                   version and commit\n"
+    "  --scene FILE                the resolved scene\n"
+    "  --segments NAME=DESCRIPTOR,...  inherited segments of the station\n"
+    "  --clock real|virtual        whose time it keeps\n"
+    "\n"
+    "Examples:\n"
+    "  punctum run icsi\n"
+    "      starts this program as it should be\n"
+    "\n"
+    "Exit codes:\n"
+    "  0  the task ended well\n"
+    "  1  it ended without a fault, but is not done\n"
+    "  2  bad input: nothing has moved\n"
+    "  3  a latched fault\n";
+
 std::atomic<bool> end_loop{false};
 std::atomic<sim::VirtualClock*> waiting_clock{nullptr};
 static_assert(std::atomic<bool>::is_always_lock_free && std::atomic<sim::VirtualClock*>::is_always_lock_free);
@@ -212,6 +235,10 @@ tl::expected<StationSegments, std::string> attach_station(const tools::HandedSeg
 int run(int argc, char** argv) {
   if (argc == 2 && std::string_view(argv[1]) == "--version") {
     tools::say(tools::version_line("punctum-core") + "\n");
+    return tools::all_was_said() ? tools::exit_done : tools::exit_not_done;
+  }
+  if (argc == 2 && (std::string_view(argv[1]) == "--help" || std::string_view(argv[1]) == "-h")) {
+    tools::say(kHelp);
     return tools::all_was_said() ? tools::exit_done : tools::exit_not_done;
   }
   stop_signal::watch({SIGTERM, SIGINT, SIGHUP, SIGQUIT}, on_stop_signal);

@@ -5,11 +5,14 @@
 #include <cstdlib>
 #include <exception>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tools/punctum/explain.hpp"
+#include "tools/punctum/lab_report.hpp"
 #include "tools/punctum/supervisor.hpp"
 #include "tools/scene/scene.hpp"
+#include "tools/shared/command_line.hpp"
 #include "tools/shared/exit_codes.hpp"
 #include "tools/shared/say.hpp"
 #include "tools/shared/version.hpp"
@@ -18,16 +21,31 @@ namespace {
 
 using namespace punctum::tools;
 
+std::vector<std::pair<int, const char*>> exit_codes_of_run() {
+  return {{exit_done, "the task ended well"},
+          {exit_not_done, "it ended without a fault, but is not done, or its report is not complete"},
+          {exit_bad_input, "bad input: nothing was started"},
+          {exit_fault, "a latched fault, or a control core that died"}};
+}
+
 int bad(const std::string& text) {
   complain(text);
   return 2;
 }
 
 int main_or_throw(int argc, char** argv) {
-  CLI::App app{"Haptic cell injection: control core, simulated station and vision"};
+  CLI::App app{"Haptic cell injection: runs a scene on control core, station and vision, and reports.",
+               "punctum"};
+  set_help_style(app);
   app.require_subcommand(1);
-  app.set_version_flag("--version", version_line("punctum"));
-  app.failure_message([](const CLI::App*, const CLI::Error& e) { return std::string(e.what()) + "\n"; });
+  app.set_version_flag("--version", version_line("punctum"), "version and commit");
+  app.footer(help_footer(
+      {{"punctum run icsi", "one injection on the simulated station; its report goes to reports/"},
+       {"punctum run icsi --clock virtual --seed 7", "the same, as fast as possible and the same every time"},
+       {"punctum run my.toml --set servo.rate_hz=2000", "a scene of your own, one number changed"},
+       {"punctum explain zebrafish", "what would run, and what is left out"},
+       {"punctum report reports/a reports/b", "their reports once more, and the two compared"}},
+      exit_codes_of_run()));
   std::string scene_name;
   std::vector<std::string> overrides;
   std::string clock, seed, rate, seconds;
@@ -40,24 +58,28 @@ int main_or_throw(int argc, char** argv) {
       names += (names.empty() ? "" : ", ") + std::string(n);
     }
     sub->add_option("SCENE", scene_name, "a scene file, or one of: " + names)->required();
-    sub->add_option("--set", overrides, "table.key=value, or table=on|off; may be repeated")
+    sub->add_option("--set", overrides, "change the scene; or TABLE=on, TABLE=off; may be repeated")
+        ->type_name("TABLE.KEY=VALUE")
         ->allow_extra_args(false)
         ->take_all();
-    sub->add_option("--rate", rate, "servo rate in Hz: 1000, 2000, 4000 or 8000");
-    sub->add_option("--clock", clock, "real, or virtual: as fast as possible, the same every time")
-        ->check(CLI::IsMember({"real", "virtual"}));
-    sub->add_option("--seed", seed, "of the simulated world");
-    sub->add_option("--seconds", seconds, "time limit");
+    sub->add_option("--rate", rate, "of the servo: 1000, 2000, 4000 or 8000")->type_name("HZ");
+    sub->add_option("--clock", clock, "virtual: as fast as possible, the same every time")
+        ->check(CLI::IsMember({"real", "virtual"}))
+        ->type_name("real|virtual");
+    sub->add_option("--seed", seed, "of the simulated world: a whole number")->type_name("NUMBER");
+    sub->add_option("--seconds", seconds, "time limit of the run, in the scene's time")->type_name("SECONDS");
   };
   CLI::App* run = app.add_subcommand("run", "run a scene and write a report");
   common(run);
-  run->add_option("--report", settings.report, "folder of the report (default: reports/SCENE-DATE)");
+  run->add_option("--report", settings.report, "folder of the report (default: reports/SCENE-DATE)")
+      ->type_name("FOLDER");
   run->add_flag("--overwrite", settings.overwrite,
                 "the new report takes the place of the one in --report once it is whole; without, it gets a "
                 "new folder");
   run->add_option("--samples-every", settings.samples_every,
-                  "write every n-th tick to samples.csv (0: choose)")
-      ->check(CLI::Range(0, 1'000'000'000));
+                  "write every n-th tick to samples.csv (default: all, of long runs fewer)")
+      ->check(CLI::Range(0, 1'000'000'000))
+      ->type_name("TICKS");
   run->add_flag("--no-frames", no_frames, "write no annotated frames");
   run->add_flag("--no-figure", no_figure, "draw no figure");
   run->add_flag("--quiet", settings.quiet, "no progress, only the summary");
@@ -69,11 +91,36 @@ int main_or_throw(int argc, char** argv) {
       app.add_subcommand("check", "validate a scene, devices and permissions; touches no actuator");
   common(checking);
 
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    const int code = app.exit(e);
-    return code != 0 ? exit_bad_input : all_was_said() ? exit_done : exit_not_done;
+  CLI::App* reporting = app.add_subcommand(
+      "report", "make report.html again, after a crash report.json too; of several runs also compare them");
+  std::vector<std::string> folders;
+  std::string comparison;
+  reporting->add_option("FOLDER", folders, "report folders of runs")->required();
+  reporting
+      ->add_option("--out", comparison, "where the comparison goes (default: reports/comparison-DATE.html)")
+      ->type_name("FILE");
+  run->footer(
+      help_footer({{"punctum run icsi --report reports/mine", "the report goes to that folder"},
+                   {"punctum run recorded --set camera.frames=my/pictures", "vision on your own pictures"},
+                   {"NO_COLOR=1 punctum run icsi", "without colour on the terminal"}},
+                  exit_codes_of_run()));
+  explaining->footer(help_footer({{"punctum explain icsi --keys", "every number that can be set"}},
+                                 {{exit_done, "explained"}, {exit_bad_input, "bad input"}}));
+  checking->footer(
+      help_footer({{"punctum check my.toml", "before the first run on a machine"}},
+                  {{exit_done, "it can run"}, {exit_bad_input, "it cannot; the text says why"}}));
+  reporting->footer(
+      help_footer({{"punctum report reports/icsi-20260101-120000", "after a crash, or from an older version"},
+                   {"punctum report reports/icsi-*", "all of them, compared in a table with figures"}},
+                  {{exit_done, "written"},
+                   {exit_not_done, "a report could not be written"},
+                   {exit_bad_input, "bad input"}}));
+
+  if (const auto code = parse_command_line(app, argc, argv)) {
+    return *code;
+  }
+  if (*reporting) {
+    return report_folders(folders, comparison);
   }
 
   // Options are overrides too, so that their messages are the same.

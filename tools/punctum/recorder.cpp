@@ -4,11 +4,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
+#include <cstddef>
 #include <iterator>
 #include <string>
 #include <utility>
 
 #include "rt/forces/list.hpp"
+#include "tools/punctum/event_log.hpp"
 
 namespace punctum::tools {
 namespace {
@@ -42,6 +45,7 @@ std::string columns() {
 // In virtual time the core may be as fast as the recorder: the caller has other work between two rounds.
 constexpr std::uint64_t kMostTicksPerRound = 4096;
 
+constexpr std::chrono::milliseconds kFlushed{500};  // so long at most a row waits for its file
 constexpr double kBeforeFault_s = 2;
 constexpr double kAfterFault_s = 0.5;
 constexpr int kMostFaultsKept = 20;  // a station that is reset again and again fills no disk
@@ -71,6 +75,11 @@ Recorder::Recorder(RowFile file, const std::string& folder, const Scene& scene, 
       ticks_after_fault_(static_cast<std::uint64_t>(kAfterFault_s * scene.servo.rate_Hz)) {
   samples_.file = std::move(file);
   samples_.file.append(columns());
+  // Without it the run loses nothing but what a crash would leave.
+  if (auto opened = RowFile::open(folder + "/events.csv", RowFile::Begin::empty)) {
+    events_table_.file = std::move(*opened);
+    events_table_.file.append(kEventColumns);
+  }
   if (bench != nullptr) {
     taker_ = std::make_unique<sim::SnapshotTaker>(*bench);
     taker_->attach();
@@ -86,8 +95,10 @@ std::uint64_t Recorder::drain(bool to_the_end) {
   rt::Event event;
   while (event_ring_.next(event) == hal::Read::ok) {
     events_.add(event);
+    events_table_.file.append(event_line(event));
   }
   events_.lost = event_ring_.lost();
+  flush_now_and_then();
   if (taker_ && to_the_end) {
     while (taker_->next(world_)) {
     }
@@ -113,6 +124,16 @@ const sim::Snapshot* Recorder::world_of(const rt::TelemetrySample& s) {
       return &world_;
     }
   }
+}
+
+void Recorder::flush_now_and_then() {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < flushed_ + kFlushed) {
+    return;
+  }
+  flushed_ = now;
+  flush(samples_, before_.t_s);
+  flush(events_table_, before_.t_s);
 }
 
 void Recorder::record(const rt::TelemetrySample& s, const sim::Snapshot* world) {
@@ -248,6 +269,7 @@ void Recorder::finish() {
   measures_.finish();
   flush(samples_, measures_.last_s);
   flush(fault_, measures_.last_s);
+  flush(events_table_, measures_.last_s);
 }
 
 }  // namespace punctum::tools

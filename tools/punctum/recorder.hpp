@@ -1,9 +1,11 @@
 // Writes samples.csv and feeds the measures: takes the telemetry and the events of the core and, when the
 // world is simulated, the snapshots of the bench, tick by tick. Under the virtual clock the same seed gives
 // the same bytes. However thin samples.csv is, fault.csv has every tick from two seconds before a fault to
-// half a second after it.
+// half a second after it. samples.csv and events.csv grow by whole rows, and are never more than half a
+// second old.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -59,6 +61,7 @@ class Recorder {
            sim::Bench* bench, std::uint64_t every);
   [[nodiscard]] const sim::Snapshot* world_of(const rt::TelemetrySample& s);  // null: there is none
   void record(const rt::TelemetrySample& s, const sim::Snapshot* world);
+  void flush_now_and_then();
   void record_fault(const rt::TelemetrySample& s, const sim::Snapshot* world);
   void row(Table& table, const rt::TelemetrySample& s, const sim::Snapshot* world);
   void flush(Table& table, double t_s);
@@ -77,6 +80,8 @@ class Recorder {
   hal::Follower<rt::TelemetryRing> telemetry_;
   hal::Follower<rt::EventRing> event_ring_;
   EventList events_;
+  Table events_table_{.name = "events.csv", .file = {}};
+  std::chrono::steady_clock::time_point flushed_{};
   std::unique_ptr<sim::SnapshotTaker> taker_;
   std::uint64_t every_;
   std::uint64_t rows_ = 0;

@@ -22,8 +22,9 @@ namespace fs = std::filesystem;
 
 // What a run writes, or has written in earlier versions.
 constexpr const char* kReportFiles[] = {
-    "samples.csv", "fault.csv", "obs.csv",    "contours.csv", "report.json", "scene.toml",  "figure.png",
-    "figure.svg",  "figure.gp", "figure.log", "core.log",     "vision.log",  "gnuplot.log", "reserve"};
+    "report.html",  "begun.json",  "events.csv", "samples.csv", "fault.csv",  "obs.csv",
+    "contours.csv", "report.json", "scene.toml", "figure.png",  "figure.svg", "figure.gp",
+    "figure.log",   "core.log",    "vision.log", "gnuplot.log", "reserve"};
 constexpr const char* kFrames = "frames";
 
 // A run that has written anything has written its resolved scene first.
@@ -77,10 +78,11 @@ bool lies_within(const fs::path& inner, const fs::path& outer) {
   return false;
 }
 
-// Pictures that vision has numbered, for example 000012.png.
+// Pictures that vision has numbered, for example 000012.jpg.
 bool is_annotated_frame(const fs::path& file) {
   const std::string stem = file.stem().string();
-  return file.extension() == ".png" && stem.size() >= 6 &&
+  const std::string ending = file.extension().string();
+  return (ending == ".png" || ending == ".jpg") && stem.size() >= 6 &&
          std::all_of(stem.begin(), stem.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 

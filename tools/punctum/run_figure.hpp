@@ -1,17 +1,14 @@
-// Force, depth and phases of a run over time.
+// Force, depth, phases, alarms and events of a run over its time.
 #pragma once
 
-#include <cstdint>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
-#include <tl/expected.hpp>
 
-#include "tools/punctum/measures.hpp"
-#include "tools/scene/scene.hpp"
+#include "tools/punctum/time_chart.hpp"
 
 namespace punctum::tools {
 
-// From FOLDER/samples.csv, which has `rows` rows, to FOLDER/figure.png. The error says why there is none.
-[[nodiscard]] tl::expected<std::string, std::string> draw_run(const std::string& folder, const Scene& scene,
-                                                              const Measures& m, std::uint64_t rows);
+// From FOLDER/samples.csv and the facts of report.json. A chart without panels: nothing was recorded.
+[[nodiscard]] TimeChart chart_of_run(const std::string& folder, const nlohmann::ordered_json& facts);
 
 }  // namespace punctum::tools

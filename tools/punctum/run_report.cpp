@@ -1,16 +1,19 @@
 #include "tools/punctum/run_report.hpp"
 
 #include <fmt/format.h>
-#include <sys/utsname.h>
 
 #include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <utility>
 
-#include "rt/forces/list.hpp"
+#include "tools/punctum/event_log.hpp"
+#include "tools/punctum/fault_advice.hpp"
+#include "tools/punctum/run_sentence.hpp"
+#include "tools/punctum/terminal.hpp"
 #include "tools/shared/csv.hpp"
-#include "tools/shared/whole_file.hpp"
+#include "tools/shared/exit_codes.hpp"
 
 namespace punctum::tools {
 namespace {
@@ -32,6 +35,18 @@ Json times(const H& h) {
           {"max", h.max_us()}};
 }
 
+// Of bins of 1 us those that are not empty.
+Json bins(const rt::TimeHistogram& h) {
+  Json from_us = Json::array(), count = Json::array();
+  for (std::size_t k = 0; k < rt::TimeHistogram::kBins; ++k) {
+    if (const std::uint64_t n = h.bin(k); n > 0) {
+      from_us.push_back(k);
+      count.push_back(n);
+    }
+  }
+  return {{"from_us", from_us}, {"count", count}, {"over", h.overflow()}};
+}
+
 std::vector<const rt::Right*> rights(const rt::CoreStatus& core) {
   std::vector<const rt::Right*> list;
   const auto n = std::min<std::uint64_t>(core.rights_count.load(), rt::kMaxRights);
@@ -39,50 +54,6 @@ std::vector<const rt::Right*> rights(const rt::CoreStatus& core) {
     list.push_back(&core.rights[i]);
   }
   return list;
-}
-
-// What an event is about, in words; a number where this program knows no word.
-std::string subject(const rt::Event& e) {
-  const auto named = [&e](auto limit, auto text) {
-    return e.what < static_cast<std::uint64_t>(limit) ? std::string(text(e.what)) : std::to_string(e.what);
-  };
-  switch (e.kind) {
-    case rt::Event::fault:
-    case rt::Event::fault_cleared:
-      return named(rt::kFaults, [](auto n) { return rt::name(static_cast<rt::Fault>(n)); });
-    case rt::Event::alarm_on:
-    case rt::Event::alarm_off:
-      return named(std::size(rt::kAlarmNames), [](auto n) { return rt::kAlarmNames[n]; });
-    case rt::Event::phase:
-      return named(rt::kPhases, [](auto n) { return rt::name(static_cast<rt::Phase>(n)); });
-    case rt::Event::command:
-    case rt::Event::command_refused:
-      return named(rt::kCommandKinds, [](auto n) { return rt::name(static_cast<rt::Command::Kind>(n)); });
-    case rt::Event::ended:
-      return named(rt::kRunEnds, [](auto n) { return rt::name(static_cast<rt::RunEnd>(n)); });
-    default:
-      return std::to_string(e.what);
-  }
-}
-
-Json event_row(const rt::Event& e) {
-  const bool known = e.kind < static_cast<std::uint64_t>(rt::kEventKinds);
-  Json row = {{"t_s", e.t_s},
-              {"tick", e.tick},
-              {"event", known ? rt::name(static_cast<rt::Event::Kind>(e.kind)) : "unknown"},
-              {"what", subject(e)}};
-  if (e.kind == rt::Event::phase) {
-    row["cell"] = e.value;
-  }
-  if (e.kind == rt::Event::command || e.kind == rt::Event::command_refused) {
-    row["value"] = number(e.value);
-    if (e.what == rt::Command::effect_gain && e.target < rt::effect_count) {
-      row["target"] = rt::effect_name(e.target);
-    }
-    row["writer"] =
-        e.writer < rt::kCommandWriterCount ? Json(rt::kCommandWriters[e.writer]->name) : Json(e.writer);
-  }
-  return row;
 }
 
 // How long so many ticks last.
@@ -134,6 +105,12 @@ std::optional<ContourError> read_contour_error(const std::string& obs_csv) {
   return e;
 }
 
+std::string fault_text(rt::Fault fault, double t_s) {
+  const FaultAdvice& advice = kFaultAdvice[static_cast<std::size_t>(fault)];
+  return fmt::format("FAULT {} at {:.3f} s: {}\n  what to do: {}\n  cleared:    {}", rt::name(fault), t_s,
+                     advice.cause, advice.next, clearing_condition(fault));
+}
+
 std::string missing_rights(const rt::CoreStatus& core) {
   std::string missing, advice;
   for (const auto* r : rights(core)) {
@@ -160,10 +137,9 @@ std::string missing_rights(const rt::CoreStatus& core) {
   return text;
 }
 
-tl::expected<void, std::string> write_report(const std::string& path, const Scene& scene,
-                                             const RunResult& result, const Measures& m,
-                                             const EventList& events, const rt::CoreStatus& core,
-                                             const std::optional<ContourError>& contour) {
+nlohmann::ordered_json report_facts(const Scene& scene, const RunResult& result, const Measures& m,
+                                    const EventList& events, const rt::CoreStatus& core,
+                                    const std::optional<ContourError>& contour) {
   Json j;
   j["outcome"] = rt::name(result.end);
   if (!result.detail.empty()) {
@@ -311,20 +287,24 @@ tl::expected<void, std::string> write_report(const std::string& path, const Scen
   }
   j["samples"] = {
       {"rows", result.rows}, {"every", result.rows_every}, {"lost", result.samples_lost}, {"gaps", m.gaps}};
-  utsname system{};
-  uname(&system);
-  j["machine"] = {{"kernel", std::string(system.release) + " " + system.version},
-                  {"architecture", system.machine}};
-  return write_whole(path, j.dump(2, ' ', false, Json::error_handler_t::replace) + '\n');
+  for (const auto& [name, histogram] :
+       {std::pair{"wake_histogram", &core.wake}, std::pair{"tick_histogram", &core.tick}}) {
+    j[name] = bins(*histogram);
+  }
+  j["sentence"] = run_sentence(j);
+  return j;
 }
 
 std::string summary(const Scene& scene, const RunResult& result, const Measures& m,
-                    const rt::CoreStatus& core, const std::optional<ContourError>& contour) {
+                    const rt::CoreStatus& core, const std::optional<ContourError>& contour, bool coloured) {
   std::string s;
   const auto line = [&s](const char* what, const std::string& text) {
     s += fmt::format("{:<16}{}\n", what, text);
   };
-  line("outcome", fmt::format("{}{} after {:.1f} s{}", rt::name(result.end),
+  const Colour mood = exit_code(result.end) == exit_done    ? Colour::good
+                      : exit_code(result.end) == exit_fault ? Colour::bad
+                                                            : Colour::warning;
+  line("outcome", fmt::format("{}{} after {:.1f} s{}", painted(mood, rt::name(result.end), coloured),
                               result.detail.empty() ? "" : " (" + result.detail + ")", m.last_s,
                               scene.clock == ClockKind::virtual_time
                                   ? fmt::format(" of virtual time, {:.1f} s real", result.wall_s)
@@ -360,9 +340,14 @@ std::string summary(const Scene& scene, const RunResult& result, const Measures&
       return v.n == 1 ? fmt::format("{:.3g} {}", v.mean * scale, unit)
                       : fmt::format("{:.3g} +- {:.2g} {}", v.mean * scale, v.deviation() * scale, unit);
     };
-    line("entry", fmt::format("lateral error {}, contact seen after {}, puncture after {}",
-                              value(m.lateral_error_m, 1e6, "um"), value(m.contact_delay_s, 1e3, "ms"),
-                              value(m.puncture_delay_s, 1e3, "ms")));
+    const auto told = [](const Spread& v, const char* what) {
+      return v.n > 0 ? after_or_before(v.mean * 1e3, what) +
+                           (v.n > 1 ? fmt::format(" (+- {:.2g} ms)", v.deviation() * 1e3) : "")
+                     : std::string("-");
+    };
+    line("entry", fmt::format("lateral error {}", value(m.lateral_error_m, 1e6, "um")));
+    line("contact", "told " + told(m.contact_delay_s, "the needle touched"));
+    line("puncture", "told " + told(m.puncture_delay_s, "the membrane gave way"));
     line("needle", fmt::format("peak force {:.1f} uN, depth {:.1f} um, beyond the puncture {}, withdrawal {}",
                                m.peak_force_N * 1e6, m.max_depth_m * 1e6,
                                value(m.beyond_puncture_m, 1e6, "um"), value(m.withdrawal_s, 1, "s")));
@@ -413,7 +398,9 @@ std::string summary(const Scene& scene, const RunResult& result, const Measures&
     line("alarms", alarms);
   }
   for (std::size_t i = 0; i < std::min<std::size_t>(m.faults.size(), 5); ++i) {
-    line("fault", fmt::format("{} at {:.3f} s", rt::name(m.faults[i].fault), m.faults[i].t_s));
+    line("fault",
+         painted(Colour::bad, fmt::format("{} at {:.3f} s", rt::name(m.faults[i].fault), m.faults[i].t_s),
+                 coloured));
   }
   for (const NotKept& n : result.not_kept) {
     line("not kept", fmt::format("{} from {:.3f} s on: {}", n.file, n.t_s, n.why));

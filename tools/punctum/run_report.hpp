@@ -1,10 +1,10 @@
-// report.json and the summary of a run on the screen.
+// The facts of report.json and the summary of a run on the screen.
 #pragma once
 
 #include <cstdint>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
-#include <tl/expected.hpp>
 #include <vector>
 
 #include "hal/sim/world.hpp"
@@ -37,15 +37,18 @@ struct RunResult {
   std::optional<sim::UnattendedEnd> unattended;  // what the devices did after the death of the core
 };
 
-[[nodiscard]] tl::expected<void, std::string> write_report(const std::string& path, const Scene& scene,
-                                                           const RunResult& result, const Measures& m,
-                                                           const EventList& events,
-                                                           const rt::CoreStatus& core,
-                                                           const std::optional<ContourError>& contour);
+// All of report.json but what was run and where, which lab_report.hpp adds.
+[[nodiscard]] nlohmann::ordered_json report_facts(const Scene& scene, const RunResult& result,
+                                                  const Measures& m, const EventList& events,
+                                                  const rt::CoreStatus& core,
+                                                  const std::optional<ContourError>& contour);
 // "inside the cell, 23.1 um past its membrane", "outside the cell", ...
 [[nodiscard]] std::string in_words(const Whereabouts& needle);
 [[nodiscard]] std::string summary(const Scene& scene, const RunResult& result, const Measures& m,
-                                  const rt::CoreStatus& core, const std::optional<ContourError>& contour);
+                                  const rt::CoreStatus& core, const std::optional<ContourError>& contour,
+                                  bool coloured);
+// A fault as it is latched: its cause, what to do, and what clears it.
+[[nodiscard]] std::string fault_text(rt::Fault fault, double t_s);
 // The rights the core did not get, and how to get them; empty when it has all it needs.
 [[nodiscard]] std::string missing_rights(const rt::CoreStatus& core);
 

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cctype>
 #include <chrono>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <thread>
 #include <utility>
@@ -21,9 +22,10 @@
 #include "tools/punctum/core_process.hpp"
 #include "tools/punctum/disk_space.hpp"
 #include "tools/punctum/judge.hpp"
+#include "tools/punctum/lab_report.hpp"
+#include "tools/punctum/provenance.hpp"
 #include "tools/punctum/recorder.hpp"
 #include "tools/punctum/report_folder.hpp"
-#include "tools/punctum/run_figure.hpp"
 #include "tools/punctum/run_report.hpp"
 #include "tools/punctum/terminal.hpp"
 #include "tools/punctum/vision_process.hpp"
@@ -229,6 +231,7 @@ class Run {
   }
   [[nodiscard]] const rt::CoreStatus& status() const { return segments_.core->status; }
   void watch_vision();
+  void tell_faults();
   void tell_progress();
   void tell_what_is_not_kept();
   [[nodiscard]] int refuse(const std::string& why);
@@ -236,7 +239,6 @@ class Run {
   void judge_end(const Ended& core);
   void let_devices_come_to_rest();
   int report();
-  [[nodiscard]] bool draw_figure();
 
   const Scene& scene_;
   const RunSettings& settings_;
@@ -251,10 +253,12 @@ class Run {
   std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
   bool vision_was_refused_ = false;
   bool rights_told_ = false;
+  std::size_t faults_told_ = 0;
   double next_progress_s_ = 0;
   std::size_t recorder_failures_ = 0;       // told so far
   std::uint64_t vision_does_not_keep_ = 0;  // likewise
   RunResult result_;
+  const nlohmann::ordered_json begun_facts_ = provenance(scene_);
 };
 
 int Run::run() {
@@ -268,6 +272,7 @@ int Run::run() {
   if (!report_folder_.note.empty()) {
     terminal_.say("{}", report_folder_.note);
   }
+  (void)write_begun(folder_, begun_facts_);
 
   // Recorded frames play from the core's first tick on; a camera is there before it.
   const bool vision_follows_core = scene_.recorded && scene_.clock == ClockKind::real;
@@ -285,6 +290,7 @@ int Run::run() {
   begun_ = std::chrono::steady_clock::now();
   const Ended core = watch_until_the_core_ends();
   recorder_.finish();
+  tell_faults();
   terminal_.clear_progress();
   if (core.exited && core.code == exit_bad_input) {  // it has not begun
     return refuse(fmt::format("punctum-core: {}", last_line(core_.log())));
@@ -381,23 +387,32 @@ void Run::tell_what_is_not_kept() {
   vision_does_not_keep_ |= now;
 }
 
+// As each is latched: what it means and what to do.
+void Run::tell_faults() {
+  for (const auto& faults = recorder_.measures().faults; faults_told_ < faults.size(); ++faults_told_) {
+    const Measures::Fault& f = faults[faults_told_];
+    terminal_.say("{}", painted(Colour::bad, fault_text(f.fault, f.t_s), terminal_.coloured()));
+  }
+}
+
 void Run::tell_progress() {
   const rt::CoreStatus& core = status();
   if (!rights_told_ && core.started.load() != 0) {
     rights_told_ = true;
     if (core.degraded.load() != 0 && scene_.clock == ClockKind::real) {
       if (const std::string text = missing_rights(core); !text.empty()) {
-        terminal_.say("{}", text);
+        terminal_.say("{}", painted(Colour::warning, text, terminal_.coloured()));
       }
     }
   }
+  tell_faults();
   if (settings_.quiet || now_s() < next_progress_s_) {
     return;
   }
   next_progress_s_ = now_s() + terminal_.progress_every_s();
   const Measures& m = recorder_.measures();
   if (m.ticks > 0) {
-    terminal_.progress(progress_line(scene_, m.last, core));
+    terminal_.progress(progress_line(scene_, m.last, core, terminal_.line_style()));
   }
 }
 
@@ -458,13 +473,14 @@ int Run::report() {
   result_.samples_lost = recorder_.lost();
   const auto contour = read_contour_error(folder_ + "/obs.csv");
   reserve_.give_back();
-  const auto write = [&] {
-    return write_report(folder_ + "/report.json", scene_, result_, m, recorder_.events(), status(), contour);
+  const auto facts = [&] {
+    return whole_facts(begun_facts_, report_facts(scene_, result_, m, recorder_.events(), status(), contour));
   };
-  auto written = write();
-  const bool drawn = settings_.figure && draw_figure();
-  if (settings_.figure && !drawn && !result_.not_kept.empty()) {
-    written = write();  // it tells that, too
+  auto written = write_report_json(folder_, facts());
+  if (auto page = write_report_page(folder_, facts(), settings_.figure); !page) {
+    terminal_.complain(page.error());
+    result_.not_kept.push_back({"report.html", m.last_s, page.error()});
+    written = write_report_json(folder_, facts());  // it tells that, too
   }
   if (!written) {
     terminal_.complain(written.error());
@@ -478,26 +494,14 @@ int Run::report() {
       written = tl::unexpected(moved.error());
     }
   }
-  std::string places = drawn ? fmt::format("figure          {}/figure.png\n", folder) : "";
-  places += written ? fmt::format("report          {}/report.json\n", folder) : "";
-  terminal_.print("\n" + summary(scene_, result_, m, status(), contour) + places);
+  const std::string places = written ? fmt::format("report          {}/report.html\n", folder) : "";
+  terminal_.print("\n" + summary(scene_, result_, m, status(), contour, terminal_.coloured()) + places);
   if (vision_was_refused_) {
     return exit_bad_input;
   }
   const bool complete = written && result_.not_kept.empty();
   const ExitCode code = exit_code(result_.end);
   return code == exit_done && !complete ? exit_not_done : code;
-}
-
-bool Run::draw_figure() {
-  const auto drawn = draw_run(folder_, scene_, recorder_.measures(), result_.rows);
-  if (!drawn) {
-    terminal_.complain(fmt::format("no figure: {}", drawn.error()));
-    if (drawn.error().find("cannot be written") != std::string::npos) {
-      result_.not_kept.push_back({"figure.png", recorder_.measures().last_s, drawn.error()});
-    }
-  }
-  return drawn.has_value();
 }
 
 }  // namespace

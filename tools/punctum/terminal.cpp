@@ -1,17 +1,99 @@
 #include "tools/punctum/terminal.hpp"
 
+#include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <string_view>
+#include <vector>
 
 #include "tools/shared/say.hpp"
 
 namespace punctum::tools {
-Terminal::Terminal() : is_terminal_(isatty(STDOUT_FILENO) != 0) {}
+namespace {
+
+constexpr std::size_t kBar = 10;           // letters
+constexpr std::size_t kUsualColumns = 80;  // of a terminal that does not tell
+
+// https://no-color.org: set and not empty, whatever the value.
+bool shows_colour(int file) {
+  const char* const no_color = std::getenv("NO_COLOR");
+  const char* const term = std::getenv("TERM");
+  const bool dumb = term == nullptr || std::string_view(term) == "dumb" || *term == '\0';
+  return isatty(file) != 0 && !dumb && (no_color == nullptr || *no_color == '\0');
+}
+
+// Of the locale, as the environment says it.
+bool writes_utf8() {
+  for (const char* variable : {"LC_ALL", "LC_CTYPE", "LANG"}) {
+    const char* const value = std::getenv(variable);
+    if (value != nullptr && *value != '\0') {
+      const std::string_view v = value;
+      return v.find("UTF-8") != std::string_view::npos || v.find("utf8") != std::string_view::npos;
+    }
+  }
+  return false;
+}
+
+// One part of the line; the less important leave first.
+struct Part {
+  std::string text;  // without colour
+  std::size_t width = 0;
+  Colour colour = Colour::plain;
+  int importance = 0;
+};
+
+Part part(std::string text, int importance, Colour colour = Colour::plain) {
+  const std::size_t width = text.size();
+  return {std::move(text), width, colour, importance};
+}
+
+Part bar(double filled, bool blocks) {
+  const double eighths = std::clamp(filled, 0.0, 1.0) * 8 * static_cast<double>(kBar);
+  const auto n = static_cast<std::size_t>(std::lround(eighths));
+  std::string s;
+  for (std::size_t i = 0; i < kBar; ++i) {
+    const std::size_t here = std::min<std::size_t>(8, n > 8 * i ? n - 8 * i : 0);
+    constexpr const char* kBlocks[] = {" ", "▏", "▎", "▍", "▌", "▋", "▊", "▉", "█"};
+    s += blocks ? kBlocks[here] : here >= 4 ? "#" : " ";
+  }
+  const Colour colour = filled > 0.9 ? Colour::bad : filled > 0.6 ? Colour::warning : Colour::good;
+  return {s, kBar, colour, 4};
+}
+
+Part vision_part(const Scene& scene, const rt::TelemetrySample& newest) {
+  if (newest.obs_age_s < 0) {
+    return part("vision starts", 6, Colour::warning);
+  }
+  if ((newest.alarms & rt::alarm_vision_stale) != 0) {
+    return part(fmt::format("vision stale {:.1f} s", newest.obs_age_s), 9, Colour::bad);
+  }
+  if ((newest.alarms & rt::alarm_vision_implausible) != 0) {
+    return part("vision implausible", 9, Colour::bad);
+  }
+  return part(scene.vision ? "vision ok" : "", 3, Colour::good);
+}
+
+}  // namespace
+
+std::string painted(Colour colour, const std::string& text, bool coloured) {
+  if (!coloured || colour == Colour::plain || text.empty()) {
+    return text;
+  }
+  constexpr const char* kCodes[] = {"", "\033[32m", "\033[33m", "\033[1;31m", "\033[2m"};
+  return kCodes[static_cast<std::size_t>(colour)] + text + "\033[0m";
+}
+
+Terminal::Terminal()
+    : is_terminal_(isatty(STDOUT_FILENO) != 0),
+      coloured_(shows_colour(STDOUT_FILENO)),
+      errors_coloured_(shows_colour(STDERR_FILENO)) {}
 
 void Terminal::complain(const std::string& text) {
   clear_progress();
-  tools::complain("punctum: " + text);
+  tools::complain(painted(Colour::bad, "punctum: " + text, errors_coloured_));
 }
 
 void Terminal::print(const std::string& text) {
@@ -35,22 +117,62 @@ void Terminal::clear_progress() {
   progress_drawn_ = false;
 }
 
-std::string progress_line(const Scene& scene, const rt::TelemetrySample& newest, const rt::CoreStatus& core) {
+LineStyle Terminal::line_style() const {
+  if (!is_terminal_) {
+    return {};
+  }
+  winsize size{};
+  const bool told = ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
+  return {.coloured = coloured_, .blocks = writes_utf8(), .columns = told ? size.ws_col : kUsualColumns};
+}
+
+std::string progress_line(const Scene& scene, const rt::TelemetrySample& newest, const rt::CoreStatus& core,
+                          const LineStyle& style) {
   const double hand_N = std::hypot(newest.force_N[0], newest.force_N[1], newest.force_N[2]);
-  std::string line =
-      fmt::format("{:8.1f} s  {:<11}  hand {:5.2f} N", newest.t_s, rt::name(newest.phase), hand_N);
+  const double most_N = scene.servo.limits.hand_force_N;
+  std::vector<Part> parts;
+  parts.push_back(part(fmt::format("{:6.1f} s", newest.t_s), 10));
+  if (newest.fault != rt::Fault::none) {
+    parts.push_back(part(fmt::format("FAULT {}", rt::name(newest.fault)), 10, Colour::bad));
+  }
+  parts.push_back(part(fmt::format("{:<11}", rt::name(newest.phase)), 10));
+  parts.push_back(bar(most_N > 0 ? hand_N / most_N : 0, style.blocks));
+  parts.push_back(part(fmt::format("{:4.2f} N", hand_N), 8));
   if (scene.servo.membrane) {
-    line += fmt::format("  needle {:6.1f} uN  depth {:6.1f} um", newest.tip_force_N * 1e6, newest.wd_m * 1e6);
+    parts.push_back(part(fmt::format("depth {:5.1f} um", newest.wd_m * 1e6), 7));
+    parts.push_back(part(fmt::format("needle {:5.1f} uN", newest.tip_force_N * 1e6), 2));
   }
   if (scene.servo.cells != 1 && scene.servo.phases) {
-    line += fmt::format("  cell {}", newest.cell + 1);
+    parts.push_back(part(fmt::format("cell {}", newest.cell + 1), 6));
   }
-  line += fmt::format("  missed {}", core.missed.load());
-  if (newest.fault != rt::Fault::none) {
-    line += fmt::format("  FAULT {}", rt::name(newest.fault));
+  if (scene.vision) {
+    parts.push_back(vision_part(scene, newest));
   }
-  if ((newest.alarms & rt::alarm_vision_stale) != 0) {
-    line += "  vision stale";
+  if (core.missed.load() > 0) {
+    parts.push_back(part(fmt::format("missed {}", core.missed.load()), 1, Colour::warning));
+  }
+  if (scene.seconds > 0) {
+    parts.push_back(
+        part(fmt::format("{:.0f} s left", std::max(0.0, scene.seconds - newest.t_s)), 5, Colour::faint));
+  }
+  if ((newest.alarms & rt::alarm_degraded) != 0 && scene.clock == ClockKind::real) {
+    parts.push_back(part("degraded", 1, Colour::warning));
+  }
+  const auto width = [&parts] {
+    std::size_t sum = 0;
+    for (const Part& p : parts) {
+      sum += p.width + 2;
+    }
+    return sum - 2;
+  };
+  // The last column stays free: some terminals go to the next line there.
+  while (style.columns > 0 && parts.size() > 1 && width() + 1 > style.columns) {
+    parts.erase(std::min_element(parts.begin(), parts.end(),
+                                 [](const Part& a, const Part& b) { return a.importance < b.importance; }));
+  }
+  std::string line;
+  for (const Part& p : parts) {
+    line += (line.empty() ? "" : "  ") + painted(p.colour, p.text, style.coloured);
   }
   return line;
 }

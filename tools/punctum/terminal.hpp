@@ -1,9 +1,12 @@
 // What the parent says while a run goes on: lines that stay, and on a terminal one line that is drawn again.
-// What cannot be written (a closed pipe, a terminal that is gone) ends no run.
+// Colour only where a terminal shows it and NO_COLOR is not set; what cannot be written (a closed pipe, a
+// terminal that is gone) ends no run.
 #pragma once
 
 #include <fmt/format.h>
 
+#include <cstddef>
+#include <cstdint>
 #include <string>
 #include <utility>
 
@@ -12,6 +15,17 @@
 #include "tools/scene/scene.hpp"
 
 namespace punctum::tools {
+
+enum class Colour : std::uint8_t { plain, good, warning, bad, faint };
+
+// The text in that colour; as it is where there is none.
+[[nodiscard]] std::string painted(Colour colour, const std::string& text, bool coloured);
+
+struct LineStyle {
+  bool coloured = false;
+  bool blocks = false;      // the bar from Unicode's blocks, which not every terminal has
+  std::size_t columns = 0;  // what does not fit is left out, the least important first; 0: all fits
+};
 
 class Terminal {
  public:
@@ -27,14 +41,16 @@ class Terminal {
   void clear_progress();
   // How often progress is worth telling.
   [[nodiscard]] double progress_every_s() const { return is_terminal_ ? 0.1 : 5; }
+  [[nodiscard]] bool coloured() const { return coloured_; }  // of what is printed
+  [[nodiscard]] LineStyle line_style() const;                // of the line that is drawn again
 
  private:
-  bool is_terminal_;
+  bool is_terminal_, coloured_, errors_coloured_;
   bool progress_drawn_ = false;
 };
 
-// Time, phase, forces, and what is not as it should be.
+// Time, what is left of it, phase, force, depth, vision, and what is not as it should be.
 [[nodiscard]] std::string progress_line(const Scene& scene, const rt::TelemetrySample& newest,
-                                        const rt::CoreStatus& core);
+                                        const rt::CoreStatus& core, const LineStyle& style);
 
 }  // namespace punctum::tools

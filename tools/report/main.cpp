@@ -13,7 +13,9 @@
 #include <vector>
 
 #include "tools/report/output.hpp"
+#include "tools/shared/command_line.hpp"
 #include "tools/shared/say.hpp"
+#include "tools/shared/suggestion.hpp"
 #include "tools/shared/version.hpp"
 #include "tools/shared/whole_file.hpp"
 
@@ -35,6 +37,15 @@ constexpr const char* kLeftOut = "vision and surface are left out: built without
 int bad(const std::string& text) {
   complain(text);
   return kBadInput;
+}
+
+// The topic that was probably meant.
+std::string meant(const std::string& wanted) {
+  std::vector<std::string> names{"all"};
+  for (const Topic& t : topics()) {
+    names.emplace_back(t.name);
+  }
+  return punctum::tools::suggestion(wanted, names);
 }
 
 void write(const fs::path& path, const std::string& text) {
@@ -93,36 +104,47 @@ int main_or_throw(int argc, char** argv) {
   about += kLeftOut;
   const auto evaluates =
       std::find_if(topics().begin(), topics().end(), [](const Topic& t) { return t.evaluate != nullptr; });
-  CLI::App app{about};
-  app.failure_message([](const CLI::App*, const CLI::Error& e) { return std::string(e.what()) + "\n"; });
-  app.set_version_flag("--version", punctum::tools::version_line("punctum-report"));
+  CLI::App app{about, "punctum-report"};
+  punctum::tools::set_help_style(app);
+  app.set_version_flag("--version", punctum::tools::version_line("punctum-report"), "version and commit");
+  app.footer(punctum::tools::help_footer(
+      {{"punctum-report all --quick", "every topic within a minute, into reports/report-DATE"},
+       {"punctum-report force --out mine", "one topic, into the folder `mine`"},
+       {"punctum-report force --input pairs.csv --output out.csv",
+        "the paper's membrane law on rows of your own"}},
+      {{0, "all topics were measured"},
+       {kTopicFailed, "a topic failed, the others are there"},
+       {kBadInput, "bad input"}}));
   std::vector<std::string> wanted;
   std::string folder, input, output;
   bool quick = false;
   app.add_option("TOPIC", wanted, "one or more of: " + names)->required();
-  const auto* to_folder = app.add_option(
-      "--out", folder, "folder of tables, figures and index.html (default: reports/report-DATE)");
+  const auto* to_folder =
+      app.add_option("--out", folder,
+                     "folder of tables, figures and index.html (default: reports/report-DATE)")
+          ->type_name("FOLDER");
   app.add_flag("--quick", quick, "fewer points and cells, all together within a minute");
   CLI::Option* in = nullptr;
   if (evaluates != topics().end()) {
     in = app.add_option("--input", input,
-                        std::string(evaluates->name) + " only: a CSV file of rows to evaluate");
+                        std::string(evaluates->name) + " only: a CSV file of rows to evaluate")
+             ->type_name("FILE");
     auto* to =
-        app.add_option("--output", output, "where they go with their result appended; nothing else is done");
+        app.add_option("--output", output, "where they go with their result appended; nothing else is done")
+            ->type_name("FILE");
     in->needs(to);
     to->needs(in);
   }
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) != 0 ? kBadInput : punctum::tools::all_was_said() ? 0 : kTopicFailed;
+  if (const auto code = punctum::tools::parse_command_line(app, argc, argv)) {
+    return *code;
   }
 
   const bool all = std::find(wanted.begin(), wanted.end(), "all") != wanted.end();
   for (const std::string& w : wanted) {
     if (w != "all" &&
         std::none_of(topics().begin(), topics().end(), [&w](const Topic& t) { return t.name == w; })) {
-      return bad(fmt::format("{}TOPIC: {}: there is no such topic, allowed: {}", kLeftOut, w, names));
+      return bad(
+          fmt::format("{}TOPIC: {}: there is no such topic{}, allowed: {}", kLeftOut, w, meant(w), names));
     }
   }
   if (in != nullptr && in->count() > 0) {

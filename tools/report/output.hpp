@@ -28,6 +28,5 @@ struct Finished {
 // One page that needs no other file. The figures are read from OUT/NAME.svg, if they exist.
 [[nodiscard]] std::string page(std::span<const Finished> topics, const Provenance& from,
                                const std::filesystem::path& out);
-[[nodiscard]] std::string escaped(const std::string& text);  // for HTML, also inside attributes
 
 }  // namespace punctum::report

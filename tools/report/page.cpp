@@ -6,11 +6,13 @@
 #include <numeric>
 
 #include "tools/report/output.hpp"
+#include "tools/shared/html.hpp"
 
 namespace punctum::report {
 namespace {
 
 namespace fs = std::filesystem;
+using tools::escaped;
 
 constexpr std::size_t kShortTable = 30, kRowsOfLong = 8;
 constexpr int kDigits = 4;
@@ -79,32 +81,6 @@ std::string figure_html(const Figure& f, const fs::path& out) {
 }
 
 }  // namespace
-
-std::string escaped(const std::string& text) {
-  std::string s;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        s += "&amp;";
-        break;
-      case '<':
-        s += "&lt;";
-        break;
-      case '>':
-        s += "&gt;";
-        break;
-      case '"':
-        s += "&quot;";
-        break;
-      case '\'':
-        s += "&#39;";
-        break;
-      default:
-        s += c;
-    }
-  }
-  return s;
-}
 
 std::string page(std::span<const Finished> topics, const Provenance& from, const fs::path& out) {
   std::string s =

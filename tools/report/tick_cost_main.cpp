@@ -29,6 +29,15 @@ int run(int argc, char** argv) {
     tools::say(tools::version_line("punctum-tick-cost") + "\n");
     return tools::all_was_said() ? 0 : 1;
   }
+  if (argc == 2 && (std::string_view(argv[1]) == "--help" || std::string_view(argv[1]) == "-h")) {
+    fmt::print(
+        "Runs the servo of a scene through recorded ticks, once per variant, for counting instructions.\n"
+        "Usage: punctum-tick-cost TAPE SCENE VARIANT...\n\n"
+        "Examples:\n  punctum-report scenes\n      records the tape and starts this program under "
+        "callgrind\n\n"
+        "Exit codes:\n  0  all variants were run\n  2  bad input\n");
+    return 0;
+  }
   if (argc < 4) {
     tools::complain("punctum-tick-cost TAPE SCENE VARIANT...; `punctum-report scenes` starts this program");
     return 2;

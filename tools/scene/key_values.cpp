@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "tools/scene/messages.hpp"
+#include "tools/shared/suggestion.hpp"
 
 namespace punctum::tools {
 namespace {
@@ -118,7 +119,8 @@ class Storing {
     }
     const auto it = given ? std::find(c.names.begin(), c.names.end(), *given) : c.names.end();
     if (it == c.names.end()) {
-      return shown(node_) + " is not one of the choices";
+      return shown(node_) + " is not one of the choices" +
+             (given && c.quoted ? suggestion(*given, c.names) : "");
     }
     c.set(static_cast<int>(it - c.names.begin()));
     return {};

@@ -3,32 +3,9 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include <algorithm>
+#include "tools/shared/suggestion.hpp"
 
 namespace punctum::tools {
-namespace {
-
-constexpr std::size_t kLongestSuggested = 60;
-
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) {
-    row[j] = j;
-  }
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t next =
-          std::min({row[j] + 1, row[j - 1] + 1, diagonal + (a[i - 1] != b[j - 1] ? 1U : 0U)});
-      diagonal = row[j];
-      row[j] = next;
-    }
-  }
-  return row[b.size()];
-}
-
-}  // namespace
 
 std::string printable(std::string_view s, std::size_t max) {
   // Some terminals also obey the control characters U+0080 to U+009F, in UTF-8 the bytes c2 80 to c2 9f.
@@ -47,25 +24,6 @@ std::string printable(std::string_view s, std::size_t max) {
     }
   }
   return out;
-}
-
-std::string suggestion(std::string_view given, const std::vector<std::string>& names) {
-  if (given.size() > kLongestSuggested) {
-    return {};
-  }
-  std::string nearest;
-  std::size_t best = std::max<std::size_t>(2, given.size() / 3) + 1;
-  for (const auto& name : names) {
-    std::size_t distance = edit_distance(given, name);
-    if (!given.empty() && (name.starts_with(given) || given.starts_with(name))) {
-      distance = std::min<std::size_t>(distance, 2);
-    }
-    if (distance < best) {
-      best = distance;
-      nearest = name;
-    }
-  }
-  return nearest.empty() ? std::string{} : " (did you mean " + nearest + "?)";
 }
 
 std::string unknown(std::string_view what, std::string_view given, const std::vector<std::string>& names) {

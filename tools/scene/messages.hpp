@@ -1,4 +1,4 @@
-// The words of an error message: one line, whatever the file contained, and the name that was probably meant.
+// The words of an error message: one line, whatever the file contained.
 #pragma once
 
 #include <cstddef>
@@ -11,9 +11,7 @@ namespace punctum::tools {
 // Without control characters: whatever a file says, no terminal obeys it.
 [[nodiscard]] std::string printable(std::string_view s, std::size_t max = 80);
 
-// " (did you mean X?)" for the name nearest to `given`; nothing if none is near.
-[[nodiscard]] std::string suggestion(std::string_view given, const std::vector<std::string>& names);
-
+// "unknown key (did you mean X?), allowed: ...".
 [[nodiscard]] std::string unknown(std::string_view what, std::string_view given,
                                   const std::vector<std::string>& names);
 

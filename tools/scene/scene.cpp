@@ -103,6 +103,13 @@ tl::expected<Scene, std::string> read_all(Scene scene, std::string_view text, st
   return scene;
 }
 
+// Where the files of the built-in scenes are: beside the folder of the programs, as built and as installed.
+fs::path shipped_files() {
+  std::error_code ec;
+  const fs::path program = fs::read_symlink("/proc/self/exe", ec);
+  return ec ? fs::path{} : program.parent_path().parent_path() / "share" / "punctum" / "scenes";
+}
+
 std::string no_such_scene(std::string_view name_or_path) {
   const std::string shown = printable(name_or_path, 200);
   std::vector<std::string> names;
@@ -156,7 +163,7 @@ tl::expected<Scene, std::string> load_scene(std::string_view name_or_path,
     Scene scene;
     scene.name = name_or_path;
     scene.source = "built-in";
-    return read_all(std::move(scene), *text, fmt::format("{}.toml", name_or_path), overrides, {},
+    return read_all(std::move(scene), *text, fmt::format("{}.toml", name_or_path), overrides, shipped_files(),
                     known_backends());
   }
   const fs::path path(name_or_path);

@@ -380,7 +380,7 @@ void LiveVision::record(const hal::Frame& frame, const Seen& seen) {
     }
   }
   if (seen.picture) {
-    const auto written = write_picture(fmt::format("{}/{:06}.png", options_.overlay, frame.sequence),
+    const auto written = write_picture(fmt::format("{}/{:06}.jpg", options_.overlay, frame.sequence),
                                        vision::draw_overlay(*seen.picture, *seen.result, *scene_->vision));
     if (!written) {
       go_on_without(rt::ObservationSegment::frames, written.error());

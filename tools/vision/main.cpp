@@ -3,8 +3,10 @@
 #include <exception>
 #include <opencv2/core/utility.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "tools/shared/command_line.hpp"
 #include "tools/shared/exit_codes.hpp"
 #include "tools/shared/say.hpp"
 #include "tools/shared/version.hpp"
@@ -15,43 +17,61 @@ namespace {
 
 int run(int argc, char** argv) {
   using namespace punctum;
-  CLI::App app{"punctum-vision: what the microscope shows"};
+  const std::vector<std::pair<int, const char*>> exit_codes = {
+      {tools::exit_done, "all frames were looked at"},
+      {tools::exit_not_done, "the camera was lost, or what was found could not be written"},
+      {tools::exit_bad_input, "bad input, or no first frame"}};
+  CLI::App app{"What the microscope shows: finds pipettes and membranes in frames.", "punctum-vision"};
+  tools::set_help_style(app);
   app.require_subcommand(1);
-  app.set_version_flag("--version", tools::version_line("punctum-vision"));
+  app.set_version_flag("--version", tools::version_line("punctum-vision"), "version and commit");
+  app.footer(tools::help_footer(
+      {{"punctum-vision track --frames my/pictures --scene zebrafish --out obs.csv --overlay out",
+        "a row per frame into obs.csv, and pictures with what was found drawn in"}},
+      exit_codes));
 
   tools::TrackOptions t;
   std::vector<int> roi;
   std::vector<double> seed;
   CLI::App* track = app.add_subcommand("track", "follow recorded frames");
-  track->add_option("--frames", t.frames, "folder, glob, picture or video file")->required();
-  track->add_option("--scene", t.scene, "built-in name or scene file")->required();
-  track->add_option("--set", t.overrides, "table.key=value of the scene")->take_all();
-  track->add_option("--out", t.out, "obs.csv")->required();
-  track->add_option("--contours", t.contours, "contours.csv");
-  track->add_option("--overlay", t.overlay, "folder for annotated frames");
-  track->add_option("--fps", t.fps, "frames per second")->check(CLI::Range(0.001, 1e6));
-  track->add_option("--roi", roi, "x,y,width,height in pixels")->delimiter(',')->expected(4);
-  track->add_option("--seed-circle", seed, "x,y,r in pixels: where the outer membrane is")
+  track->add_option("--frames", t.frames, "folder, glob, picture or video file")
+      ->required()
+      ->type_name("FOLDER|GLOB|FILE");
+  track->add_option("--scene", t.scene, "built-in name or scene file")->required()->type_name("SCENE");
+  track->add_option("--set", t.overrides, "change the scene; may be repeated")
+      ->take_all()
+      ->type_name("TABLE.KEY=VALUE");
+  track->add_option("--out", t.out, "table of what was found, a row per frame (obs.csv)")
+      ->required()
+      ->type_name("FILE");
+  track->add_option("--contours", t.contours, "table of the contours (contours.csv)")->type_name("FILE");
+  track->add_option("--overlay", t.overlay, "folder for annotated frames")->type_name("FOLDER");
+  track->add_option("--fps", t.fps, "frames per second, where the file does not say")
+      ->check(CLI::Range(0.001, 1e6))
+      ->type_name("RATE");
+  track->add_option("--roi", roi, "the part of the picture to look at, in pixels")
       ->delimiter(',')
-      ->expected(3);
-  track->add_option("--template", t.holder_template, "picture of the holding pipette");
+      ->expected(4)
+      ->type_name("X,Y,WIDTH,HEIGHT");
+  track->add_option("--seed-circle", seed, "where the outer membrane is, in pixels")
+      ->delimiter(',')
+      ->expected(3)
+      ->type_name("X,Y,R");
+  track->add_option("--template", t.holder_template, "picture of the holding pipette")->type_name("FILE");
 
   tools::LiveOptions l;
   CLI::App* live = app.add_subcommand("live", "observe for a running station (`punctum run` starts this)");
-  live->add_option("--scene", l.scene, "resolved scene file")->required();
-  live->add_option("--segments", l.segments, "inherited segments of the station: NAME=DESCRIPTOR,...")
-      ->required();
-  live->add_option("--out", l.out, "obs.csv");
-  live->add_option("--overlay", l.overlay, "folder for annotated frames");
+  live->add_option("--scene", l.scene, "resolved scene file")->required()->type_name("FILE");
+  live->add_option("--segments", l.segments, "inherited segments of the station")
+      ->required()
+      ->type_name("NAME=DESCRIPTOR,...");
+  live->add_option("--out", l.out, "table of what was found (obs.csv)")->type_name("FILE");
+  live->add_option("--overlay", l.overlay, "folder for annotated frames")->type_name("FOLDER");
 
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    if (e.get_exit_code() == 0) {
-      return app.exit(e) == 0 && tools::all_was_said() ? tools::exit_done : tools::exit_not_done;
-    }
-    tools::complain(e.what());
-    return tools::exit_bad_input;
+  track->footer(tools::help_footer({}, exit_codes));
+  live->footer(tools::help_footer({}, exit_codes));
+  if (const auto code = tools::parse_command_line(app, argc, argv)) {
+    return *code;
   }
   if (track->parsed()) {
     if (roi.size() == 4) {

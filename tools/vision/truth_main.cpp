@@ -87,6 +87,15 @@ int run(int argc, char** argv) {
     tools::say(tools::version_line("punctum-vision") + "\n");
     return tools::all_was_said() ? tools::exit_done : tools::exit_not_done;
   }
+  if (argc == 2 && (std::string_view(argv[1]) == "--help" || std::string_view(argv[1]) == "-h")) {
+    tools::say(
+        "Vision of a build without OpenCV: observes the truth of the simulated world.\n"
+        "Usage: punctum-vision live --scene FILE --segments NAME=DESCRIPTOR,...\n\n"
+        "Examples:\n  punctum run icsi --set vision.method=truth\n      starts this program as it should "
+        "be\n\n"
+        "Exit codes:\n  0  the run has ended\n  1  the camera was lost\n  2  bad input\n");
+    return tools::exit_done;
+  }
   if (argc < 2 || std::string_view(argv[1]) != "live") {
     return bad("this build has no OpenCV, allowed: live --scene FILE --segments NAME=DESCRIPTOR,...");
   }

@@ -1,0 +1,329 @@
+// The report that a lab keeps and the terminal's words: what they say, and that nothing in a scene or a file
+// can make a page do more than show it.
+#include "tools/punctum/lab_report.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <regex>
+#include <set>
+#include <string>
+
+#include "tools/punctum/event_log.hpp"
+#include "tools/punctum/fault_advice.hpp"
+#include "tools/punctum/rebuilt_facts.hpp"
+#include "tools/punctum/run_page.hpp"
+#include "tools/punctum/run_sentence.hpp"
+#include "tools/punctum/terminal.hpp"
+#include "tools/punctum/time_chart.hpp"
+#include "tools/shared/html.hpp"
+#include "tools/shared/suggestion.hpp"
+#include "tools/shared/written_number.hpp"
+
+namespace punctum::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+class Folder {
+ public:
+  Folder() {
+    std::string name = (fs::temp_directory_path() / "punctum-lab-report-XXXXXX").string();
+    path_ = mkdtemp(name.data());
+  }
+  ~Folder() { fs::remove_all(path_); }
+  Folder(const Folder&) = delete;
+  Folder& operator=(const Folder&) = delete;
+  [[nodiscard]] std::string path() const { return path_.string(); }
+  void put(const char* name, const std::string& text) const { std::ofstream(path_ / name) << text; }
+
+ private:
+  fs::path path_;
+};
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+// ---- the page ----
+
+TEST(Page, what_a_scene_calls_itself_stays_text) {
+  const std::string attack = "<script>alert(1)</script>\"'><img src=x onerror=alert(2)>";
+  const Folder folder;
+  folder.put("scene.toml", "# " + attack + "\n");
+  const Json facts = {{"scene", attack},
+                      {"title", attack},
+                      {"outcome", attack},
+                      {"outcome_detail", attack},
+                      {"begun_at", attack},
+                      {"command_line", attack},
+                      {"program", attack},
+                      {"machine", {{"name", attack}, {"processor", attack}, {"kernel", attack}}},
+                      {"phases", {{{"name", attack}, {"start_s", 0}, {"end_s", 1}}}},
+                      {"events", {{{"t_s", 1}, {"event", attack}, {"what", attack}, {"writer", attack}}}},
+                      {"alarms_s", {{attack, 1}}},
+                      {"not_kept", {{{"file", attack}, {"t_s", 1}, {"why", attack}}}},
+                      {"needle_at_end", {{"where", "inside"}, {"in_words", attack}, {"known_from", attack}}}};
+  TimeChart chart;
+  chart.title = attack;
+  chart.end_s = 1;
+  chart.bands = {{0, 1, attack, 0}};
+  chart.panels = {{attack, {Curve(attack, 0, 1)}}};
+  chart.panels[0].curves[0].add(0.5, 1);
+  chart.instants = {{0.5, attack, true}};
+  chart.lanes = {{attack, {{0, 1}}}};
+  const std::string page = run_page(folder.path(), facts, svg(chart));
+  EXPECT_FALSE(contains(page, "<script"));
+  EXPECT_FALSE(contains(page, "<img src=x"));
+  EXPECT_TRUE(contains(page, "&lt;script&gt;"));
+  const std::string compared = comparison_page({{attack, facts, chart}, {attack, facts, chart}});
+  EXPECT_FALSE(contains(compared, "<script"));
+  EXPECT_FALSE(contains(compared, "<img src=x"));
+}
+
+TEST(Page, needs_no_network_no_script_and_no_file_beside_it) {
+  const Folder folder;
+  fs::create_directory(fs::path(folder.path()) / "frames");
+  folder.put("frames/000003.png", "a picture");
+  folder.put("obs.csv", "frame,t_s,phase\n3,0.12,free\n");
+  const std::string page = run_page(folder.path(), {{"scene", "free"}, {"seconds", 1}}, "");
+  EXPECT_TRUE(contains(page, "src=\"data:image/png;base64,YSBwaWN0dXJl\""));
+  EXPECT_TRUE(contains(page, "t = 0.120 s"));
+  const std::regex loads("(src|href)=\"(?!data:)|<link|<script|@import|url\\(");
+  EXPECT_FALSE(std::regex_search(page, loads));
+}
+
+TEST(Page, of_facts_that_are_missing_or_of_another_kind_is_a_page_still) {
+  for (
+      const char* text :
+      {"{}", R"({"phases":3,"events":"x","machine":[],"cells":null,"seconds":"long"})",
+       R"({"phases":[1,null],"events":[{}],"faults":[{"name":7}],"needle_at_end":[],"dose":1,"not_kept":{}})"}) {
+    const Json facts = Json::parse(text);
+    EXPECT_TRUE(contains(run_page("/nowhere", facts, ""), "</html>")) << text;
+    EXPECT_TRUE(contains(comparison_page({{"a", facts, {}}, {"b", facts, {}}}), "</html>")) << text;
+  }
+}
+
+TEST(Page, a_comparison_gives_mean_and_standard_deviation) {
+  const auto run = [](double depth) { return ComparedRun{"r", {{"max_depth_um", depth}}, {}}; };
+  // Mean 20, standard deviation of three values 10 apart: 10.
+  EXPECT_TRUE(contains(comparison_page({run(10), run(20), run(30)}), "20 ± 10"));
+}
+
+TEST(Text, inside_html_loses_what_is_no_text) {
+  EXPECT_EQ(escaped("a<b & \"c\" 'd'"), "a&lt;b &amp; &quot;c&quot; &#39;d&#39;");
+  EXPECT_EQ(escaped("caf\xC3\xA9 \xE2\x82\xAC \xF0\x9F\x94\xAC"),
+            "caf\xC3\xA9 \xE2\x82\xAC \xF0\x9F\x94\xAC");
+  const std::string no_text = "\xEF\xBF\xBD";
+  EXPECT_EQ(escaped("\033[31m"), no_text + "[31m");
+  EXPECT_EQ(escaped("caf\xE9!"), "caf" + no_text + "!");            // Latin 1
+  EXPECT_EQ(escaped("\xC0\xBC"), no_text + no_text);                // '<' in two bytes
+  EXPECT_EQ(escaped("\xED\xA0\x80"), no_text + no_text + no_text);  // half of a surrogate pair
+  EXPECT_EQ(escaped("cut \xE2\x82"), "cut " + no_text + no_text);
+}
+
+TEST(Text, in_base64_is_as_rfc_4648_gives_it) {
+  EXPECT_EQ(base64(""), "");
+  EXPECT_EQ(base64("f"), "Zg==");
+  EXPECT_EQ(base64("fo"), "Zm8=");
+  EXPECT_EQ(base64("foo"), "Zm9v");
+  EXPECT_EQ(base64("foobar"), "Zm9vYmFy");
+  EXPECT_EQ(base64("\xFB\xFF\xBF"), "+/+/");
+}
+
+// ---- numbers and sentences ----
+
+TEST(Numbers, are_written_as_people_write_them) {
+  EXPECT_EQ(Json(as_written(0.030000000000000002)).dump(), "0.03");
+  EXPECT_EQ(Json(as_written(0.1 + 0.2)).dump(), "0.3");
+  EXPECT_EQ(Json(as_written(1e-6 / 3)).dump(), "3.33333333333e-07");
+  EXPECT_TRUE(std::isnan(as_written(std::nan(""))));
+  const Json facts = whole_facts({{"program", "p"}}, {{"a", 0.1 + 0.2}, {"list", {{{"b", 3 * 0.1}}}}});
+  EXPECT_EQ(facts.dump(), R"({"a":0.3,"list":[{"b":0.3}],"program":"p"})");
+}
+
+TEST(Sentence, a_time_is_never_negative) {
+  EXPECT_EQ(after_or_before(20, "the needle touched"), "20 ms after the needle touched");
+  EXPECT_EQ(after_or_before(-20, "the needle touched"), "20 ms before the needle touched");
+  EXPECT_EQ(after_or_before(0.1, "the needle touched"), "just as the needle touched");
+  EXPECT_EQ(after_or_before(std::nullopt, "x"), "-");
+}
+
+TEST(Sentence, every_end_has_its_own) {
+  std::set<std::string> sentences;
+  for (int i = 1; i < rt::kRunEnds; ++i) {
+    const auto end = static_cast<rt::RunEnd>(i);
+    if (end == rt::RunEnd::invalid_setup) {
+      continue;  // leaves no report
+    }
+    const std::string s = run_sentence({{"outcome", rt::name(end)}, {"seconds", 12.34}});
+    EXPECT_TRUE(contains(s, "12.3 s")) << s;
+    EXPECT_FALSE(contains(s, "not known")) << rt::name(end);
+    EXPECT_TRUE(sentences.insert(s).second) << s;
+  }
+  EXPECT_TRUE(contains(run_sentence({{"outcome", "unknown"}}), "not known"));
+}
+
+TEST(Sentence, says_where_the_needle_is_and_what_was_given) {
+  const std::string s =
+      run_sentence({{"outcome", "stopped"},
+                    {"seconds", 9},
+                    {"needle_at_end", {{"where", "inside"}, {"in_words", "INSIDE THE CELL, 23.1 um"}}},
+                    {"dose", {{"asked_s", 1.5}, {"given_s", 0.39}}}});
+  EXPECT_TRUE(contains(s, "INSIDE THE CELL, 23.1 um")) << s;
+  EXPECT_TRUE(contains(s, "0.39 s of 1.50 s")) << s;
+}
+
+TEST(Advice, every_fault_has_a_cause_something_to_do_and_what_clears_it) {
+  std::set<std::string> seen;
+  for (int i = 1; i < rt::kFaults; ++i) {
+    const FaultAdvice& a = kFaultAdvice[static_cast<std::size_t>(i)];
+    EXPECT_GT(std::string(a.cause).size(), 10U) << rt::name(a.fault);
+    EXPECT_GT(std::string(a.next).size(), 10U) << rt::name(a.fault);
+    EXPECT_GT(std::string(clearing_condition(a.fault)).size(), 10U) << rt::name(a.fault);
+    EXPECT_TRUE(seen.insert(a.cause).second) << rt::name(a.fault);
+    EXPECT_EQ(fault_named(rt::name(a.fault)), a.fault);
+  }
+  EXPECT_FALSE(fault_named("nonsense"));
+}
+
+TEST(Suggestion, takes_neighbours_that_changed_places_for_one_mistake) {
+  EXPECT_EQ(suggestion("--sede", {"--seconds", "--set", "--seed"}), " (did you mean --seed?)");
+  EXPECT_EQ(suggestion("zebrafihs", {"icsi", "zebrafish", "free"}), " (did you mean zebrafish?)");
+  EXPECT_EQ(suggestion("nothing-like-it", {"icsi", "free"}), "");
+}
+
+// ---- the drawing ----
+
+TEST(Drawing, a_peak_of_one_tick_is_seen_however_long_the_run_is) {
+  Curve curve("c", 0, 1000);
+  constexpr int kTicks = 1'000'000;
+  for (int i = 0; i < kTicks; ++i) {
+    curve.add(i * 1e-3, i == 345'678 ? 5.0 : 0.001 * (i % 2));
+  }
+  double highest = 0;
+  std::size_t points = 0;
+  for (const auto& stroke : curve.strokes()) {
+    points += stroke.size();
+    for (const Curve::Point& p : stroke) {
+      highest = std::max(highest, p.value);
+    }
+  }
+  EXPECT_EQ(highest, 5.0);
+  EXPECT_LE(points, 2 * (Curve::kColumns + 1));
+}
+
+TEST(Drawing, a_gap_stays_a_gap) {
+  Curve curve("c", 0, 10);
+  for (const double t : {0.0, 1.0, 2.0, 3.0}) {
+    curve.add(t, t == 1.0 ? std::nan("") : 1.0);
+  }
+  const auto strokes = curve.strokes();
+  ASSERT_EQ(strokes.size(), 2U);
+  EXPECT_EQ(strokes[0].size(), 1U);
+  EXPECT_EQ(strokes[1].size(), 2U);
+}
+
+TEST(Drawing, a_histogram_counts_every_tick) {
+  const std::string s = svg(TimesHistogram{.title = "t",
+                                           .from_us = {0, 1, 2, 500},
+                                           .count = {10, 20, 5, 1},
+                                           .over = 4,
+                                           .p50_us = 2,
+                                           .max_us = 9000});
+  EXPECT_TRUE(contains(s, "40 ticks, longest 9000 us"));
+  EXPECT_TRUE(contains(s, "4 longer ones"));
+}
+
+// ---- what a crash left ----
+
+TEST(Rebuilt, from_a_table_that_is_cut_off_in_the_middle_of_a_row) {
+  const Folder folder;
+  const std::string columns =
+      "t_s,phase,x_m,fx_N,fy_N,fz_N,wd_m,fault,cell,alarms,tip_force_N,true_force_N,true_gap_m,true_contact,"
+      "true_punctured,true_lost\n";
+  folder.put("samples.csv", columns +
+                                "0.000,free,0,0,0,0,0,none,0,0,0,0,2e-05,0,0,0\n"
+                                "0.001,contact,0,0.3,0,0.4,1e-06,none,0,0,1e-06,2e-06,-3e-06,1,0,0\n"
+                                "0.002,indentation,0,0,0,0.1,5e-06,none,0,0,1e-06,3e-06,-9e-06,1,0,0\n"
+                                "0.003,indent");
+  folder.put("events.csv",
+             std::string(kEventColumns) + "0.001000,101,phase,contact,0,,,\n0.002000,102,alarm_on,sen");
+  const Json facts = rebuilt_facts(folder.path());
+  EXPECT_EQ(facts["rebuilt"], true);
+  EXPECT_EQ(facts["outcome"], "unknown");
+  EXPECT_EQ(facts["samples"]["rows"], 3);
+  EXPECT_EQ(facts["samples"]["cut_off"], 1);
+  ASSERT_EQ(facts["phases"].size(), 3U);
+  EXPECT_EQ(facts["phases"][1]["name"], "contact");
+  EXPECT_NEAR(facts["peak_hand_force_N"].get<double>(), 0.5, 1e-12);
+  EXPECT_NEAR(facts["max_depth_um"].get<double>(), 9, 1e-9);
+  EXPECT_EQ(facts["needle_at_end"]["where"], "touching");
+  EXPECT_EQ(facts["needle_at_end"]["known_from"], "truth");
+  EXPECT_EQ(facts["events"][0]["what"], "contact");
+  EXPECT_TRUE(facts["missed"].is_null());  // nobody counted them: not zero
+  EXPECT_EQ(report_folders({folder.path()}, ""), 0);
+  EXPECT_TRUE(fs::exists(fs::path(folder.path()) / "report.html"));
+  EXPECT_TRUE(fs::exists(fs::path(folder.path()) / "report.json"));
+}
+
+TEST(Rebuilt, a_folder_that_holds_no_run_is_refused) {
+  const Folder folder;
+  EXPECT_EQ(report_folders({folder.path()}, ""), 2);
+  EXPECT_TRUE(fs::is_empty(folder.path()));
+}
+
+// ---- the terminal ----
+
+class LiveLine : public testing::Test {
+ protected:
+  LiveLine() {
+    sample.t_s = 12.34;
+    sample.phase = rt::Phase::indentation;
+    sample.force_N[2] = 1;
+    sample.wd_m = 7.5e-6;
+    sample.obs_age_s = 0.05;
+    core->missed.store(3);
+  }
+  [[nodiscard]] std::string line(const LineStyle& style) const {
+    return progress_line(scene, sample, *core, style);
+  }
+
+  Scene scene = *load_scene("icsi");
+  rt::TelemetrySample sample;
+  std::unique_ptr<rt::CoreStatus> core = std::make_unique<rt::CoreStatus>();
+};
+
+TEST_F(LiveLine, says_phase_force_depth_vision_and_what_time_is_left) {
+  const std::string s = line({});
+  for (const char* part :
+       {"12.3 s", "indentation", "###", "1.00 N", "depth   7.5 um", "vision ok", "s left"}) {
+    EXPECT_TRUE(contains(s, part)) << part << " in " << s;
+  }
+  EXPECT_FALSE(contains(s, "\033")) << s;
+}
+
+TEST_F(LiveLine, a_fault_and_stale_vision_stand_out_and_survive_a_narrow_terminal) {
+  sample.fault = rt::Fault::tip_force;
+  sample.alarms = rt::alarm_vision_stale;
+  sample.obs_age_s = 1.25;
+  EXPECT_TRUE(contains(line({.coloured = true}), "\033[1;31mFAULT tip_force\033[0m"));
+  const std::string narrow = line({.columns = 64});
+  EXPECT_TRUE(contains(narrow, "FAULT tip_force")) << narrow;
+  EXPECT_TRUE(contains(narrow, "vision stale 1.2 s") || contains(narrow, "vision stale 1.3 s")) << narrow;
+}
+
+TEST_F(LiveLine, fits_every_terminal) {
+  for (std::size_t columns = 24; columns < 200; ++columns) {
+    EXPECT_LT(line({.columns = columns}).size(), columns);
+  }
+}
+
+}  // namespace
+}  // namespace punctum::tools

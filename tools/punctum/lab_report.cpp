@@ -1,0 +1,134 @@
+#include "tools/punctum/lab_report.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <ctime>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <system_error>
+#include <utility>
+
+#include "tools/punctum/facts.hpp"
+#include "tools/punctum/provenance.hpp"
+#include "tools/punctum/rebuilt_facts.hpp"
+#include "tools/punctum/run_figure.hpp"
+#include "tools/punctum/run_page.hpp"
+#include "tools/punctum/run_sentence.hpp"
+#include "tools/shared/exit_codes.hpp"
+#include "tools/shared/say.hpp"
+#include "tools/shared/whole_file.hpp"
+#include "tools/shared/written_number.hpp"
+
+namespace punctum::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+using Done = tl::expected<void, std::string>;
+
+void write_numbers_as_people_do(Json& j) {
+  if (j.is_number_float()) {
+    j = as_written(j.get<double>());
+  }
+  if (j.is_structured()) {
+    for (Json& part : j) {
+      write_numbers_as_people_do(part);
+    }
+  }
+}
+
+std::string text_of(const Json& j) { return j.dump(2, ' ', false, Json::error_handler_t::replace) + "\n"; }
+
+// Null where there is no such file, or nothing that could be read as one.
+Json read_json(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  Json j = Json::parse(in, nullptr, false);
+  return j.is_object() ? j : Json();
+}
+
+// The page and the figure beside it; without samples there is a page still.
+Done write_page(const std::string& folder, const Json& facts, const std::optional<TimeChart>& chart) {
+  std::string drawing;
+  if (chart && !chart->panels.empty()) {
+    drawing = svg(*chart);
+    if (auto written = write_whole(fs::path(folder) / "figure.svg", drawing); !written) {
+      return written;
+    }
+  }
+  return write_whole(fs::path(folder) / "report.html", run_page(folder, facts, drawing));
+}
+
+}  // namespace
+
+Json whole_facts(const Json& begun, Json facts) {
+  if (begun.is_object()) {
+    facts.update(begun);
+  }
+  write_numbers_as_people_do(facts);
+  return facts;
+}
+
+Done write_begun(const std::string& folder, const Json& begun) {
+  return write_whole(fs::path(folder) / kBegun, text_of(begun), Sync::later);
+}
+
+Done write_report_json(const std::string& folder, const Json& facts) {
+  return write_whole(fs::path(folder) / "report.json", text_of(facts));
+}
+
+Done write_report_page(const std::string& folder, const Json& facts, bool figure) {
+  return write_page(folder, facts, figure ? std::optional(chart_of_run(folder, facts)) : std::nullopt);
+}
+
+int report_folders(const std::vector<std::string>& folders, const std::string& out) {
+  std::vector<ComparedRun> runs;
+  for (const std::string& folder : folders) {
+    const fs::path path = fs::path(folder).lexically_normal();
+    std::error_code ec;
+    if (!fs::is_regular_file(path / "samples.csv", ec) && !fs::is_regular_file(path / "report.json", ec)) {
+      complain(
+          fmt::format("{}: no report of a run, allowed: a folder with samples.csv or report.json", folder));
+      return exit_bad_input;
+    }
+    Json facts = read_json(path / "report.json");
+    if (facts.is_null()) {
+      facts = whole_facts(read_json(path / kBegun), rebuilt_facts(path.string()));
+      facts["sentence"] = run_sentence(facts);
+      if (auto written = write_report_json(path.string(), facts); !written) {
+        complain(written.error());
+        return exit_not_done;
+      }
+    }
+    TimeChart chart = chart_of_run(path.string(), facts);
+    if (auto written = write_page(path.string(), facts, chart); !written) {
+      complain(written.error());
+      return exit_not_done;
+    }
+    say(fmt::format("{}: {}\n{}\n", (path / "report.html").string(), text_in(facts, "outcome"),
+                    run_sentence(facts)));
+    const fs::path named = path.has_filename() ? path : path.parent_path();
+    runs.push_back({named.filename().string(), std::move(facts), std::move(chart)});
+  }
+  if (runs.size() < 2) {
+    return exit_done;
+  }
+  const fs::path page = out.empty() ? fs::path(fmt::format("reports/comparison-{:%Y%m%d-%H%M%S}.html",
+                                                           fmt::localtime(std::time(nullptr))))
+                                    : fs::path(out);
+  std::error_code ec;
+  if (page.has_parent_path()) {
+    fs::create_directories(page.parent_path(), ec);
+  }
+  if (auto written = write_whole(page, comparison_page(runs)); !written) {
+    complain(written.error());
+    return exit_not_done;
+  }
+  say("\n" + comparison_text(runs) + "\n" + page.string() + "\n");
+  return exit_done;
+}
+
+}  // namespace punctum::tools

@@ -1,0 +1,193 @@
+#include "tools/punctum/rebuilt_facts.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <iterator>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "rt/station/core_status.hpp"
+#include "rt/station/telemetry.hpp"
+#include "tools/punctum/event_log.hpp"
+#include "tools/punctum/facts.hpp"
+#include "tools/punctum/fault_advice.hpp"
+#include "tools/punctum/measures.hpp"
+#include "tools/punctum/run_report.hpp"
+#include "tools/scene/scene.hpp"
+#include "tools/shared/csv.hpp"
+
+namespace punctum::tools {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// A count in a cell of the table; 0 where there is none or it cannot be one.
+std::uint64_t count_in(const CsvReader& row, const char* column, std::uint64_t most) {
+  const double v = row.number(column).value_or(0);
+  return v >= 0 && v <= static_cast<double>(most) ? static_cast<std::uint64_t>(v) : 0;
+}
+
+std::optional<rt::Phase> phase_named(std::string_view name) {
+  for (int i = 0; i < rt::kPhases; ++i) {
+    if (name == rt::name(static_cast<rt::Phase>(i))) {
+      return static_cast<rt::Phase>(i);
+    }
+  }
+  return std::nullopt;
+}
+
+// Nothing if the row was cut off.
+std::optional<rt::TelemetrySample> sample_of(const CsvReader& row, double rate_Hz) {
+  const auto t_s = row.number("t_s"), fz = row.number("fz_N");
+  const auto phase = phase_named(row.text("phase"));
+  if (!t_s || !fz || !phase || row.text("fault").empty() || !(*t_s >= 0 && *t_s < 1e9)) {
+    return std::nullopt;
+  }
+  const auto number = [&row](const char* column) { return row.number(column).value_or(0); };
+  rt::TelemetrySample s;
+  s.t_s = *t_s;
+  s.tick = static_cast<std::uint64_t>(std::llround(*t_s * rate_Hz));
+  s.phase = *phase;
+  s.fault = fault_named(row.text("fault")).value_or(rt::Fault::none);
+  s.alarms = static_cast<std::uint32_t>(count_in(row, "alarms", UINT32_MAX));
+  s.buttons = static_cast<std::uint32_t>(count_in(row, "buttons", UINT32_MAX));
+  s.cell = static_cast<std::uint32_t>(count_in(row, "cell", UINT32_MAX));
+  s.force_N[0] = number("fx_N"), s.force_N[1] = number("fy_N"), s.force_N[2] = *fz;
+  s.wd_m = number("wd_m");
+  s.tip_force_N = number("tip_force_N");
+  s.obs_age_s = number("obs_age_s");
+  s.obs_gap_m = number("obs_gap_m");
+  s.injected_energy_J = number("injected_energy_J");
+  s.injector_open = static_cast<std::uint8_t>(count_in(row, "injector_open", 1));
+  return s;
+}
+
+// What the samples have of the simulated truth.
+struct Truth {
+  bool any = false;
+  double peak_force_N = 0, max_depth_m = 0, error2 = 0, true2 = 0;
+  std::uint64_t compared = 0;
+  std::optional<double> gap_m;
+  bool contact = false, punctured = false, lost = false;
+
+  void take(const CsvReader& row, const rt::TelemetrySample& s) {
+    gap_m = row.number("true_gap_m");
+    const auto force = row.number("true_force_N");
+    if (!gap_m || !force) {
+      return;
+    }
+    any = true;
+    contact = row.number("true_contact") == 1.0;
+    punctured = row.number("true_punctured") == 1.0;
+    lost = lost || row.number("true_lost") == 1.0;
+    if (contact) {
+      max_depth_m = std::max(max_depth_m, -*gap_m);
+      peak_force_N = std::max(peak_force_N, *force);
+    }
+    if (contact && !punctured && (s.phase == rt::Phase::contact || s.phase == rt::Phase::indentation)) {
+      error2 += (s.tip_force_N - *force) * (s.tip_force_N - *force);
+      true2 += *force * *force;
+      ++compared;
+    }
+  }
+  [[nodiscard]] Whereabouts needle(const Whereabouts& believed) const {
+    if (!any || !gap_m) {
+      return believed;
+    }
+    const bool inside = punctured && *gap_m < 0;
+    return {.where = inside    ? Whereabouts::inside
+                     : contact ? Whereabouts::touching
+                               : Whereabouts::outside,
+            .source = Whereabouts::truth,
+            .depth_m = -*gap_m};
+  }
+};
+
+}  // namespace
+
+Json rebuilt_facts(const std::string& folder) {
+  const auto loaded = load_scene(folder + "/scene.toml");
+  Scene scene = loaded ? *loaded : Scene{};
+  if (!loaded) {
+    scene.name = std::filesystem::path(folder).filename().string();
+  }
+  Measures measures(scene);
+  Truth truth;
+  CsvReader row(folder + "/samples.csv");
+  std::uint64_t rows = 0, cut_off = 0;
+  while (row.next()) {
+    if (const auto sample = sample_of(row, scene.servo.rate_Hz)) {
+      measures.tick(*sample, nullptr);
+      truth.take(row, *sample);
+      ++rows;
+    } else {
+      ++cut_off;
+    }
+  }
+  measures.finish();
+  RunResult result;
+  result.rows = rows;
+  result.needle = truth.needle(measures.whereabouts());
+  const auto no_core = std::make_unique<rt::CoreStatus>();
+  Json j =
+      report_facts(scene, result, measures, EventList{}, *no_core, read_contour_error(folder + "/obs.csv"));
+  j["rebuilt"] = true;
+  j["outcome"] = "unknown";
+  j["outcome_detail"] = rows > 0
+                            ? fmt::format("the recording ends in phase {}", rt::name(measures.last.phase))
+                            : "nothing was recorded";
+  j["events"] = read_events(folder + "/events.csv");
+  for (const Json& e : j["events"]) {
+    if (text_in(e, "event") == "ended") {
+      j["outcome"] = text_in(e, "what");
+      j["outcome_detail"] = measures.faults.empty() ? "" : rt::name(measures.faults.back().fault);
+    }
+  }
+  // Nobody is left to ask.
+  for (const char* unknown : {"wall_s",
+                              "missed",
+                              "ticks",
+                              "worst_lateness_us",
+                              "wake_us",
+                              "tick_us",
+                              "slots_us",
+                              "page_faults",
+                              "switches",
+                              "allocations",
+                              "degraded",
+                              "rights",
+                              "dose",
+                              "cells",
+                              "observations",
+                              "stale_s",
+                              "without_vision_s",
+                              "commands_refused",
+                              "wake_histogram",
+                              "tick_histogram",
+                              "tremor_ratio",
+                              "tremor_hand_um",
+                              "tremor_tip_um"}) {
+    j[unknown] = nullptr;
+  }
+  j["cell_list"] = Json::array();
+  j["samples"] = {
+      {"rows", rows}, {"cut_off", cut_off}, {"every", nullptr}, {"lost", nullptr}, {"gaps", nullptr}};
+  if (truth.any) {
+    j["peak_force_N"] = truth.peak_force_N;
+    j["max_depth_um"] = truth.max_depth_m * 1e6;
+    if (truth.compared > 0) {
+      const auto n = static_cast<double>(truth.compared);
+      j["force_error_rms_N"] = std::sqrt(truth.error2 / n);
+      j["true_force_rms_N"] = std::sqrt(truth.true2 / n);
+    }
+    j["cells"] = {{"tried", measures.last.cell + 1}, {"lost", truth.lost ? Json(1) : Json(nullptr)}};
+  }
+  return j;
+}
+
+}  // namespace punctum::tools

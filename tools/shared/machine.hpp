@@ -1,0 +1,16 @@
+// The machine that a program runs on, as a report names it.
+#pragma once
+
+#include <string>
+
+namespace punctum::tools {
+
+struct Machine {
+  std::string host, processor, architecture, kernel;
+  unsigned cores = 0;
+  bool real_time_kernel = false;  // built with PREEMPT_RT
+};
+
+[[nodiscard]] Machine this_machine();
+
+}  // namespace punctum::tools

@@ -10,6 +10,7 @@
 #include "tools/punctum/explain.hpp"
 #include "tools/punctum/supervisor.hpp"
 #include "tools/scene/scene.hpp"
+#include "tools/shared/program_start.hpp"
 #include "tools/shared/version.hpp"
 
 namespace {
@@ -118,6 +119,7 @@ int main_or_throw(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  start_program();
   try {
     return main_or_throw(argc, argv);
   } catch (const std::exception& e) {

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "tools/report/output.hpp"
+#include "tools/shared/program_start.hpp"
 #include "tools/shared/version.hpp"
 
 namespace {
@@ -160,6 +161,7 @@ int main_or_throw(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  punctum::tools::start_program();
   try {
     return main_or_throw(argc, argv);
   } catch (const std::exception& e) {

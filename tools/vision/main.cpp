@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "tools/shared/exit_codes.hpp"
+#include "tools/shared/program_start.hpp"
 #include "tools/shared/version.hpp"
 #include "tools/vision/live_vision.hpp"
 #include "tools/vision/track.hpp"
@@ -70,6 +71,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  punctum::tools::start_program();
   // Errors come as one line of ours, not OpenCV's own log as well.
   cv::redirectError([](int, const char*, const char*, const char*, int, void*) { return 0; });
   try {

@@ -16,6 +16,7 @@
 #include "rt/station/station.hpp"
 #include "tools/scene/scene.hpp"
 #include "tools/shared/exit_codes.hpp"
+#include "tools/shared/program_start.hpp"
 #include "tools/shared/station_segments.hpp"
 #include "tools/shared/stop_signal.hpp"
 #include "tools/shared/truth_observer.hpp"
@@ -131,6 +132,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  tools::start_program();
   try {
     return run(argc, argv);
   } catch (const std::exception& e) {

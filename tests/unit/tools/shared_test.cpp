@@ -2,10 +2,14 @@
 // line.
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <atomic>
+#include <cerrno>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <regex>
@@ -13,6 +17,7 @@
 #include <vector>
 
 #include "tools/shared/csv.hpp"
+#include "tools/shared/program_start.hpp"
 #include "tools/shared/station_segments.hpp"
 #include "tools/shared/stop_signal.hpp"
 #include "tools/shared/version.hpp"
@@ -54,6 +59,58 @@ TEST(CsvTest, a_file_that_is_not_there_has_no_rows) {
   CsvReader table("/nowhere/obs.csv");
   EXPECT_FALSE(table.has("t_s"));
   EXPECT_FALSE(table.next());
+}
+
+// In a child, which returns 0 when all is as it should be.
+int in_child(int (*work)()) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::_exit(work());
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+}
+
+TEST(ProgramStartTest, descriptors_0_to_2_exist_from_then_on) {
+  EXPECT_EQ(in_child([] {
+              ::close(0);
+              ::close(1);
+              ::close(2);
+              start_program();
+              struct stat null = {}, here = {};
+              bool right = ::stat("/dev/null", &null) == 0;
+              for (int fd = 0; fd < 3; ++fd) {
+                right = right && ::fstat(fd, &here) == 0 && here.st_rdev == null.st_rdev;
+              }
+              return right && ::dup(0) == 3 ? 0 : 1;
+            }),
+            0);
+}
+
+TEST(ProgramStartTest, descriptors_that_are_there_stay_as_they_are) {
+  EXPECT_EQ(in_child([] {
+              int pipes[2];
+              if (::pipe(pipes) != 0 || ::dup2(pipes[1], 1) != 1) {
+                return 2;
+              }
+              ::close(0);
+              start_program();
+              char got = 0;
+              return ::write(1, "x", 1) == 1 && ::read(pipes[0], &got, 1) == 1 && got == 'x' ? 0 : 1;
+            }),
+            0);
+}
+
+TEST(ProgramStartTest, a_file_that_may_not_grow_is_a_write_error) {
+  EXPECT_EQ(in_child([] {
+              start_program();
+              const rlimit none{0, 0};
+              std::FILE* file = std::tmpfile();
+              ::setrlimit(RLIMIT_FSIZE, &none);
+              return ::write(::fileno(file), "x", 1) < 0 && errno == EFBIG ? 0 : 1;
+            }),
+            0);
 }
 
 std::atomic<int> woken{0};

@@ -36,7 +36,9 @@ class Recorder {
   [[nodiscard]] const EventList& events() const noexcept { return events_; }
   [[nodiscard]] std::uint64_t rows() const noexcept { return rows_; }
   // Samples that were overwritten before they were read.
-  [[nodiscard]] std::uint64_t lost() const noexcept { return telemetry_.lost(); }
+  [[nodiscard]] std::uint64_t lost() const noexcept;
+  // Samples that named what does not exist; they are in no file.
+  [[nodiscard]] std::uint64_t unusable() const noexcept { return unusable_; }
   [[nodiscard]] std::uint64_t every() const noexcept { return every_; }
   [[nodiscard]] bool write_failed() const noexcept { return failed_; }
   void finish();
@@ -67,12 +69,13 @@ class Recorder {
   int faults_kept_ = 0;
   sim::SimConfig sim_;
   Measures measures_;
+  const rt::CoreSegment& core_;
   hal::Follower<rt::TelemetryRing> telemetry_;
   hal::Follower<rt::EventRing> event_ring_;
   EventList events_;
   std::unique_ptr<sim::SnapshotTaker> taker_;
   std::uint64_t every_;
-  std::uint64_t rows_ = 0;
+  std::uint64_t rows_ = 0, unusable_ = 0;
   double half_period_s_;
   std::uint64_t ticks_after_fault_;
   bool failed_ = false;

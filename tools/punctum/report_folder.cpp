@@ -10,6 +10,7 @@
 #include <ctime>
 #include <filesystem>
 #include <fstream>
+#include <utility>
 #include <vector>
 
 namespace punctum::tools {
@@ -91,7 +92,7 @@ void clear(const fs::path& folder) {
 
 }  // namespace
 
-tl::expected<std::string, std::string> prepare_report_folder(const Scene& scene, const std::string& wanted) {
+tl::expected<ReportFolder, std::string> prepare_report_folder(const Scene& scene, const std::string& wanted) {
   std::error_code ec;
   const fs::path folder = wanted.empty() ? dated_folder(scene.name) : fs::path(wanted);
   fs::create_directories(folder, ec);
@@ -101,6 +102,10 @@ tl::expected<std::string, std::string> prepare_report_folder(const Scene& scene,
   }
   if (access(folder.c_str(), W_OK | X_OK) != 0) {
     return tl::unexpected(fmt::format("{}: cannot be written to: {}", folder.string(), std::strerror(errno)));
+  }
+  auto lock = FolderLock::take(folder.string());
+  if (!lock) {
+    return tl::unexpected(lock.error());
   }
   if (!is_report(folder)) {
     if (const fs::path file = foreign_file(folder); !file.empty()) {
@@ -114,7 +119,7 @@ tl::expected<std::string, std::string> prepare_report_folder(const Scene& scene,
                                       (folder / kFrames).string()));
   }
   clear(folder);
-  return fs::absolute(folder).string();
+  return ReportFolder{fs::absolute(folder).string(), std::move(*lock)};
 }
 
 }  // namespace punctum::tools

@@ -14,8 +14,10 @@
 #include <vector>
 
 #include "hal/ipc/rendezvous.hpp"
+#include "hal/ipc/sealed_text.hpp"
 #include "hal/ipc/segment.hpp"
 #include "hal/sim/bench.hpp"
+#include "hal/sim/valid.hpp"
 #include "hal/sim/world.hpp"
 #include "rt/station/station.hpp"
 #include "tools/punctum/core_process.hpp"
@@ -28,6 +30,7 @@
 #include "tools/punctum/vision_process.hpp"
 #include "tools/shared/exit_codes.hpp"
 #include "tools/shared/station_segments.hpp"
+#include "tools/shared/station_values.hpp"
 #include "tools/shared/stop_signal.hpp"
 
 namespace punctum::tools {
@@ -36,6 +39,7 @@ namespace {
 constexpr double kLongRun_s = 600;         // longer ones are recorded thinner, and without annotated frames
 constexpr double kOpenEnded_s = 8 * 3600;  // what is recorded of a run without a limit at that density
 constexpr double kRowsOfLongRun = 500'000;
+constexpr double kSilent_s = 2;           // without a readable sample while the core ticks
 constexpr std::uint64_t kBusyRound = 64;  // ticks drained in one round: there may be more already
 
 // Letters, digits, '-' and '_' of the scene's name, and this process: two runs never meet.
@@ -182,37 +186,48 @@ HandedSegments for_vision(const Segments& segments) {
   return handed;
 }
 
-std::vector<std::string> core_arguments(const Scene& scene, const std::string& folder,
+std::vector<std::string> core_arguments(const Scene& scene, const hal::Descriptor& resolved,
                                         const HandedSegments& segments) {
-  return {"--scene",    folder + "/scene.toml",
+  return {"--scene",    hal::inherited_path(resolved),
           "--segments", segments.text(),
           "--clock",    scene.clock == ClockKind::real ? "real" : "virtual"};
 }
 
-std::vector<std::string> vision_arguments(const Scene& scene, const std::string& folder,
-                                          const HandedSegments& segments, bool frames) {
-  std::vector<std::string> args{"live",          "--scene", folder + "/scene.toml", "--segments",
-                                segments.text(), "--out",   folder + "/obs.csv"};
+std::vector<std::string> vision_arguments(const Scene& scene, const hal::Descriptor& resolved,
+                                          const std::string& folder, const HandedSegments& segments,
+                                          bool frames) {
+  std::vector<std::string> args{
+      "live",  "--scene",          hal::inherited_path(resolved), "--segments", segments.text(),
+      "--out", folder + "/obs.csv"};
   if (frames && !is_long(scene)) {
     args.insert(args.end(), {"--overlay", folder + "/frames"});
   }
   return args;
 }
 
+// What a child inherits: its segments, and the scene.
+std::vector<int> inherited(const HandedSegments& segments, const hal::Descriptor& resolved) {
+  std::vector<int> all = segments.descriptors();
+  all.push_back(resolved.number());
+  return all;
+}
+
 // One run, from the first process to the report.
 class Run {
  public:
-  Run(const Scene& scene, const RunSettings& settings, const std::string& folder, Segments& segments,
-      Recorder& recorder, Terminal& terminal)
+  // `resolved`: the scene as the children read it, from their parent and not from a file that others write.
+  Run(const Scene& scene, const hal::Descriptor& resolved, const RunSettings& settings,
+      const std::string& folder, Segments& segments, Recorder& recorder, Terminal& terminal)
       : scene_(scene),
+        resolved_(resolved),
         settings_(settings),
         folder_(folder),
         segments_(segments),
         recorder_(recorder),
         terminal_(terminal),
         core_(*segments.core, segments.commands.front()->queue, scene.clock == ClockKind::real, terminal),
-        vision_(vision_arguments(scene, folder, for_vision(segments), settings.frames),
-                for_vision(segments).descriptors(), folder + "/vision.log", terminal) {}
+        vision_(vision_arguments(scene, resolved, folder, for_vision(segments), settings.frames),
+                inherited(for_vision(segments), resolved), folder + "/vision.log", terminal) {}
 
   int run();
 
@@ -222,6 +237,7 @@ class Run {
   }
   [[nodiscard]] const rt::CoreStatus& status() const { return segments_.core->status; }
   void watch_vision();
+  void watch_recording();
   void tell_progress();
   Ended watch_until_the_core_ends();
   void judge_end(const Ended& core);
@@ -229,6 +245,7 @@ class Run {
   int report();
 
   const Scene& scene_;
+  const hal::Descriptor& resolved_;
   const RunSettings& settings_;
   const std::string& folder_;
   Segments& segments_;
@@ -240,6 +257,8 @@ class Run {
   bool vision_was_refused_ = false;
   bool rights_told_ = false;
   double next_progress_s_ = 0;
+  std::uint64_t recorded_ = 0, ticks_at_record_ = 0;  // when a sample last came
+  double recorded_s_ = 0;
   RunResult result_;
 };
 
@@ -258,8 +277,8 @@ int Run::run() {
     }
   }
   const HandedSegments handed = for_core(segments_);
-  if (auto started =
-          core_.start(core_arguments(scene_, folder_, handed), folder_ + "/core.log", handed.descriptors());
+  if (auto started = core_.start(core_arguments(scene_, resolved_, handed), folder_ + "/core.log",
+                                 inherited(handed, resolved_));
       !started) {
     terminal_.complain(started.error());
     return exit_bad_input;
@@ -290,6 +309,7 @@ Ended Run::watch_until_the_core_ends() {
     }
     segments_.rendezvous.serve();
     watch_vision();
+    watch_recording();
     core_.watch(now_s(), stop_signal::count());
     tell_progress();
     if (taken < kBusyRound) {
@@ -331,6 +351,23 @@ void Run::watch_vision() {
   }
 }
 
+// Samples that stop coming although the core ticks: the recording would end without a word.
+void Run::watch_recording() {
+  const std::uint64_t recorded = recorder_.measures().ticks;
+  const std::uint64_t ticks = status().ticks.load();
+  if (recorded != recorded_ || ticks == ticks_at_record_) {
+    recorded_ = recorded;
+    ticks_at_record_ = ticks;
+    recorded_s_ = now_s();
+  } else if (!result_.silent_from_s && now_s() > recorded_s_ + kSilent_s) {
+    result_.silent_from_s = recorder_.measures().last_s;
+    terminal_.complain(fmt::format(
+        "the core ticks, but none of its samples could be read for {:.0f} s: the recording has a gap from "
+        "{:.3f} s on",
+        kSilent_s, *result_.silent_from_s));
+  }
+}
+
 void Run::tell_progress() {
   const rt::CoreStatus& core = status();
   if (!rights_told_ && core.started.load() != 0) {
@@ -359,7 +396,8 @@ void Run::judge_end(const Ended& core) {
   result_.end = judge(facts, status(), recorder_.measures());
   result_.wall_s = now_s();
   if (result_.end == rt::RunEnd::fault) {
-    result_.detail = rt::name(static_cast<rt::Fault>(status().fault.load()));
+    const auto fault = fault_in(status().fault.load());
+    result_.detail = fault ? rt::name(*fault) : "unknown";
   }
   if (result_.end == rt::RunEnd::core_died) {
     result_.detail = core.text();
@@ -377,6 +415,10 @@ void Run::let_devices_come_to_rest() {
   }
   if ((*segments_.bench)->snapshots.head() == 0) {
     terminal_.say("it had not begun: no device was switched on");
+    return;
+  }
+  if (sim::Snapshot newest; !sim::newest_valid(**segments_.bench, newest)) {
+    terminal_.complain("what it left of the simulated devices is not usable: their state is not known");
     return;
   }
   result_.unattended = sim::run_unattended(*scene_.sim, **segments_.bench);
@@ -397,6 +439,7 @@ int Run::report() {
   result_.rows = recorder_.rows();
   result_.rows_every = recorder_.every();
   result_.samples_lost = recorder_.lost();
+  result_.samples_unusable = recorder_.unusable();
   const auto contour = read_contour_error(folder_ + "/obs.csv");
   const std::string path = folder_ + "/report.json";
   bool complete = true;
@@ -412,6 +455,7 @@ int Run::report() {
     terminal_.complain(fmt::format("{}: samples are not complete, is the disk full?", folder_));
     complete = false;
   }
+  complete = complete && recorder_.unusable() == 0 && !result_.silent_from_s;
   if (settings_.figure) {
     if (auto drawn = draw_run(folder_, scene_, m, result_.rows); !drawn) {
       terminal_.complain(fmt::format("no figure: {}", drawn.error()));
@@ -427,9 +471,9 @@ int Run::report() {
   return code == exit_done && !complete ? exit_not_done : code;
 }
 
-tl::expected<void, std::string> write_resolved(const Scene& scene, const std::string& folder) {
+tl::expected<void, std::string> write_resolved(const std::string& scene, const std::string& folder) {
   std::ofstream out(folder + "/scene.toml");
-  out << to_toml(scene);
+  out << scene;
   if (!out.flush()) {
     return tl::unexpected(fmt::format("{}/scene.toml: cannot be written", folder));
   }
@@ -439,6 +483,9 @@ tl::expected<void, std::string> write_resolved(const Scene& scene, const std::st
 }  // namespace
 
 int run_scene(const Scene& scene, const RunSettings& settings) {
+  // Before anything exists that an end would leave behind.
+  stop_signal::watch({SIGINT, SIGTERM, SIGHUP, SIGQUIT});
+  signal(SIGPIPE, SIG_IGN);
   Terminal terminal;
   const auto refuse = [&terminal](const std::string& why) {
     terminal.complain(why);
@@ -448,22 +495,32 @@ int run_scene(const Scene& scene, const RunSettings& settings) {
   if (!folder) {
     return refuse(folder.error());
   }
-  if (auto written = write_resolved(scene, *folder); !written) {
+  if (const std::string& warning = folder->lock.not_held(); !warning.empty()) {
+    terminal.complain(warning);
+  }
+  const std::string text = to_toml(scene);
+  if (auto written = write_resolved(text, folder->path); !written) {
     return refuse(written.error());
+  }
+  const auto resolved = hal::seal_text("scene", text);
+  if (!resolved) {
+    return refuse(resolved.error());
   }
   auto segments = create_segments(scene);
   if (!segments) {
     return refuse(segments.error());
   }
   auto recorder =
-      Recorder::create(*folder, scene, *segments->core, segments->bench ? segments->bench->get() : nullptr,
-                       rows_every(scene, settings));
+      Recorder::create(folder->path, scene, *segments->core,
+                       segments->bench ? segments->bench->get() : nullptr, rows_every(scene, settings));
   if (!recorder) {
     return refuse(recorder.error());
   }
-  stop_signal::watch({SIGINT, SIGTERM, SIGHUP, SIGQUIT});
-  signal(SIGPIPE, SIG_IGN);
-  Run run(scene, settings, *folder, *segments, *recorder, terminal);
+  if (stop_signal::count() > 0) {
+    terminal.complain("stopped before anything was started");
+    return exit_not_done;
+  }
+  Run run(scene, *resolved, settings, folder->path, *segments, *recorder, terminal);
   return run.run();
 }
 

@@ -133,18 +133,17 @@ TEST_F(Survive, the_folder_of_a_run_that_was_killed_is_free) {
 }
 
 TEST_F(Survive, the_core_runs_the_scene_of_its_parent_whatever_others_write_into_the_folder) {
-  const std::jthread writer([this](const std::stop_token& over) {
-    while (!over.stop_requested()) {
-      if (fs::exists(fs::path(report()) / "scene.toml")) {
-        std::ofstream(fs::path(report()) / "scene.toml") << "[nothing of the kind]\n";
+  for (const char* name : {"a", "b", "c"}) {
+    const std::jthread writer([this, name](const std::stop_token& over) {
+      while (!over.stop_requested()) {
+        if (fs::exists(fs::path(report(name)) / "scene.toml")) {
+          std::ofstream(fs::path(report(name)) / "scene.toml") << "[nothing of the kind]\n";
+        }
       }
-    }
-  });
-  for (int i = 0; i < 3; ++i) {
-    Program run(kPunctum, free_run({"--clock", "virtual", "--seconds", "0.2"}), words());
-    ASSERT_EQ(run.wait(), 0) << said();
-    ASSERT_EQ(json()["outcome"], "done");
-    fs::remove_all(report());
+    });
+    Program run(kPunctum, free_run({"--clock", "virtual", "--seconds", "0.2"}, name), words(name));
+    ASSERT_EQ(run.wait(), 0) << said(name);
+    ASSERT_EQ(json(name)["outcome"], "done");
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include "hal/sim/valid.hpp"
 #include "hal/sim/virtual_clock.hpp"
 #include "hal/sim/waiting.hpp"
 
@@ -40,13 +41,17 @@ hal::Status ExposureTaker::next(Exposure& out, std::int64_t timeout_ns) noexcept
       if (bench_.virtual_time.load(std::memory_order_relaxed) == 0) {
         next_ = exposed - 1;
       }
-      if (bench_.exposures.read(next_, out) == hal::Read::ok) {
+      const bool whole = bench_.exposures.read(next_, out) == hal::Read::ok;
+      if (whole && valid(out)) {
         deliver_ns_ = out.deliver_ns;
         taken_ = true;
         return hal::Status::ok;
       }
-      next_ = exposed - 1;  // overwritten meanwhile: continue with the newest
+      // Of no use: the one after it. Overwritten meanwhile: continue with the newest.
+      next_ = whole ? next_ + 1 : exposed - 1;
       answers_.delivered.store(next_, std::memory_order_release);
+    } else if (exposed < next_) {
+      next_ = exposed;  // the count was not true
     } else if (finished) {
       return hal::Status::disconnected;
     }
@@ -87,11 +92,12 @@ void SnapshotTaker::detach() noexcept {
 }
 
 bool SnapshotTaker::next(Snapshot& out) noexcept {
-  if (follower_.next(out) != hal::Read::ok) {
-    return false;
+  bool usable = false;
+  for (std::uint64_t i = 0; !usable && i < kSnapshots && follower_.next(out) == hal::Read::ok; ++i) {
+    usable = valid(out);
+    bench_.recorder_cursor.store(follower_.position(), std::memory_order_release);
   }
-  bench_.recorder_cursor.store(follower_.position(), std::memory_order_release);
-  return true;
+  return usable;
 }
 
 }  // namespace punctum::sim

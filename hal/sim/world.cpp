@@ -4,6 +4,8 @@
 #include <cmath>
 #include <memory>
 
+#include "hal/sim/valid.hpp"
+
 namespace punctum::sim {
 namespace {
 
@@ -313,8 +315,7 @@ UnattendedEnd run_unattended(const SimConfig& config, const Snapshot& from, Benc
 
 UnattendedEnd run_unattended(const SimConfig& config, Bench& bench, double for_s) {
   Snapshot newest;
-  std::uint64_t index = 0;
-  if (bench.snapshots.newest(newest, index) != hal::Read::ok) {
+  if (!newest_valid(bench, newest)) {
     return {};  // it died before its first tick
   }
   UnattendedEnd end = run_unattended(config, newest, &bench, for_s);

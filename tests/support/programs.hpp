@@ -163,8 +163,8 @@ class Programs : public testing::Test {
 // Looks into the segments of a run while it runs.
 class Look {
  public:
-  Look(const std::string& scene, const Running& running)
-      : name_(scene + "-" + std::to_string(running.pid())) {}
+  Look(const std::string& scene, const Running& running) : Look(scene, running.pid()) {}
+  Look(const std::string& scene, pid_t parent) : name_(scene + "-" + std::to_string(parent)) {}
 
   // Waits until the core has come to a phase; false after 60 s.
   bool until(rt::Phase phase) {

@@ -59,8 +59,8 @@ struct Room {
 // line.
 std::vector<Room> house() {
   const Names interfaces = {"hal/realtime", "hal/math/", "hal/"};
-  const Names ground =
-      interfaces + Names{"hal/device_life", "hal/ipc/", "hal/ipc/segment", "hal/ipc/rendezvous"};
+  const Names ground = interfaces + Names{"hal/device_life", "hal/ipc/", "hal/ipc/segment",
+                                          "hal/ipc/rendezvous", "hal/ipc/sealed_text"};
   const Names sim_shared = {"hal/sim/point", "hal/sim/noise", "hal/sim/config", "hal/sim/failures"};
   const Names sim = sim_shared + Names{"hal/sim/plant/", "hal/sim/operator/", "hal/sim/"};
   const Names core = {
@@ -81,6 +81,7 @@ std::vector<Room> house() {
       {"hal/ipc/", interfaces, kPlain, true},
       {"hal/ipc/segment", interfaces + Names{"hal/ipc/"}, kMayFail},
       {"hal/ipc/rendezvous", interfaces + Names{"hal/ipc/", "hal/ipc/segment"}, kMayFail},
+      {"hal/ipc/sealed_text", interfaces + Names{"hal/ipc/", "hal/ipc/segment"}, kMayFail},
       // Backends: the ground and a library of their own, never each other.
       {"hal/recorded/", ground, kPictures},
       {"hal/gpiod/", ground, "Eigen/.*|tl/expected.hpp|gpiod.*"},

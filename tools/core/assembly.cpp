@@ -75,10 +75,6 @@ std::span<const Backend> backends() {
 
 std::string_view name_of(Role role) noexcept { return kNames[static_cast<std::size_t>(role)].name; }
 
-bool any_simulated(const DeviceNames& names) noexcept {
-  return std::ranges::any_of(kNames, [&](const RoleName& role) { return names.*role.device == kSimulated; });
-}
-
 bool any_real(const DeviceNames& names) noexcept {
   return std::ranges::any_of(kAllRoles, [&](Role role) {
     const std::string& name = device_of(names, role);

@@ -106,9 +106,7 @@ class Assembly {
   std::optional<sim::FollowedStage> followed_stage_;
 };
 
-// What is to be known before anything is opened: the bench is there for simulated devices, the camera's among
-// them; virtual time is for a core without real ones.
-[[nodiscard]] bool any_simulated(const DeviceNames& names) noexcept;
+// What is to be known before anything is opened: virtual time is for a core without real devices.
 [[nodiscard]] bool any_real(const DeviceNames& names) noexcept;
 
 }  // namespace punctum::tools

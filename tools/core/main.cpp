@@ -28,6 +28,7 @@
 #include "tools/core/shut_down.hpp"
 #include "tools/scene/scene.hpp"
 #include "tools/shared/exit_codes.hpp"
+#include "tools/shared/program_start.hpp"
 #include "tools/shared/say.hpp"
 #include "tools/shared/station_segments.hpp"
 #include "tools/shared/stop_signal.hpp"
@@ -202,17 +203,21 @@ rt::RunEnd run_end(const tools::Scene& scene, rt::Executive::Ended ended) {
 // The segments of the station as the core maps them.
 struct StationSegments {
   hal::Shared<rt::CoreSegment> core;
-  std::optional<hal::Shared<const rt::ObservationSegment>> observation;  // none: the scene has no vision
-  std::vector<hal::Shared<rt::CommandSegment>> commands;                 // in the order of kCommandWriters
+  std::vector<hal::Shared<rt::CommandSegment>> commands = {};  // in the order of kCommandWriters
+  std::optional<hal::Shared<const rt::ObservationSegment>> observation = {};  // none: the scene has no vision
+  std::optional<hal::Shared<sim::Bench>> bench = {};                          // none: nothing is simulated
+  std::optional<hal::Shared<sim::CameraAnswers>> camera = {};                 // likewise
 };
 
-tl::expected<StationSegments, std::string> attach_station(const tools::HandedSegments& handed, bool vision) {
+tl::expected<StationSegments, std::string> attach_station(const tools::HandedSegments& handed,
+                                                          const tools::Scene& scene) {
+  // First of all: from here on no second core is accepted.
   auto claimed =
       hal::Shared<rt::CoreSegment>::claim(tools::kCoreSegment, handed.descriptor(tools::kCoreSegment));
   if (!claimed) {
     return tl::unexpected(claimed.error());
   }
-  StationSegments segments{std::move(*claimed), std::nullopt, {}};
+  StationSegments segments{.core = std::move(*claimed)};
   for (const rt::CommandWriter* writer : rt::kCommandWriters) {
     const std::string commands = tools::command_segment(*writer);
     auto attached = hal::Shared<rt::CommandSegment>::attach(commands, handed.descriptor(commands));
@@ -221,7 +226,7 @@ tl::expected<StationSegments, std::string> attach_station(const tools::HandedSeg
     }
     segments.commands.push_back(std::move(*attached));
   }
-  if (vision) {
+  if (scene.vision) {
     auto observation = hal::Shared<const rt::ObservationSegment>::attach(
         tools::kObservationSegment, handed.descriptor(tools::kObservationSegment));
     if (!observation) {
@@ -229,7 +234,185 @@ tl::expected<StationSegments, std::string> attach_station(const tools::HandedSeg
     }
     segments.observation = std::move(*observation);
   }
+  if (scene.sim) {
+    auto bench =
+        hal::Shared<sim::Bench>::attach(tools::kBenchSegment, handed.descriptor(tools::kBenchSegment));
+    if (!bench) {
+      return tl::unexpected(bench.error());
+    }
+    segments.bench = std::move(*bench);
+    auto camera = hal::Shared<sim::CameraAnswers>::attach(tools::kCameraSegment,
+                                                          handed.descriptor(tools::kCameraSegment));
+    if (!camera) {
+      return tl::unexpected(camera.error());
+    }
+    segments.camera = std::move(*camera);
+  }
   return segments;
+}
+
+// The scene that the parent hands over, on the clock that it names.
+tl::expected<tools::Scene, std::string> scene_to_run(const Arguments& arguments) {
+  auto scene = tools::load_scene(arguments.scene);
+  if (!scene) {
+    return scene;
+  }
+  if (!arguments.clock.empty()) {
+    scene->clock = arguments.clock == "real" ? tools::ClockKind::real : tools::ClockKind::virtual_time;
+  }
+  if (scene->clock == tools::ClockKind::virtual_time && (!scene->sim || tools::any_real(scene->devices))) {
+    return tl::unexpected(
+        std::string("--clock virtual: the scene has real devices, which do not wait for it, allowed: real"));
+  }
+  return scene;
+}
+
+bool in_real_time(const tools::Scene& scene) { return scene.clock == tools::ClockKind::real; }
+
+// The time of the station: of this machine, or the bench's own, which a signal may wake from waiting.
+class StationClock {
+ public:
+  StationClock(const tools::Scene& scene, StationSegments& segments) {
+    if (!in_real_time(scene)) {
+      virtual_.emplace(**segments.bench, **segments.camera);
+      waiting_clock = &*virtual_;
+      if (stop_signal::count() > 0) {
+        virtual_->stop_waiting();
+      }
+    } else if (segments.bench) {
+      (*segments.bench)->now_ns.store(monotonic_.now_ns());
+    }
+  }
+  ~StationClock() { waiting_clock = nullptr; }
+  StationClock(const StationClock&) = delete;
+  StationClock& operator=(const StationClock&) = delete;
+
+  [[nodiscard]] hal::Clock& now() {
+    return virtual_ ? static_cast<hal::Clock&>(*virtual_) : static_cast<hal::Clock&>(monotonic_);
+  }
+  // For durations on this machine, in either kind of time.
+  [[nodiscard]] rt::MonotonicClock& monotonic() { return monotonic_; }
+
+  // In virtual time, before the first tick: camera and recorder are there, or it was waited for them in vain.
+  void await_others(bool vision) {
+    if (virtual_ && vision) {
+      (void)virtual_->await_camera();
+    }
+    if (virtual_) {
+      (void)virtual_->await_recorder();
+    }
+  }
+  // The shut-down waits for nobody.
+  void wait_no_more() {
+    if (virtual_) {
+      virtual_->stop_waiting();
+    }
+  }
+
+ private:
+  rt::MonotonicClock monotonic_;
+  std::optional<sim::VirtualClock> virtual_;
+};
+
+// Priority, processor and memory for this thread, and every page of the segments in place.
+rt::RealTimeRights become_real_time(const tools::Scene& scene, const StationSegments& segments) {
+  rt::RightsWanted wanted;
+  wanted.priority = scene.core_priority;
+  wanted.cpu = scene.core_cpu;
+  auto rights = rt::RealTimeRights::acquire(wanted);
+  rights.publish(segments.core->status);
+  rt::prefault_writable(segments.core.get(), sizeof(rt::CoreSegment));
+  for (const auto& commands : segments.commands) {
+    rt::prefault_writable(commands.get(), sizeof(rt::CommandSegment));
+  }
+  if (segments.observation) {
+    rt::prefault(segments.observation->get(), sizeof(rt::ObservationSegment));
+  }
+  if (segments.bench) {
+    rt::prefault_writable(segments.bench->get(), sizeof(sim::Bench));
+  }
+  return rights;
+}
+
+rt::ExecutiveConfig executive_config(const tools::Scene& scene, std::int64_t period_ns,
+                                     std::int64_t start_ns) {
+  rt::ExecutiveConfig config;
+  config.period_ns = period_ns;
+  config.start_ns = start_ns;
+  config.overrun_window_ticks =
+      static_cast<std::uint32_t>(std::clamp(scene.servo.overrun_window_s * scene.servo.rate_Hz, 1.0,
+                                            static_cast<double>(rt::MissedWindow::kMaxTicks)));
+  return config;
+}
+
+// The loop itself, from the first tick to the last; nothing in it allocates, which is counted.
+rt::Executive::Ended run_loop(rt::Executive& executive, rt::CoreStatus& status) {
+  const rt::ThreadCounters before = rt::read_thread_counters();
+  rt::allocation_trap::arm(rt::allocation_trap::On::allocation_count);
+  const bool watched = rt::allocation_trap::armed();
+  const auto ended = executive.run(end_loop);
+  const std::uint64_t allocations = rt::allocation_trap::disarm();
+  rt::publish_counters(before, rt::read_thread_counters(), allocations, watched, status);
+  return ended;
+}
+
+// The last event, and the word on which the parent waits.
+void publish_end(rt::CoreSegment& segment, rt::RunEnd end) {
+  rt::Event last;
+  last.tick = segment.status.tick_index.load();
+  last.t_s = core.servo().sample().t_s;
+  last.kind = rt::Event::ended;
+  last.what = static_cast<std::uint64_t>(end);
+  segment.events.push(last);
+  segment.status.run_end.store(static_cast<std::uint64_t>(end), std::memory_order_release);
+}
+
+// With every device open: takes the rights, starts the devices, runs the loop, and shuts down.
+int control(const tools::Scene& scene, StationSegments& segments, StationClock& clock,
+            tools::Assembly& assembly) {
+  const auto period_ns = static_cast<std::int64_t>(std::llround(1e9 / scene.servo.rate_Hz));
+  std::optional<rt::RealTimeRights> rights;
+  if (in_real_time(scene)) {
+    rights.emplace(become_real_time(scene, segments));
+  }
+  clock.await_others(scene.vision.has_value());
+  const std::int64_t start_ns = clock.now().now_ns() + (in_real_time(scene) ? kSetUp_ns : period_ns);
+  // From here on every way out of this function, an exception too, goes through it.
+  tools::ShutDown shut_down(assembly.devices(), clock.now(), period_ns,
+                            std::llround(scene.servo.estop.power_off_after_s * 1e9));
+  if (const auto started = assembly.start(start_ns); !started) {
+    return bad(started.error());
+  }
+  shut_down.started(assembly.world());
+  static const rt::Devices devices = assembly.devices();
+  tools::shut_down_when_spinning(devices);
+  if (!rt::drop_capabilities()) {
+    return bad("its capabilities cannot be given up");
+  }
+
+  std::vector<rt::CommandInput> commands;
+  for (std::size_t i = 0; i < rt::kCommandWriterCount; ++i) {
+    commands.push_back({&segments.commands[i]->queue, rt::kCommandWriters[i]->role});
+  }
+  rt::Station station{*segments.core, segments.observation ? &(*segments.observation)->slot : nullptr,
+                      commands};
+  core.set_up(scene, assembly, station, rights && rights->degraded());
+  std::vector<rt::Slot> slots;
+  if (assembly.world() != nullptr) {
+    slots.push_back(rt::slot<&Core::step_plant>("plant", core));
+  }
+  slots.push_back(rt::slot<&Core::tick_servo>("servo", core));
+  rt::CoreStatus& status = segments.core->status;
+  rt::Executive executive(clock.now(), clock.monotonic(), executive_config(scene, period_ns, start_ns), slots,
+                          status);
+
+  const auto ended = run_loop(executive, status);
+  clock.wait_no_more();
+  shut_down.run();
+  rt::leave_real_time();
+  const rt::RunEnd end = run_end(scene, ended);
+  publish_end(*segments.core, end);
+  return tools::exit_code(end);
 }
 
 int run(int argc, char** argv) {
@@ -246,153 +429,34 @@ int run(int argc, char** argv) {
   if (!arguments) {
     return bad(arguments.error());
   }
-  auto scene = tools::load_scene(arguments->scene);
+  const auto scene = scene_to_run(*arguments);
   if (!scene) {
     return bad(scene.error());
   }
-  if (!arguments->clock.empty()) {
-    scene->clock = arguments->clock == "real" ? tools::ClockKind::real : tools::ClockKind::virtual_time;
-  }
-  const bool real = scene->clock == tools::ClockKind::real;
-  const bool simulated = tools::any_simulated(scene->devices);
-  if (!real && (!simulated || tools::any_real(scene->devices))) {
-    return bad("--clock virtual: the scene has real devices, which do not wait for it, allowed: real");
-  }
-
-  auto segments = attach_station(arguments->segments, scene->vision.has_value());
+  auto segments = attach_station(arguments->segments, *scene);
   if (!segments) {
     return bad(segments.error());
   }
   if (!stop_signal::watch_parent(segments->core->header.owner_pid)) {
     return bad("the program that started it has died");
   }
-  std::optional<hal::Shared<sim::Bench>> bench;
-  std::optional<hal::Shared<sim::CameraAnswers>> camera;
-  if (simulated) {
-    auto attached = hal::Shared<sim::Bench>::attach(tools::kBenchSegment,
-                                                    arguments->segments.descriptor(tools::kBenchSegment));
-    if (!attached) {
-      return bad(attached.error());
-    }
-    bench.emplace(std::move(*attached));
-    auto answers = hal::Shared<sim::CameraAnswers>::attach(
-        tools::kCameraSegment, arguments->segments.descriptor(tools::kCameraSegment));
-    if (!answers) {
-      return bad(answers.error());
-    }
-    camera.emplace(std::move(*answers));
-  }
   if (stop_signal::count() > 0) {
     return tools::exit_not_done;  // stopped before anything has moved
   }
-  rt::CoreStatus& status = segments->core->status;
-  status.pid.store(static_cast<std::uint64_t>(getpid()));
-
-  const auto period_ns = static_cast<std::int64_t>(std::llround(1e9 / scene->servo.rate_Hz));
-  rt::MonotonicClock monotonic;
-  std::optional<sim::VirtualClock> virtual_clock;
-  if (simulated && real) {
-    (*bench)->now_ns.store(monotonic.now_ns());
-  } else if (simulated) {
-    virtual_clock.emplace(**bench, **camera);
-    waiting_clock = &*virtual_clock;
-    if (stop_signal::count() > 0) {
-      virtual_clock->stop_waiting();
-    }
-  }
-  hal::Clock& clock = real ? static_cast<hal::Clock&>(monotonic) : *virtual_clock;
-
-  const auto assembly = tools::Assembly::open({*scene, clock, simulated ? bench->get() : nullptr});
+  segments->core->status.pid.store(static_cast<std::uint64_t>(getpid()));
+  StationClock clock(*scene, *segments);
+  const auto assembly =
+      tools::Assembly::open({*scene, clock.now(), segments->bench ? segments->bench->get() : nullptr});
   if (!assembly) {
     return bad(assembly.error());
   }
-
-  std::optional<rt::RealTimeRights> rights;
-  bool degraded = false;
-  if (real) {
-    rt::RightsWanted wanted;
-    wanted.priority = scene->core_priority;
-    wanted.cpu = scene->core_cpu;
-    rights.emplace(rt::RealTimeRights::acquire(wanted));
-    rights->publish(status);
-    degraded = rights->degraded();
-    rt::prefault_writable(segments->core.get(), sizeof(rt::CoreSegment));
-    for (const auto& commands : segments->commands) {
-      rt::prefault_writable(commands.get(), sizeof(rt::CommandSegment));
-    }
-    if (segments->observation) {
-      rt::prefault(segments->observation->get(), sizeof(rt::ObservationSegment));
-    }
-    if (simulated) {
-      rt::prefault_writable(bench->get(), sizeof(sim::Bench));
-    }
-  } else {
-    if (scene->vision) {
-      (void)virtual_clock->await_camera();
-    }
-    (void)virtual_clock->await_recorder();
-  }
-  const std::int64_t start_ns = clock.now_ns() + (real ? kSetUp_ns : period_ns);
-  // From here on every way out of this function, an exception too, goes through it.
-  tools::ShutDown shut_down((*assembly)->devices(), clock, period_ns,
-                            std::llround(scene->servo.estop.power_off_after_s * 1e9));
-  if (const auto started = (*assembly)->start(start_ns); !started) {
-    return bad(started.error());
-  }
-  shut_down.started((*assembly)->world());
-  static const rt::Devices devices = (*assembly)->devices();
-  tools::shut_down_when_spinning(devices);
-  if (!rt::drop_capabilities()) {
-    return bad("its capabilities cannot be given up");
-  }
-  std::vector<rt::CommandInput> commands;
-  for (std::size_t i = 0; i < rt::kCommandWriterCount; ++i) {
-    commands.push_back({&segments->commands[i]->queue, rt::kCommandWriters[i]->role});
-  }
-  rt::Station station{*segments->core, segments->observation ? &(*segments->observation)->slot : nullptr,
-                      commands};
-  core.set_up(*scene, **assembly, station, degraded);
-
-  std::vector<rt::Slot> slots;
-  if ((*assembly)->world() != nullptr) {
-    slots.push_back(rt::slot<&Core::step_plant>("plant", core));
-  }
-  slots.push_back(rt::slot<&Core::tick_servo>("servo", core));
-  rt::ExecutiveConfig config;
-  config.period_ns = period_ns;
-  config.start_ns = start_ns;
-  config.overrun_window_ticks =
-      static_cast<std::uint32_t>(std::clamp(scene->servo.overrun_window_s * scene->servo.rate_Hz, 1.0,
-                                            static_cast<double>(rt::MissedWindow::kMaxTicks)));
-  rt::Executive executive(clock, monotonic, config, slots, status);
-
-  const rt::ThreadCounters before = rt::read_thread_counters();
-  rt::allocation_trap::arm(rt::allocation_trap::On::allocation_count);
-  const bool watched = rt::allocation_trap::armed();
-  const auto ended = executive.run(end_loop);
-  const std::uint64_t allocations = rt::allocation_trap::disarm();
-  rt::publish_counters(before, rt::read_thread_counters(), allocations, watched, status);
-  if (virtual_clock) {
-    virtual_clock->stop_waiting();  // the shut-down waits for nobody
-  }
-  shut_down.run();
-  rt::leave_real_time();
-  waiting_clock = nullptr;
-  const rt::RunEnd end = run_end(*scene, ended);
-  rt::Event last;
-  last.tick = status.tick_index.load();
-  last.t_s = core.servo().sample().t_s;
-  last.kind = rt::Event::ended;
-  last.what = static_cast<std::uint64_t>(end);
-  segments->core->events.push(last);
-  status.run_end.store(static_cast<std::uint64_t>(end), std::memory_order_release);
-  return tools::exit_code(end);
+  return control(*scene, *segments, clock, **assembly);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  tools::take_file_limits_as_errors();
+  tools::start_program();
   try {
     return run(argc, argv);
   } catch (const std::exception& e) {

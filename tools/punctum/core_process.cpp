@@ -9,6 +9,9 @@ namespace {
 constexpr double kTimeToAnswer_s = 5;
 constexpr double kHung_s = 2;          // without a tick
 constexpr double kHungVirtual_s = 30;  // it may wait for camera and recorder
+// Without a step of its set-up or its shut-down: they read a scene, lock memory, open devices and let the
+// drive brake, a second or two of work on an idle machine.
+constexpr double kHungOutsideLoop_s = 10;
 
 }  // namespace
 
@@ -17,7 +20,8 @@ CoreProcess::CoreProcess(const rt::CoreSegment& segment, rt::CommandQueue& comma
     : status_(segment.status),
       commands_(commands),
       terminal_(terminal),
-      longest_without_tick_s_(real_time ? kHung_s : kHungVirtual_s) {}
+      longest_without_tick_s_(real_time ? kHung_s : kHungVirtual_s),
+      longest_outside_loop_s_(real_time ? kHungOutsideLoop_s : kHungVirtual_s) {}
 
 tl::expected<void, std::string> CoreProcess::start(const std::vector<std::string>& args,
                                                    const std::string& log,
@@ -38,7 +42,7 @@ void CoreProcess::ask(rt::Command::Kind what) {
 
 void CoreProcess::watch(double now_s, int stop_signals) {
   watch_stop(now_s, stop_signals);
-  watch_ticks(now_s);
+  watch_progress(now_s);
 }
 
 void CoreProcess::watch_stop(double now_s, int stop_signals) {
@@ -62,18 +66,24 @@ void CoreProcess::watch_stop(double now_s, int stop_signals) {
   }
 }
 
-// A core that hangs will not come back by itself; its heartbeat has stopped and the relay has acted.
-void CoreProcess::watch_ticks(double now_s) {
-  const std::uint64_t ticks = status_.ticks.load(std::memory_order_relaxed);
-  const bool in_loop = status_.started.load(std::memory_order_relaxed) != 0 &&
-                       status_.counters_final.load(std::memory_order_relaxed) == 0;
-  if (ticks != seen_ticks_ || !in_loop) {
-    seen_ticks_ = ticks;
-    ticked_s_ = now_s;
-  } else if (now_s > ticked_s_ + longest_without_tick_s_) {
-    terminal_.complain(fmt::format("the core has not ticked for {:.0f} s: killed", longest_without_tick_s_));
+// A core that hangs will not come back by itself; its heartbeat has stopped and the relay has acted. It is
+// watched from its first moment to its last, by whatever moves in its status.
+void CoreProcess::watch_progress(double now_s) {
+  const Progress progress{status_.ticks.load(std::memory_order_relaxed),
+                          status_.started.load(std::memory_order_relaxed) != 0,
+                          status_.counters_final.load(std::memory_order_relaxed) != 0};
+  const bool in_loop = progress.started && !progress.loop_ended;
+  const double longest_s = in_loop ? longest_without_tick_s_ : longest_outside_loop_s_;
+  if (progress != seen_) {
+    seen_ = progress;
+    moved_s_ = now_s;
+  } else if (now_s > moved_s_ + longest_s) {
+    terminal_.complain(in_loop
+                           ? fmt::format("the core has not ticked for {:.0f} s: killed", longest_s)
+                           : fmt::format("the core has hung for {:.0f} s {}: killed", longest_s,
+                                         progress.started ? "in its shut-down" : "before its first tick"));
     child_.send(SIGKILL);
-    ticked_s_ = now_s;
+    moved_s_ = now_s;
   }
 }
 

@@ -1,4 +1,5 @@
-// The control core as its parent sees it: started once, asked to stop in steps, killed when it hangs.
+// The control core as its parent sees it: started once, asked to stop in steps, killed when it hangs:
+// in its set-up, in its loop or in its shut-down.
 #pragma once
 
 #include <cstdint>
@@ -29,18 +30,23 @@ class CoreProcess {
 
  private:
   enum class Step : std::uint8_t { none, commanded, signalled, killed };
+  struct Progress {
+    std::uint64_t ticks = 0;
+    bool started = false, loop_ended = false;
+    friend bool operator==(const Progress&, const Progress&) = default;
+  };
   void watch_stop(double now_s, int stop_signals);
-  void watch_ticks(double now_s);
+  void watch_progress(double now_s);
 
   const rt::CoreStatus& status_;
   rt::CommandQueue& commands_;
   Terminal& terminal_;
-  double longest_without_tick_s_;
+  double longest_without_tick_s_, longest_outside_loop_s_;
   Child child_;
   Step step_ = Step::none;
   double stepped_s_ = 0;
-  std::uint64_t seen_ticks_ = 0;
-  double ticked_s_ = 0;
+  Progress seen_;
+  double moved_s_ = 0;  // when it last changed
 };
 
 }  // namespace punctum::tools

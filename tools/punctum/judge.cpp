@@ -1,5 +1,7 @@
 #include "tools/punctum/judge.hpp"
 
+#include "tools/shared/station_values.hpp"
+
 namespace punctum::tools {
 namespace {
 
@@ -23,17 +25,21 @@ RunEnd ended_without_task(const RunFacts& facts, const rt::CoreStatus& core, con
 
 RunEnd judge(const RunFacts& facts, const rt::CoreStatus& core, const Measures& measures) {
   // A core that ends in order says how it ended.
-  const bool said_nothing = core.run_end.load() == static_cast<std::uint64_t>(RunEnd::running);
+  const auto end = run_end_in(core.run_end.load());
+  const bool said_nothing = !end || *end == RunEnd::running;
   if (!facts.core_exited || (said_nothing && !facts.stop_was_asked)) {
     return RunEnd::core_died;
   }
-  const auto fault = static_cast<rt::Fault>(core.fault.load());
-  if (fault != rt::Fault::none && fault != rt::Fault::command_stop) {
+  const auto fault = fault_in(core.fault.load());
+  if (!fault) {
+    return RunEnd::fault;  // a core that names no fault that exists is defective
+  }
+  if (*fault != rt::Fault::none && *fault != rt::Fault::command_stop) {
     return RunEnd::fault;
   }
-  const auto phase = static_cast<rt::Phase>(core.phase.load());
+  const auto phase = phase_in(core.phase.load());
   const bool clear = phase == rt::Phase::clear;
-  if (facts.stop_was_asked || fault == rt::Fault::command_stop) {
+  if (facts.stop_was_asked || *fault == rt::Fault::command_stop) {
     // A scene without a task has no end of its own: whoever ends it outside a cell ends it well.
     const bool outside = clear || phase == rt::Phase::free;
     return facts.has_task || facts.vision_over || !outside ? RunEnd::stopped
@@ -59,7 +65,8 @@ RunEnd judge(const RunFacts& facts, const rt::CoreStatus& core, const Measures& 
   if (core.task_finished.load() != 0) {
     return ended_well(core);
   }
-  return clear ? RunEnd::not_injected : RunEnd::time_limit;
+  const bool at_limit = end == RunEnd::time_limit;
+  return clear && !at_limit ? RunEnd::not_injected : RunEnd::time_limit;
 }
 
 }  // namespace punctum::tools

@@ -14,6 +14,7 @@
 #include "tools/scene/scene.hpp"
 #include "tools/shared/command_line.hpp"
 #include "tools/shared/exit_codes.hpp"
+#include "tools/shared/program_start.hpp"
 #include "tools/shared/say.hpp"
 #include "tools/shared/version.hpp"
 
@@ -170,7 +171,7 @@ int main_or_throw(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  punctum::tools::take_file_limits_as_errors();
+  start_program();
   try {
     return main_or_throw(argc, argv);
   } catch (const std::exception& e) {

@@ -12,6 +12,7 @@
 
 #include "rt/forces/list.hpp"
 #include "tools/punctum/event_log.hpp"
+#include "tools/shared/station_values.hpp"
 
 namespace punctum::tools {
 namespace {
@@ -68,6 +69,7 @@ Recorder::Recorder(RowFile file, const std::string& folder, const Scene& scene, 
       recent_(static_cast<std::size_t>(kBeforeFault_s * scene.servo.rate_Hz)),
       sim_(scene.sim.value_or(sim::SimConfig{})),
       measures_(scene),
+      core_(core),
       telemetry_(core.telemetry),
       event_ring_(core.events),
       every_(every > 0 ? every : 1),
@@ -87,23 +89,34 @@ Recorder::Recorder(RowFile file, const std::string& folder, const Scene& scene, 
 }
 
 std::uint64_t Recorder::drain(bool to_the_end) {
+  // What a ring holds is the most that a writer which is gone has left, and no round takes more.
+  const std::uint64_t most = to_the_end ? rt::TelemetryRing::kSize : kMostTicksPerRound;
   std::uint64_t taken = 0;
-  while ((to_the_end || taken < kMostTicksPerRound) && telemetry_.next(sample_) == hal::Read::ok) {
-    record(sample_, world_of(sample_));
+  while (taken < most && telemetry_.next(sample_) == hal::Read::ok) {
     ++taken;
+    if (usable(sample_)) {
+      record(sample_, world_of(sample_));
+    } else {
+      ++unusable_;
+    }
   }
   rt::Event event;
-  while (event_ring_.next(event) == hal::Read::ok) {
+  for (std::size_t i = 0; i < rt::EventRing::kSize && event_ring_.next(event) == hal::Read::ok; ++i) {
     events_.add(event);
     events_table_.file.append(event_line(event));
   }
   events_.lost = event_ring_.lost();
   flush_now_and_then();
   if (taker_ && to_the_end) {
-    while (taker_->next(world_)) {
+    for (std::uint64_t i = 0; i < sim::kSnapshots && taker_->next(world_); ++i) {
     }
   }
   return taken;
+}
+
+// A ring whose counter is wrong may seem to have run far ahead; no more can be lost than was executed.
+std::uint64_t Recorder::lost() const noexcept {
+  return std::min(telemetry_.lost(), core_.status.ticks.load(std::memory_order_relaxed));
 }
 
 // The plant publishes before the core does: the snapshot of a tick is there, or it was overwritten.

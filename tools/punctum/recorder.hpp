@@ -39,7 +39,9 @@ class Recorder {
   [[nodiscard]] const EventList& events() const noexcept { return events_; }
   [[nodiscard]] std::uint64_t rows() const noexcept { return rows_; }
   // Samples that were overwritten before they were read.
-  [[nodiscard]] std::uint64_t lost() const noexcept { return telemetry_.lost(); }
+  [[nodiscard]] std::uint64_t lost() const noexcept;
+  // Samples that named what does not exist; they are in no file.
+  [[nodiscard]] std::uint64_t unusable() const noexcept { return unusable_; }
   [[nodiscard]] std::uint64_t every() const noexcept { return every_; }
   // What could not be written so far: of each file the first failure. The run goes on without.
   [[nodiscard]] const std::vector<NotKept>& not_kept() const noexcept { return not_kept_; }
@@ -77,6 +79,7 @@ class Recorder {
   int faults_kept_ = 0;
   sim::SimConfig sim_;
   Measures measures_;
+  const rt::CoreSegment& core_;
   hal::Follower<rt::TelemetryRing> telemetry_;
   hal::Follower<rt::EventRing> event_ring_;
   EventList events_;
@@ -84,7 +87,7 @@ class Recorder {
   std::chrono::steady_clock::time_point flushed_{};
   std::unique_ptr<sim::SnapshotTaker> taker_;
   std::uint64_t every_;
-  std::uint64_t rows_ = 0;
+  std::uint64_t rows_ = 0, unusable_ = 0;
   double half_period_s_;
   std::uint64_t ticks_after_fault_;
   bool world_pending_ = false;  // world_ is of a tick whose sample has not come yet

@@ -10,6 +10,7 @@
 #include <ctime>
 #include <filesystem>
 #include <fstream>
+#include <utility>
 #include <vector>
 
 #include "tools/scene/messages.hpp"
@@ -141,6 +142,11 @@ tl::expected<ReportFolder, std::string> prepare_report_folder(const Scene& scene
   }
   if (!there || wanted.empty() || is_report(folder)) {
     const bool taken = there && !wanted.empty();
+    if (taken) {
+      if (const auto free = FolderLock::take(folder.string()); !free) {
+        return tl::unexpected(free.error());
+      }
+    }
     const auto made = new_folder(folder, taken ? 2 : 1);
     if (!made) {
       return tl::unexpected(made.error());
@@ -157,12 +163,21 @@ tl::expected<ReportFolder, std::string> prepare_report_folder(const Scene& scene
   if (access(folder.c_str(), W_OK | X_OK) != 0) {
     return tl::unexpected(fmt::format("{}: cannot be written to: {}", folder.string(), std::strerror(errno)));
   }
+  auto lock = FolderLock::take(folder.string());
+  if (!lock) {
+    return tl::unexpected(lock.error());
+  }
+  report.lock = std::move(*lock);
   report.folder = fs::absolute(folder).string();
   return report;
 }
 
 tl::expected<std::string, std::string> take_place(const ReportFolder& report) {
   const fs::path from = report.folder, to = report.replaces;
+  const auto lock = FolderLock::take(to.string());
+  if (!lock) {
+    return tl::unexpected(lock.error());
+  }
   std::error_code ec;
   clear(to);
   fs::create_directory(to / kFrames, ec);

@@ -4,6 +4,7 @@
 #include <string>
 #include <tl/expected.hpp>
 
+#include "tools/punctum/folder_lock.hpp"
 #include "tools/scene/scene.hpp"
 
 namespace punctum::tools {
@@ -14,11 +15,13 @@ struct ReportFolder {
   std::string replaces;  // an earlier report whose place it takes once it is whole; empty: none
   std::string note;      // one line on why it is not the folder that was wanted; empty where it is
   bool is_new = false;   // made for this run
+  FolderLock lock;       // held until the report is whole
 };
 
 // Makes a new folder, reports/SCENE-DATE here where none is wanted. A folder that holds the report of an
 // earlier run is left alone: the run writes beside it, into FOLDER-2, and takes its place only in
-// take_place(). A folder that holds anybody's own files of a report's names is refused. Nothing is cleared.
+// take_place(). A folder that another run is writing to, or that holds anybody's own files of a report's
+// names, is refused. Nothing is cleared.
 [[nodiscard]] tl::expected<ReportFolder, std::string> prepare_report_folder(const Scene& scene,
                                                                             const std::string& wanted,
                                                                             bool overwrite);

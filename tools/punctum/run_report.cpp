@@ -14,6 +14,7 @@
 #include "tools/punctum/terminal.hpp"
 #include "tools/shared/csv.hpp"
 #include "tools/shared/exit_codes.hpp"
+#include "tools/shared/station_values.hpp"
 
 namespace punctum::tools {
 namespace {
@@ -45,6 +46,12 @@ Json bins(const rt::TimeHistogram& h) {
     }
   }
   return {{"from_us", from_us}, {"count", count}, {"over", h.overflow()}};
+}
+
+// For a terminal and for a file, whatever stands in the segment.
+template <std::size_t N>
+std::string text_of(const rt::Text<N>& text) {
+  return printable(bounded(text), N);
 }
 
 std::vector<const rt::Right*> rights(const rt::CoreStatus& core) {
@@ -118,12 +125,12 @@ std::string missing_rights(const rt::CoreStatus& core) {
       continue;
     }
     if (r->required == 0) {
-      advice += fmt::format("{}{}", advice.empty() ? "" : ", ", r->name.text);
+      advice += fmt::format("{}{}", advice.empty() ? "" : ", ", text_of(r->name));
       continue;
     }
-    missing += fmt::format("\n  {:<18} {}", r->name.text, r->detail.text);
-    if (r->remedy.text[0] != '\0') {
-      missing += fmt::format("\n{:21}get it: {}", "", r->remedy.text);
+    missing += fmt::format("\n  {:<18} {}", text_of(r->name), text_of(r->detail));
+    if (const std::string remedy = text_of(r->remedy); !remedy.empty()) {
+      missing += fmt::format("\n{:21}get it: {}", "", remedy);
     }
   }
   if (missing.empty()) {
@@ -178,7 +185,7 @@ nlohmann::ordered_json report_facts(const Scene& scene, const RunResult& result,
   j["tick_us"] = times(core.tick);  // everything of one tick, the simulated plant included
   j["slots_us"] = Json::object();
   for (std::uint64_t i = 0; i < std::min<std::uint64_t>(core.slot_count.load(), rt::kMaxSlots); ++i) {
-    j["slots_us"][core.slots[i].name.text] = times(core.slots[i].execution);
+    j["slots_us"][text_of(core.slots[i].name)] = times(core.slots[i].execution);
   }
   // Counted by the core when it ends: unknown of one that was killed.
   const auto counted = [&result](std::uint64_t n) {
@@ -192,11 +199,11 @@ nlohmann::ordered_json report_facts(const Scene& scene, const RunResult& result,
   j["degraded"] = core.degraded.load() != 0;
   j["rights"] = Json::array();
   for (const auto* r : rights(core)) {
-    j["rights"].push_back({{"name", r->name.text},
+    j["rights"].push_back({{"name", text_of(r->name)},
                            {"got", r->got != 0},
                            {"required", r->required != 0},
-                           {"detail", r->detail.text},
-                           {"remedy", r->remedy.text}});
+                           {"detail", text_of(r->detail)},
+                           {"remedy", text_of(r->remedy)}});
   }
 
   // Against the truth. One number per run: the mean over its cells; peaks are the largest.
@@ -285,8 +292,14 @@ nlohmann::ordered_json report_facts(const Scene& scene, const RunResult& result,
                        {"vacuum_kept", u.vacuum_kept},
                        {"cell_held", u.cell_held}};
   }
-  j["samples"] = {
-      {"rows", result.rows}, {"every", result.rows_every}, {"lost", result.samples_lost}, {"gaps", m.gaps}};
+  j["samples"] = {{"rows", result.rows},
+                  {"every", result.rows_every},
+                  {"lost", result.samples_lost},
+                  {"gaps", m.gaps},
+                  {"unusable", result.samples_unusable}};
+  if (result.silent_from_s) {
+    j["samples"]["silent_from_s"] = *result.silent_from_s;
+  }
   for (const auto& [name, histogram] :
        {std::pair{"wake_histogram", &core.wake}, std::pair{"tick_histogram", &core.tick}}) {
     j[name] = bins(*histogram);
@@ -407,6 +420,12 @@ std::string summary(const Scene& scene, const RunResult& result, const Measures&
   }
   if (result.samples_lost > 0) {
     line("recording", fmt::format("{} samples were overrun before they were read", result.samples_lost));
+  }
+  if (result.samples_unusable > 0) {
+    line("recording", fmt::format("{} samples were not usable", result.samples_unusable));
+  }
+  if (result.silent_from_s) {
+    line("recording", fmt::format("no samples came from {:.3f} s on", *result.silent_from_s));
   }
   if (result.rows_every > 1) {
     line("samples.csv", fmt::format("one row for {} ticks, and every change of phase", result.rows_every));

@@ -33,6 +33,8 @@ struct RunResult {
   double wall_s = 0;
   std::vector<NotKept> not_kept;  // in the order of time
   std::uint64_t rows = 0, rows_every = 1, samples_lost = 0;
+  std::uint64_t samples_unusable = 0;   // they named what does not exist
+  std::optional<double> silent_from_s;  // the core ticked, but none of its samples could be read any more
   std::vector<Restart> vision_restarts;
   std::optional<sim::UnattendedEnd> unattended;  // what the devices did after the death of the core
 };

@@ -15,8 +15,10 @@
 #include <vector>
 
 #include "hal/ipc/rendezvous.hpp"
+#include "hal/ipc/sealed_text.hpp"
 #include "hal/ipc/segment.hpp"
 #include "hal/sim/bench.hpp"
+#include "hal/sim/valid.hpp"
 #include "hal/sim/world.hpp"
 #include "rt/station/station.hpp"
 #include "tools/punctum/core_process.hpp"
@@ -32,6 +34,7 @@
 #include "tools/scene/messages.hpp"
 #include "tools/shared/exit_codes.hpp"
 #include "tools/shared/station_segments.hpp"
+#include "tools/shared/station_values.hpp"
 #include "tools/shared/stop_signal.hpp"
 #include "tools/shared/whole_file.hpp"
 
@@ -41,6 +44,7 @@ namespace {
 constexpr double kLongRun_s = 600;         // longer ones are recorded thinner, and without annotated frames
 constexpr double kOpenEnded_s = 8 * 3600;  // what is recorded of a run without a limit at that density
 constexpr double kRowsOfLongRun = 500'000;
+constexpr double kSilent_s = 2;           // without a readable sample while the core ticks
 constexpr std::uint64_t kBusyRound = 64;  // ticks drained in one round: there may be more already
 
 // Letters, digits, '-' and '_' of the scene's name, and this process: two runs never meet.
@@ -187,29 +191,41 @@ HandedSegments for_vision(const Segments& segments) {
   return handed;
 }
 
-std::vector<std::string> core_arguments(const Scene& scene, const std::string& folder,
+std::vector<std::string> core_arguments(const Scene& scene, const hal::Descriptor& resolved,
                                         const HandedSegments& segments) {
-  return {"--scene",    folder + "/scene.toml",
+  return {"--scene",    hal::inherited_path(resolved),
           "--segments", segments.text(),
           "--clock",    scene.clock == ClockKind::real ? "real" : "virtual"};
 }
 
-std::vector<std::string> vision_arguments(const Scene& scene, const std::string& folder,
-                                          const HandedSegments& segments, bool frames) {
-  std::vector<std::string> args{"live",          "--scene", folder + "/scene.toml", "--segments",
-                                segments.text(), "--out",   folder + "/obs.csv"};
+std::vector<std::string> vision_arguments(const Scene& scene, const hal::Descriptor& resolved,
+                                          const std::string& folder, const HandedSegments& segments,
+                                          bool frames) {
+  std::vector<std::string> args{
+      "live",  "--scene",          hal::inherited_path(resolved), "--segments", segments.text(),
+      "--out", folder + "/obs.csv"};
   if (frames && !is_long(scene)) {
     args.insert(args.end(), {"--overlay", folder + "/frames"});
   }
   return args;
 }
 
+// What a child inherits: its segments, and the scene.
+std::vector<int> inherited(const HandedSegments& segments, const hal::Descriptor& resolved) {
+  std::vector<int> all = segments.descriptors();
+  all.push_back(resolved.number());
+  return all;
+}
+
 // One run, from the first process to the report.
 class Run {
  public:
-  Run(const Scene& scene, const RunSettings& settings, const ReportFolder& report_folder, Segments& segments,
-      Recorder& recorder, SpaceReserve& reserve, Terminal& terminal)
+  // `resolved`: the scene as the children read it, from their parent and not from a file that others write.
+  Run(const Scene& scene, const hal::Descriptor& resolved, const RunSettings& settings,
+      const ReportFolder& report_folder, Segments& segments, Recorder& recorder, SpaceReserve& reserve,
+      Terminal& terminal)
       : scene_(scene),
+        resolved_(resolved),
         settings_(settings),
         report_folder_(report_folder),
         folder_(report_folder.folder),
@@ -218,8 +234,8 @@ class Run {
         recorder_(recorder),
         terminal_(terminal),
         core_(*segments.core, segments.commands.front()->queue, scene.clock == ClockKind::real, terminal),
-        vision_(vision_arguments(scene, folder_, for_vision(segments), settings.frames),
-                for_vision(segments).descriptors(), folder_ + "/vision.log",
+        vision_(vision_arguments(scene, resolved, folder_, for_vision(segments), settings.frames),
+                inherited(for_vision(segments), resolved), folder_ + "/vision.log",
                 segments.observation ? &(*segments.observation)->rounds : nullptr,
                 scene.clock == ClockKind::real, terminal) {}
 
@@ -232,6 +248,7 @@ class Run {
   [[nodiscard]] const rt::CoreStatus& status() const { return segments_.core->status; }
   void watch_vision();
   void tell_faults();
+  void watch_recording();
   void tell_progress();
   void tell_what_is_not_kept();
   [[nodiscard]] int refuse(const std::string& why);
@@ -241,6 +258,7 @@ class Run {
   int report();
 
   const Scene& scene_;
+  const hal::Descriptor& resolved_;
   const RunSettings& settings_;
   const ReportFolder& report_folder_;
   std::string folder_;
@@ -255,8 +273,10 @@ class Run {
   bool rights_told_ = false;
   std::size_t faults_told_ = 0;
   double next_progress_s_ = 0;
-  std::size_t recorder_failures_ = 0;       // told so far
-  std::uint64_t vision_does_not_keep_ = 0;  // likewise
+  std::size_t recorder_failures_ = 0;                 // told so far
+  std::uint64_t vision_does_not_keep_ = 0;            // likewise
+  std::uint64_t recorded_ = 0, ticks_at_record_ = 0;  // when a sample last came
+  double recorded_s_ = 0;
   RunResult result_;
   const nlohmann::ordered_json begun_facts_ = provenance(scene_);
 };
@@ -282,8 +302,8 @@ int Run::run() {
     }
   }
   const HandedSegments handed = for_core(segments_);
-  if (auto started =
-          core_.start(core_arguments(scene_, folder_, handed), folder_ + "/core.log", handed.descriptors());
+  if (auto started = core_.start(core_arguments(scene_, resolved_, handed), folder_ + "/core.log",
+                                 inherited(handed, resolved_));
       !started) {
     return refuse(started.error());
   }
@@ -321,6 +341,7 @@ Ended Run::watch_until_the_core_ends() {
     }
     segments_.rendezvous.serve();
     watch_vision();
+    watch_recording();
     core_.watch(now_s(), stop_signal::count());
     tell_what_is_not_kept();
     tell_progress();
@@ -392,163 +413,204 @@ void Run::tell_faults() {
   for (const auto& faults = recorder_.measures().faults; faults_told_ < faults.size(); ++faults_told_) {
     const Measures::Fault& f = faults[faults_told_];
     terminal_.say("{}", painted(Colour::bad, fault_text(f.fault, f.t_s), terminal_.coloured()));
-  }
-}
-
-void Run::tell_progress() {
-  const rt::CoreStatus& core = status();
-  if (!rights_told_ && core.started.load() != 0) {
-    rights_told_ = true;
-    if (core.degraded.load() != 0 && scene_.clock == ClockKind::real) {
-      if (const std::string text = missing_rights(core); !text.empty()) {
-        terminal_.say("{}", painted(Colour::warning, text, terminal_.coloured()));
+    // Samples that stop coming although the core ticks: the recording would end without a word.
+    void Run::watch_recording() {
+      const std::uint64_t recorded = recorder_.measures().ticks;
+      const std::uint64_t ticks = status().ticks.load();
+      if (recorded != recorded_ || ticks == ticks_at_record_) {
+        recorded_ = recorded;
+        ticks_at_record_ = ticks;
+        recorded_s_ = now_s();
+      } else if (!result_.silent_from_s && now_s() > recorded_s_ + kSilent_s) {
+        result_.silent_from_s = recorder_.measures().last_s;
+        terminal_.complain(
+            fmt::format("the core ticks, but none of its samples could be read for {:.0f} s: the recording "
+                        "has a gap from "
+                        "{:.3f} s on",
+                        kSilent_s, *result_.silent_from_s));
       }
     }
-  }
-  tell_faults();
-  if (settings_.quiet || now_s() < next_progress_s_) {
-    return;
-  }
-  next_progress_s_ = now_s() + terminal_.progress_every_s();
-  const Measures& m = recorder_.measures();
-  if (m.ticks > 0) {
-    terminal_.progress(progress_line(scene_, m.last, core, terminal_.line_style()));
-  }
-}
 
-void Run::judge_end(const Ended& core) {
-  const RunFacts facts{.core_exited = core.exited,
-                       .stop_was_asked = core_.stop_was_asked(),
-                       .vision_over = vision_.over(),
-                       .has_task = scene_.has_task(),
-                       .has_vision = scene_.vision.has_value()};
-  result_.end = judge(facts, status(), recorder_.measures());
-  result_.wall_s = now_s();
-  if (result_.end == rt::RunEnd::fault) {
-    result_.detail = rt::name(static_cast<rt::Fault>(status().fault.load()));
-  }
-  const Measures& m = recorder_.measures();
-  if (result_.end == rt::RunEnd::after_fault && !m.faults.empty()) {
-    result_.detail = fmt::format("{} at {:.3f} s", rt::name(m.faults.front().fault), m.faults.front().t_s);
-  }
-  if (result_.end == rt::RunEnd::underdosed) {
-    result_.detail = fmt::format("{:.2f} s of {:.2f} s asked", m.injected_s, m.asked_s);
-  }
-  if (result_.end == rt::RunEnd::core_died) {
-    result_.detail = core.text();
-    terminal_.complain(
-        fmt::format("the control core {} at {:.3f} s", core.text(), recorder_.measures().last_s));
-    recorder_.keep_last_seconds();
-    let_devices_come_to_rest();
-  }
-  result_.needle = recorder_.measures().whereabouts(result_.unattended ? &result_.unattended->last : nullptr);
-}
-
-// The core is dead: what the simulated devices do by themselves.
-void Run::let_devices_come_to_rest() {
-  if (!segments_.bench || !scene_.sim) {
-    return;
-  }
-  if ((*segments_.bench)->snapshots.head() == 0) {
-    terminal_.say("it had not begun: no device was switched on");
-    return;
-  }
-  result_.unattended = sim::run_unattended(*scene_.sim, **segments_.bench);
-  const auto& u = *result_.unattended;
-  const auto when = [](double s) {
-    return s < 0 ? std::string("not") : fmt::format("after {:.0f} ms", s * 1e3);
-  };
-  terminal_.say(
-      "the devices without it: relay opened {}, stage at rest {} ({:.1f} um further), injector gate shut {}, "
-      "hand force off {}, holding vacuum {}: {}",
-      when(u.relay_opened_s), when(u.stage_at_rest_s), u.stage_moved_m * 1e6, when(u.gate_shut_s),
-      when(u.hand_force_off_s), u.vacuum_kept ? "kept" : "LOST", u.safe ? "safe" : "NOT SAFE");
-}
-
-int Run::report() {
-  const Measures& m = recorder_.measures();
-  result_.vision_restarts = vision_.restarts();
-  result_.rows = recorder_.rows();
-  result_.rows_every = recorder_.every();
-  result_.samples_lost = recorder_.lost();
-  const auto contour = read_contour_error(folder_ + "/obs.csv");
-  reserve_.give_back();
-  const auto facts = [&] {
-    return whole_facts(begun_facts_, report_facts(scene_, result_, m, recorder_.events(), status(), contour));
-  };
-  auto written = write_report_json(folder_, facts());
-  if (auto page = write_report_page(folder_, facts(), settings_.figure); !page) {
-    terminal_.complain(page.error());
-    result_.not_kept.push_back({"report.html", m.last_s, page.error()});
-    written = write_report_json(folder_, facts());  // it tells that, too
-  }
-  if (!written) {
-    terminal_.complain(written.error());
-  }
-  std::string folder = folder_;
-  if (written && !report_folder_.replaces.empty() && !vision_was_refused_) {
-    if (auto moved = take_place(report_folder_)) {
-      folder = *moved;
-    } else {
-      terminal_.complain(moved.error());
-      written = tl::unexpected(moved.error());
+    void Run::tell_progress() {
+      const rt::CoreStatus& core = status();
+      if (!rights_told_ && core.started.load() != 0) {
+        rights_told_ = true;
+        if (core.degraded.load() != 0 && scene_.clock == ClockKind::real) {
+          if (const std::string text = missing_rights(core); !text.empty()) {
+            terminal_.say("{}", painted(Colour::warning, text, terminal_.coloured()));
+          }
+        }
+      }
+      tell_faults();
+      if (settings_.quiet || now_s() < next_progress_s_) {
+        return;
+      }
+      next_progress_s_ = now_s() + terminal_.progress_every_s();
+      const Measures& m = recorder_.measures();
+      if (m.ticks > 0) {
+        terminal_.progress(progress_line(scene_, m.last, core, terminal_.line_style()));
+      }
     }
-  }
-  const std::string places = written ? fmt::format("report          {}/report.html\n", folder) : "";
-  terminal_.print("\n" + summary(scene_, result_, m, status(), contour, terminal_.coloured()) + places);
-  if (vision_was_refused_) {
-    return exit_bad_input;
-  }
-  const bool complete = written && result_.not_kept.empty();
-  const ExitCode code = exit_code(result_.end);
-  return code == exit_done && !complete ? exit_not_done : code;
-}
 
-}  // namespace
+    void Run::judge_end(const Ended& core) {
+      const RunFacts facts{.core_exited = core.exited,
+                           .stop_was_asked = core_.stop_was_asked(),
+                           .vision_over = vision_.over(),
+                           .has_task = scene_.has_task(),
+                           .has_vision = scene_.vision.has_value()};
+      result_.end = judge(facts, status(), recorder_.measures());
+      result_.wall_s = now_s();
+      if (result_.end == rt::RunEnd::fault) {
+        const auto fault = fault_in(status().fault.load());
+        result_.detail = fault ? rt::name(*fault) : "unknown";
+      }
+      const Measures& m = recorder_.measures();
+      if (result_.end == rt::RunEnd::after_fault && !m.faults.empty()) {
+        result_.detail =
+            fmt::format("{} at {:.3f} s", rt::name(m.faults.front().fault), m.faults.front().t_s);
+      }
+      if (result_.end == rt::RunEnd::underdosed) {
+        result_.detail = fmt::format("{:.2f} s of {:.2f} s asked", m.injected_s, m.asked_s);
+      }
+      if (result_.end == rt::RunEnd::core_died) {
+        result_.detail = core.text();
+        terminal_.complain(
+            fmt::format("the control core {} at {:.3f} s", core.text(), recorder_.measures().last_s));
+        recorder_.keep_last_seconds();
+        let_devices_come_to_rest();
+      }
+      result_.needle =
+          recorder_.measures().whereabouts(result_.unattended ? &result_.unattended->last : nullptr);
+    }
 
-int run_scene(const Scene& scene, const RunSettings& settings) {
-  Terminal terminal;
-  const auto refuse = [&terminal](const std::string& why) {
-    terminal.complain(why);
-    return exit_bad_input;
-  };
-  const auto report = prepare_report_folder(scene, settings.report, settings.overwrite);
-  if (!report) {
-    return refuse(report.error());
+    // The core is dead: what the simulated devices do by themselves.
+    void Run::let_devices_come_to_rest() {
+      if (!segments_.bench || !scene_.sim) {
+        return;
+      }
+      if ((*segments_.bench)->snapshots.head() == 0) {
+        terminal_.say("it had not begun: no device was switched on");
+        return;
+      }
+      if (sim::Snapshot newest; !sim::newest_valid(**segments_.bench, newest)) {
+        terminal_.complain("what it left of the simulated devices is not usable: their state is not known");
+        return;
+      }
+      result_.unattended = sim::run_unattended(*scene_.sim, **segments_.bench);
+      const auto& u = *result_.unattended;
+      const auto when = [](double s) {
+        return s < 0 ? std::string("not") : fmt::format("after {:.0f} ms", s * 1e3);
+      };
+      terminal_.say(
+          "the devices without it: relay opened {}, stage at rest {} ({:.1f} um further), injector gate shut "
+          "{}, "
+          "hand force off {}, holding vacuum {}: {}",
+          when(u.relay_opened_s), when(u.stage_at_rest_s), u.stage_moved_m * 1e6, when(u.gate_shut_s),
+          when(u.hand_force_off_s), u.vacuum_kept ? "kept" : "LOST", u.safe ? "safe" : "NOT SAFE");
+    }
+
+    int Run::report() {
+      const Measures& m = recorder_.measures();
+      result_.vision_restarts = vision_.restarts();
+      result_.rows = recorder_.rows();
+      result_.rows_every = recorder_.every();
+      result_.samples_lost = recorder_.lost();
+      result_.samples_unusable = recorder_.unusable();
+      const auto contour = read_contour_error(folder_ + "/obs.csv");
+      reserve_.give_back();
+      const auto facts = [&] {
+        return whole_facts(begun_facts_,
+                           report_facts(scene_, result_, m, recorder_.events(), status(), contour));
+      };
+      auto written = write_report_json(folder_, facts());
+      if (auto page = write_report_page(folder_, facts(), settings_.figure); !page) {
+        terminal_.complain(page.error());
+        result_.not_kept.push_back({"report.html", m.last_s, page.error()});
+        written = write_report_json(folder_, facts());  // it tells that, too
+      }
+      if (!written) {
+        terminal_.complain(written.error());
+      }
+      std::string folder = folder_;
+      if (written && !report_folder_.replaces.empty() && !vision_was_refused_) {
+        if (auto moved = take_place(report_folder_)) {
+          folder = *moved;
+        } else {
+          terminal_.complain(moved.error());
+          written = tl::unexpected(moved.error());
+        }
+      }
+      const std::string places = written ? fmt::format("report          {}/report.html\n", folder) : "";
+      terminal_.print("\n" + summary(scene_, result_, m, status(), contour, terminal_.coloured()) + places);
+      if (vision_was_refused_) {
+        return exit_bad_input;
+      }
+      const bool complete =
+          written && result_.not_kept.empty() && recorder_.unusable() == 0 && !result_.silent_from_s;
+      const ExitCode code = exit_code(result_.end);
+      return code == exit_done && !complete ? exit_not_done : code;
+    }
+
+  }  // namespace
+
+  int run_scene(const Scene& scene, const RunSettings& settings) {
+    // Before anything exists that an end would leave behind.
+    stop_signal::watch({SIGINT, SIGTERM, SIGHUP, SIGQUIT});
+    signal(SIGPIPE, SIG_IGN);
+    Terminal terminal;
+    const auto refuse = [&terminal](const std::string& why) {
+      terminal.complain(why);
+      return exit_bad_input;
+    };
+    const auto report = prepare_report_folder(scene, settings.report, settings.overwrite);
+    if (!report) {
+      return refuse(report.error());
+    }
+    const std::string& folder = report->folder;
+    const auto refuse_and_leave_nothing = [&](const std::string& why) {
+      discard(*report);
+      return refuse(why);
+    };
+    const std::uint64_t every = rows_every(scene, settings);
+    const auto space = look_for_space(
+        folder, bytes_written(scene, {.seconds = scene.seconds > 0 ? scene.seconds : kOpenEnded_s,
+                                      .rows_every = every,
+                                      .frames = settings.frames && !is_long(scene)}));
+    if (!space) {
+      return refuse_and_leave_nothing(space.error());
+    }
+    if (!space->empty()) {
+      terminal.complain(*space);
+    }
+    if (const std::string& warning = report->lock.not_held(); !warning.empty()) {
+      terminal.complain(warning);
+    }
+    const std::string text = to_toml(scene);
+    if (auto written = write_whole(folder + "/scene.toml", text); !written) {
+      return refuse_and_leave_nothing(written.error());
+    }
+    SpaceReserve reserve(folder);
+    const auto resolved = hal::seal_text("scene", text);
+    if (!resolved) {
+      return refuse_and_leave_nothing(resolved.error());
+    }
+    auto segments = create_segments(scene);
+    if (!segments) {
+      return refuse_and_leave_nothing(segments.error());
+    }
+    auto recorder = Recorder::create(folder, scene, *segments->core,
+                                     segments->bench ? segments->bench->get() : nullptr, every);
+    if (!recorder) {
+      return refuse_and_leave_nothing(recorder.error());
+    }
+    if (stop_signal::count() > 0) {
+      terminal.complain("stopped before anything was started");
+      reserve.give_back();
+      discard(*report);
+      return exit_not_done;
+    }
+    Run run(scene, *resolved, settings, *report, *segments, *recorder, reserve, terminal);
+    return run.run();
   }
-  const std::string& folder = report->folder;
-  const auto refuse_and_leave_nothing = [&](const std::string& why) {
-    discard(*report);
-    return refuse(why);
-  };
-  const std::uint64_t every = rows_every(scene, settings);
-  const auto space = look_for_space(
-      folder, bytes_written(scene, {.seconds = scene.seconds > 0 ? scene.seconds : kOpenEnded_s,
-                                    .rows_every = every,
-                                    .frames = settings.frames && !is_long(scene)}));
-  if (!space) {
-    return refuse_and_leave_nothing(space.error());
-  }
-  if (!space->empty()) {
-    terminal.complain(*space);
-  }
-  if (auto written = write_whole(folder + "/scene.toml", to_toml(scene)); !written) {
-    return refuse_and_leave_nothing(written.error());
-  }
-  SpaceReserve reserve(folder);
-  auto segments = create_segments(scene);
-  if (!segments) {
-    return refuse_and_leave_nothing(segments.error());
-  }
-  auto recorder = Recorder::create(folder, scene, *segments->core,
-                                   segments->bench ? segments->bench->get() : nullptr, every);
-  if (!recorder) {
-    return refuse_and_leave_nothing(recorder.error());
-  }
-  stop_signal::watch({SIGINT, SIGTERM, SIGHUP, SIGQUIT});
-  signal(SIGPIPE, SIG_IGN);
-  Run run(scene, settings, *report, *segments, *recorder, reserve, terminal);
-  return run.run();
-}
 
 }  // namespace punctum::tools

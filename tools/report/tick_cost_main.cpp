@@ -9,6 +9,7 @@
 
 #include "tools/report/tick_tape.hpp"
 #include "tools/shared/csv.hpp"
+#include "tools/shared/program_start.hpp"
 #include "tools/shared/say.hpp"
 #include "tools/shared/version.hpp"
 
@@ -60,4 +61,7 @@ int run(int argc, char** argv) {
 
 }  // namespace punctum::report
 
-int main(int argc, char** argv) { return punctum::report::run(argc, argv); }
+int main(int argc, char** argv) {
+  punctum::tools::start_program();
+  return punctum::report::run(argc, argv);
+}

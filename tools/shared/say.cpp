@@ -1,7 +1,5 @@
 #include "tools/shared/say.hpp"
 
-#include <signal.h>
-
 #include <cerrno>
 #include <cstring>
 
@@ -44,7 +42,5 @@ bool all_was_said() noexcept {
   complain("");
   return false;
 }
-
-void take_file_limits_as_errors() noexcept { (void)signal(SIGXFSZ, SIG_IGN); }
 
 }  // namespace punctum::tools

@@ -15,8 +15,4 @@ void complain(std::string_view text) noexcept;   // likewise, as a line of its o
 // the standard error output says so.
 [[nodiscard]] bool all_was_said() noexcept;
 
-// A file that may grow no further (ulimit -f) is an error of the write, as a full disk is, and no signal that
-// kills. Children inherit it.
-void take_file_limits_as_errors() noexcept;
-
 }  // namespace punctum::tools

@@ -8,6 +8,7 @@
 
 #include "tools/shared/command_line.hpp"
 #include "tools/shared/exit_codes.hpp"
+#include "tools/shared/program_start.hpp"
 #include "tools/shared/say.hpp"
 #include "tools/shared/version.hpp"
 #include "tools/vision/live_vision.hpp"
@@ -88,7 +89,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  punctum::tools::take_file_limits_as_errors();
+  punctum::tools::start_program();
   // Errors come as one line of ours, not OpenCV's own log as well.
   cv::redirectError([](int, const char*, const char*, const char*, int, void*) { return 0; });
   try {

@@ -15,6 +15,7 @@
 #include "rt/station/station.hpp"
 #include "tools/scene/scene.hpp"
 #include "tools/shared/exit_codes.hpp"
+#include "tools/shared/program_start.hpp"
 #include "tools/shared/say.hpp"
 #include "tools/shared/station_segments.hpp"
 #include "tools/shared/stop_signal.hpp"
@@ -140,7 +141,7 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  tools::take_file_limits_as_errors();
+  tools::start_program();
   try {
     return run(argc, argv);
   } catch (const std::exception& e) {

@@ -12,12 +12,14 @@
 #include <cerrno>
 #include <fstream>
 #include <functional>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <type_traits>
 #include <utility>
 
 #include "hal/ipc/rendezvous.hpp"
+#include "hal/ipc/sealed_text.hpp"
 #include "rt/station/station.hpp"
 
 namespace punctum::hal {
@@ -147,6 +149,53 @@ TEST_F(SegmentTest, another_version_is_refused_with_a_clear_message) {
   const auto other = Shared<const OtherThing>::attach(name, fd);
   ASSERT_FALSE(other);
   EXPECT_NE(other.error().find("something else"), std::string::npos) << other.error();
+}
+
+// A page and more beyond what a Board has, under the same name and layout.
+struct LargeBoard : Board {
+  Word more[1024] = {};
+};
+
+// Sealed memory of `bytes`, whose header claims that a LargeBoard of `claimed` bytes lies in it.
+Descriptor forged(std::size_t bytes, std::size_t claimed) {
+  Descriptor made(::memfd_create("punctum.forged", MFD_CLOEXEC | MFD_ALLOW_SEALING));
+  SegmentHeader header;
+  header.magic.store(LargeBoard::kMagic);
+  header.layout = LargeBoard::kLayout;
+  header.size = claimed;
+  EXPECT_EQ(::ftruncate(made.number(), static_cast<off_t>(bytes)), 0);
+  EXPECT_EQ(::pwrite(made.number(), static_cast<const void*>(&header), sizeof header, 0),
+            static_cast<ssize_t>(sizeof header));
+  EXPECT_EQ(::fcntl(made.number(), F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_SEAL), 0);
+  return made;
+}
+
+TEST_F(SegmentTest, memory_of_another_size_is_refused_whatever_its_header_claims) {
+  const std::size_t right = sizeof(LargeBoard);
+  const auto attaches = [this](const Descriptor& memory) {
+    return Shared<const LargeBoard>::attach(name, memory.number()).has_value();
+  };
+  EXPECT_TRUE(attaches(forged(right, right)));
+  EXPECT_FALSE(attaches(forged(sizeof(Board), right))) << "whoever read it to its end would be killed";
+  EXPECT_FALSE(attaches(forged(sizeof(SegmentHeader) - 8, right)));
+  EXPECT_FALSE(attaches(forged(right + 4096, right)));
+  EXPECT_FALSE(attaches(forged(right, right + 8)));
+  EXPECT_FALSE(attaches(forged(right, 0)));
+}
+
+TEST_F(SegmentTest, a_text_that_was_handed_over_can_be_read_again_and_again_and_changed_by_nobody) {
+  const std::string text(100'000, 'a');
+  auto sealed = seal_text(name, text + "b");
+  ASSERT_TRUE(sealed) << sealed.error();
+  for (int i = 0; i < 2; ++i) {
+    std::ifstream in(inherited_path(*sealed));
+    EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), text + "b");
+  }
+  EXPECT_LT(::pwrite(sealed->number(), "x", 1, 0), 0);
+  EXPECT_NE(::ftruncate(sealed->number(), 0), 0);
+  EXPECT_FALSE(mappable_for_writing(sealed->number()));
+  const Descriptor again(::open(inherited_path(*sealed).c_str(), O_RDWR | O_CLOEXEC));
+  EXPECT_LT(::pwrite(again.number(), "x", 1, 0), 0);
 }
 
 TEST_F(SegmentTest, a_missing_segment_is_said_to_be_missing) {

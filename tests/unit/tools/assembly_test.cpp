@@ -211,7 +211,6 @@ TEST_F(AssemblyTest, puts_a_real_stage_into_a_simulated_world) {
 
 TEST_F(AssemblyTest, makes_no_world_where_nothing_is_simulated) {
   all_from("fake");
-  EXPECT_FALSE(any_simulated(scene.devices));
   scene.sim.reset();
   const auto assembly = open();
   ASSERT_TRUE(assembly) << assembly.error();
@@ -224,23 +223,17 @@ TEST_F(AssemblyTest, makes_no_world_where_nothing_is_simulated) {
   EXPECT_EQ((*assembly)->positioner(), fakes[0]);
 }
 
-TEST_F(AssemblyTest, counts_a_camera_as_simulated_but_not_as_a_real_device_of_the_core) {
+TEST_F(AssemblyTest, does_not_count_a_camera_as_a_real_device_of_the_core) {
   EXPECT_FALSE(any_real(scene.devices));
   scene.devices.camera = "recorded";
   EXPECT_FALSE(any_real(scene.devices));
   scene.devices.positioner = "fake";
   EXPECT_TRUE(any_real(scene.devices));
-  DeviceNames camera_alone;
-  camera_alone.camera = "recorded";
-  EXPECT_FALSE(any_simulated(camera_alone));
-  camera_alone.camera = "simulated";
-  EXPECT_TRUE(any_simulated(camera_alone));
 }
 
 TEST_F(AssemblyTest, makes_a_world_for_the_simulated_camera_alone) {
   all_from("fake");
   scene.devices.camera = "simulated";
-  EXPECT_TRUE(any_simulated(scene.devices));
   const auto assembly = open();
   ASSERT_TRUE(assembly) << assembly.error();
   EXPECT_NE((*assembly)->world(), nullptr);

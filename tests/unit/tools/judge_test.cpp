@@ -93,6 +93,18 @@ TEST_F(JudgeTest, a_core_that_was_killed_died_even_after_a_fault) {
   EXPECT_EQ(judged(), RunEnd::core_died);
 }
 
+TEST_F(JudgeTest, words_that_stand_for_nothing_make_no_run_done) {
+  core_says(rt::Phase::clear, RunEnd::done);
+  core->fault.store(256);  // cut to a byte it would be none
+  EXPECT_EQ(judged(), RunEnd::fault);
+  core_says(rt::Phase::clear, RunEnd::done);
+  core->run_end.store(256 + static_cast<std::uint64_t>(RunEnd::done));
+  EXPECT_EQ(judged(), RunEnd::core_died);
+  core_says(rt::Phase::clear, RunEnd::stopped);
+  core->phase.store(256 + static_cast<std::uint64_t>(rt::Phase::clear));
+  EXPECT_EQ(judged(), RunEnd::time_limit);
+}
+
 TEST_F(JudgeTest, a_core_that_ended_without_a_word_died_whatever_the_scene_asks) {
   core_says(rt::Phase::free, RunEnd::running);
   EXPECT_EQ(judged(), RunEnd::core_died);

@@ -15,7 +15,7 @@
 #include "tools/punctum/disk_space.hpp"
 #include "tools/punctum/report_folder.hpp"
 #include "tools/punctum/vision_watchdog.hpp"
-#include "tools/shared/say.hpp"
+#include "tools/shared/program_start.hpp"
 
 namespace punctum::tools {
 namespace {
@@ -28,7 +28,7 @@ class RecorderTest : public testing::Test {
     std::string name = (fs::temp_directory_path() / "punctum-recorder-XXXXXX").string();
     ASSERT_NE(::mkdtemp(name.data()), nullptr);
     folder_ = name;
-    take_file_limits_as_errors();
+    start_program();
     ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before_), 0);
   }
   void TearDown() override {

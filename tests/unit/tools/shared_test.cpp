@@ -3,10 +3,13 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <atomic>
+#include <cerrno>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -15,6 +18,7 @@
 #include <vector>
 
 #include "tools/shared/csv.hpp"
+#include "tools/shared/program_start.hpp"
 #include "tools/shared/row_file.hpp"
 #include "tools/shared/say.hpp"
 #include "tools/shared/station_segments.hpp"
@@ -75,7 +79,7 @@ class FilesTest : public testing::Test {
     std::string name = (fs::temp_directory_path() / "punctum-files-XXXXXX").string();
     ASSERT_NE(::mkdtemp(name.data()), nullptr);
     folder_ = name;
-    take_file_limits_as_errors();
+    start_program();
     ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before_), 0);
   }
   void TearDown() override {
@@ -159,6 +163,58 @@ TEST_F(FilesTest, rows_that_find_no_room_are_cut_off_at_a_line_end_and_the_failu
 
 TEST_F(FilesTest, a_table_that_cannot_be_opened_is_an_error) {
   EXPECT_FALSE(RowFile::open(folder_ / "nowhere" / "a.csv", RowFile::Begin::empty));
+}
+
+// In a child, which returns 0 when all is as it should be.
+int in_child(int (*work)()) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::_exit(work());
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+}
+
+TEST(ProgramStartTest, descriptors_0_to_2_exist_from_then_on) {
+  EXPECT_EQ(in_child([] {
+              ::close(0);
+              ::close(1);
+              ::close(2);
+              start_program();
+              struct stat null = {}, here = {};
+              bool right = ::stat("/dev/null", &null) == 0;
+              for (int fd = 0; fd < 3; ++fd) {
+                right = right && ::fstat(fd, &here) == 0 && here.st_rdev == null.st_rdev;
+              }
+              return right && ::dup(0) == 3 ? 0 : 1;
+            }),
+            0);
+}
+
+TEST(ProgramStartTest, descriptors_that_are_there_stay_as_they_are) {
+  EXPECT_EQ(in_child([] {
+              int pipes[2];
+              if (::pipe(pipes) != 0 || ::dup2(pipes[1], 1) != 1) {
+                return 2;
+              }
+              ::close(0);
+              start_program();
+              char got = 0;
+              return ::write(1, "x", 1) == 1 && ::read(pipes[0], &got, 1) == 1 && got == 'x' ? 0 : 1;
+            }),
+            0);
+}
+
+TEST(ProgramStartTest, a_file_that_may_not_grow_is_a_write_error) {
+  EXPECT_EQ(in_child([] {
+              start_program();
+              const rlimit none{0, 0};
+              std::FILE* file = std::tmpfile();
+              ::setrlimit(RLIMIT_FSIZE, &none);
+              return ::write(::fileno(file), "x", 1) < 0 && errno == EFBIG ? 0 : 1;
+            }),
+            0);
 }
 
 std::atomic<int> woken{0};

@@ -32,14 +32,14 @@ struct Case {
 };
 
 // The scene zebrafish: a needle whose walls at the tip are thinner than the blur, in a granular yolk.
-struct Embryo {
+struct SimulatedEmbryo {
   sim::MicroscopeParams lens;
   sim::NeedleParams needle;
   sim::CellParams cell;
   sim::HolderParams holder;
   VisionConfig vision;
 
-  Embryo() {
+  SimulatedEmbryo() {
     lens.pixel_m = 3.25e-6;
     needle.radius_m = 7.5e-6;
     needle.shaft_radius_m = 25e-6;
@@ -221,7 +221,7 @@ INSTANTIATE_TEST_SUITE_P(Cases, SimulatedFrames,
 class EmbryoFrames : public testing::TestWithParam<int> {};
 
 TEST_P(EmbryoFrames, show_the_tip_in_the_yolk_where_it_is_or_not_at_all) {
-  const Embryo e;
+  const SimulatedEmbryo e;
   const auto seed = static_cast<std::uint64_t>(GetParam());
   sim::Microscope microscope(e.lens, e.needle, e.holder, seed);
   const sim::Cell cell(e.cell, e.needle, e.holder, seed, 0);

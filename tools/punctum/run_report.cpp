@@ -12,6 +12,7 @@
 #include "tools/punctum/fault_advice.hpp"
 #include "tools/punctum/run_sentence.hpp"
 #include "tools/punctum/terminal.hpp"
+#include "tools/scene/messages.hpp"
 #include "tools/shared/csv.hpp"
 #include "tools/shared/exit_codes.hpp"
 #include "tools/shared/station_values.hpp"

@@ -413,204 +413,204 @@ void Run::tell_faults() {
   for (const auto& faults = recorder_.measures().faults; faults_told_ < faults.size(); ++faults_told_) {
     const Measures::Fault& f = faults[faults_told_];
     terminal_.say("{}", painted(Colour::bad, fault_text(f.fault, f.t_s), terminal_.coloured()));
-    // Samples that stop coming although the core ticks: the recording would end without a word.
-    void Run::watch_recording() {
-      const std::uint64_t recorded = recorder_.measures().ticks;
-      const std::uint64_t ticks = status().ticks.load();
-      if (recorded != recorded_ || ticks == ticks_at_record_) {
-        recorded_ = recorded;
-        ticks_at_record_ = ticks;
-        recorded_s_ = now_s();
-      } else if (!result_.silent_from_s && now_s() > recorded_s_ + kSilent_s) {
-        result_.silent_from_s = recorder_.measures().last_s;
-        terminal_.complain(
-            fmt::format("the core ticks, but none of its samples could be read for {:.0f} s: the recording "
-                        "has a gap from "
-                        "{:.3f} s on",
-                        kSilent_s, *result_.silent_from_s));
-      }
-    }
-
-    void Run::tell_progress() {
-      const rt::CoreStatus& core = status();
-      if (!rights_told_ && core.started.load() != 0) {
-        rights_told_ = true;
-        if (core.degraded.load() != 0 && scene_.clock == ClockKind::real) {
-          if (const std::string text = missing_rights(core); !text.empty()) {
-            terminal_.say("{}", painted(Colour::warning, text, terminal_.coloured()));
-          }
-        }
-      }
-      tell_faults();
-      if (settings_.quiet || now_s() < next_progress_s_) {
-        return;
-      }
-      next_progress_s_ = now_s() + terminal_.progress_every_s();
-      const Measures& m = recorder_.measures();
-      if (m.ticks > 0) {
-        terminal_.progress(progress_line(scene_, m.last, core, terminal_.line_style()));
-      }
-    }
-
-    void Run::judge_end(const Ended& core) {
-      const RunFacts facts{.core_exited = core.exited,
-                           .stop_was_asked = core_.stop_was_asked(),
-                           .vision_over = vision_.over(),
-                           .has_task = scene_.has_task(),
-                           .has_vision = scene_.vision.has_value()};
-      result_.end = judge(facts, status(), recorder_.measures());
-      result_.wall_s = now_s();
-      if (result_.end == rt::RunEnd::fault) {
-        const auto fault = fault_in(status().fault.load());
-        result_.detail = fault ? rt::name(*fault) : "unknown";
-      }
-      const Measures& m = recorder_.measures();
-      if (result_.end == rt::RunEnd::after_fault && !m.faults.empty()) {
-        result_.detail =
-            fmt::format("{} at {:.3f} s", rt::name(m.faults.front().fault), m.faults.front().t_s);
-      }
-      if (result_.end == rt::RunEnd::underdosed) {
-        result_.detail = fmt::format("{:.2f} s of {:.2f} s asked", m.injected_s, m.asked_s);
-      }
-      if (result_.end == rt::RunEnd::core_died) {
-        result_.detail = core.text();
-        terminal_.complain(
-            fmt::format("the control core {} at {:.3f} s", core.text(), recorder_.measures().last_s));
-        recorder_.keep_last_seconds();
-        let_devices_come_to_rest();
-      }
-      result_.needle =
-          recorder_.measures().whereabouts(result_.unattended ? &result_.unattended->last : nullptr);
-    }
-
-    // The core is dead: what the simulated devices do by themselves.
-    void Run::let_devices_come_to_rest() {
-      if (!segments_.bench || !scene_.sim) {
-        return;
-      }
-      if ((*segments_.bench)->snapshots.head() == 0) {
-        terminal_.say("it had not begun: no device was switched on");
-        return;
-      }
-      if (sim::Snapshot newest; !sim::newest_valid(**segments_.bench, newest)) {
-        terminal_.complain("what it left of the simulated devices is not usable: their state is not known");
-        return;
-      }
-      result_.unattended = sim::run_unattended(*scene_.sim, **segments_.bench);
-      const auto& u = *result_.unattended;
-      const auto when = [](double s) {
-        return s < 0 ? std::string("not") : fmt::format("after {:.0f} ms", s * 1e3);
-      };
-      terminal_.say(
-          "the devices without it: relay opened {}, stage at rest {} ({:.1f} um further), injector gate shut "
-          "{}, "
-          "hand force off {}, holding vacuum {}: {}",
-          when(u.relay_opened_s), when(u.stage_at_rest_s), u.stage_moved_m * 1e6, when(u.gate_shut_s),
-          when(u.hand_force_off_s), u.vacuum_kept ? "kept" : "LOST", u.safe ? "safe" : "NOT SAFE");
-    }
-
-    int Run::report() {
-      const Measures& m = recorder_.measures();
-      result_.vision_restarts = vision_.restarts();
-      result_.rows = recorder_.rows();
-      result_.rows_every = recorder_.every();
-      result_.samples_lost = recorder_.lost();
-      result_.samples_unusable = recorder_.unusable();
-      const auto contour = read_contour_error(folder_ + "/obs.csv");
-      reserve_.give_back();
-      const auto facts = [&] {
-        return whole_facts(begun_facts_,
-                           report_facts(scene_, result_, m, recorder_.events(), status(), contour));
-      };
-      auto written = write_report_json(folder_, facts());
-      if (auto page = write_report_page(folder_, facts(), settings_.figure); !page) {
-        terminal_.complain(page.error());
-        result_.not_kept.push_back({"report.html", m.last_s, page.error()});
-        written = write_report_json(folder_, facts());  // it tells that, too
-      }
-      if (!written) {
-        terminal_.complain(written.error());
-      }
-      std::string folder = folder_;
-      if (written && !report_folder_.replaces.empty() && !vision_was_refused_) {
-        if (auto moved = take_place(report_folder_)) {
-          folder = *moved;
-        } else {
-          terminal_.complain(moved.error());
-          written = tl::unexpected(moved.error());
-        }
-      }
-      const std::string places = written ? fmt::format("report          {}/report.html\n", folder) : "";
-      terminal_.print("\n" + summary(scene_, result_, m, status(), contour, terminal_.coloured()) + places);
-      if (vision_was_refused_) {
-        return exit_bad_input;
-      }
-      const bool complete =
-          written && result_.not_kept.empty() && recorder_.unusable() == 0 && !result_.silent_from_s;
-      const ExitCode code = exit_code(result_.end);
-      return code == exit_done && !complete ? exit_not_done : code;
-    }
-
-  }  // namespace
-
-  int run_scene(const Scene& scene, const RunSettings& settings) {
-    // Before anything exists that an end would leave behind.
-    stop_signal::watch({SIGINT, SIGTERM, SIGHUP, SIGQUIT});
-    signal(SIGPIPE, SIG_IGN);
-    Terminal terminal;
-    const auto refuse = [&terminal](const std::string& why) {
-      terminal.complain(why);
-      return exit_bad_input;
-    };
-    const auto report = prepare_report_folder(scene, settings.report, settings.overwrite);
-    if (!report) {
-      return refuse(report.error());
-    }
-    const std::string& folder = report->folder;
-    const auto refuse_and_leave_nothing = [&](const std::string& why) {
-      discard(*report);
-      return refuse(why);
-    };
-    const std::uint64_t every = rows_every(scene, settings);
-    const auto space = look_for_space(
-        folder, bytes_written(scene, {.seconds = scene.seconds > 0 ? scene.seconds : kOpenEnded_s,
-                                      .rows_every = every,
-                                      .frames = settings.frames && !is_long(scene)}));
-    if (!space) {
-      return refuse_and_leave_nothing(space.error());
-    }
-    if (!space->empty()) {
-      terminal.complain(*space);
-    }
-    if (const std::string& warning = report->lock.not_held(); !warning.empty()) {
-      terminal.complain(warning);
-    }
-    const std::string text = to_toml(scene);
-    if (auto written = write_whole(folder + "/scene.toml", text); !written) {
-      return refuse_and_leave_nothing(written.error());
-    }
-    SpaceReserve reserve(folder);
-    const auto resolved = hal::seal_text("scene", text);
-    if (!resolved) {
-      return refuse_and_leave_nothing(resolved.error());
-    }
-    auto segments = create_segments(scene);
-    if (!segments) {
-      return refuse_and_leave_nothing(segments.error());
-    }
-    auto recorder = Recorder::create(folder, scene, *segments->core,
-                                     segments->bench ? segments->bench->get() : nullptr, every);
-    if (!recorder) {
-      return refuse_and_leave_nothing(recorder.error());
-    }
-    if (stop_signal::count() > 0) {
-      terminal.complain("stopped before anything was started");
-      reserve.give_back();
-      discard(*report);
-      return exit_not_done;
-    }
-    Run run(scene, *resolved, settings, *report, *segments, *recorder, reserve, terminal);
-    return run.run();
   }
+}
+
+// Samples that stop coming although the core ticks: the recording would end without a word.
+void Run::watch_recording() {
+  const std::uint64_t recorded = recorder_.measures().ticks;
+  const std::uint64_t ticks = status().ticks.load();
+  if (recorded != recorded_ || ticks == ticks_at_record_) {
+    recorded_ = recorded;
+    ticks_at_record_ = ticks;
+    recorded_s_ = now_s();
+  } else if (!result_.silent_from_s && now_s() > recorded_s_ + kSilent_s) {
+    result_.silent_from_s = recorder_.measures().last_s;
+    terminal_.complain(
+        fmt::format("the core ticks, but none of its samples could be read for {:.0f} s: the recording "
+                    "has a gap from "
+                    "{:.3f} s on",
+                    kSilent_s, *result_.silent_from_s));
+  }
+}
+
+void Run::tell_progress() {
+  const rt::CoreStatus& core = status();
+  if (!rights_told_ && core.started.load() != 0) {
+    rights_told_ = true;
+    if (core.degraded.load() != 0 && scene_.clock == ClockKind::real) {
+      if (const std::string text = missing_rights(core); !text.empty()) {
+        terminal_.say("{}", painted(Colour::warning, text, terminal_.coloured()));
+      }
+    }
+  }
+  tell_faults();
+  if (settings_.quiet || now_s() < next_progress_s_) {
+    return;
+  }
+  next_progress_s_ = now_s() + terminal_.progress_every_s();
+  const Measures& m = recorder_.measures();
+  if (m.ticks > 0) {
+    terminal_.progress(progress_line(scene_, m.last, core, terminal_.line_style()));
+  }
+}
+
+void Run::judge_end(const Ended& core) {
+  const RunFacts facts{.core_exited = core.exited,
+                       .stop_was_asked = core_.stop_was_asked(),
+                       .vision_over = vision_.over(),
+                       .has_task = scene_.has_task(),
+                       .has_vision = scene_.vision.has_value()};
+  result_.end = judge(facts, status(), recorder_.measures());
+  result_.wall_s = now_s();
+  if (result_.end == rt::RunEnd::fault) {
+    const auto fault = fault_in(status().fault.load());
+    result_.detail = fault ? rt::name(*fault) : "unknown";
+  }
+  const Measures& m = recorder_.measures();
+  if (result_.end == rt::RunEnd::after_fault && !m.faults.empty()) {
+    result_.detail = fmt::format("{} at {:.3f} s", rt::name(m.faults.front().fault), m.faults.front().t_s);
+  }
+  if (result_.end == rt::RunEnd::underdosed) {
+    result_.detail = fmt::format("{:.2f} s of {:.2f} s asked", m.injected_s, m.asked_s);
+  }
+  if (result_.end == rt::RunEnd::core_died) {
+    result_.detail = core.text();
+    terminal_.complain(
+        fmt::format("the control core {} at {:.3f} s", core.text(), recorder_.measures().last_s));
+    recorder_.keep_last_seconds();
+    let_devices_come_to_rest();
+  }
+  result_.needle = recorder_.measures().whereabouts(result_.unattended ? &result_.unattended->last : nullptr);
+}
+
+// The core is dead: what the simulated devices do by themselves.
+void Run::let_devices_come_to_rest() {
+  if (!segments_.bench || !scene_.sim) {
+    return;
+  }
+  if ((*segments_.bench)->snapshots.head() == 0) {
+    terminal_.say("it had not begun: no device was switched on");
+    return;
+  }
+  if (sim::Snapshot newest; !sim::newest_valid(**segments_.bench, newest)) {
+    terminal_.complain("what it left of the simulated devices is not usable: their state is not known");
+    return;
+  }
+  result_.unattended = sim::run_unattended(*scene_.sim, **segments_.bench);
+  const auto& u = *result_.unattended;
+  const auto when = [](double s) {
+    return s < 0 ? std::string("not") : fmt::format("after {:.0f} ms", s * 1e3);
+  };
+  terminal_.say(
+      "the devices without it: relay opened {}, stage at rest {} ({:.1f} um further), injector gate shut "
+      "{}, "
+      "hand force off {}, holding vacuum {}: {}",
+      when(u.relay_opened_s), when(u.stage_at_rest_s), u.stage_moved_m * 1e6, when(u.gate_shut_s),
+      when(u.hand_force_off_s), u.vacuum_kept ? "kept" : "LOST", u.safe ? "safe" : "NOT SAFE");
+}
+
+int Run::report() {
+  const Measures& m = recorder_.measures();
+  result_.vision_restarts = vision_.restarts();
+  result_.rows = recorder_.rows();
+  result_.rows_every = recorder_.every();
+  result_.samples_lost = recorder_.lost();
+  result_.samples_unusable = recorder_.unusable();
+  const auto contour = read_contour_error(folder_ + "/obs.csv");
+  reserve_.give_back();
+  const auto facts = [&] {
+    return whole_facts(begun_facts_, report_facts(scene_, result_, m, recorder_.events(), status(), contour));
+  };
+  auto written = write_report_json(folder_, facts());
+  if (auto page = write_report_page(folder_, facts(), settings_.figure); !page) {
+    terminal_.complain(page.error());
+    result_.not_kept.push_back({"report.html", m.last_s, page.error()});
+    written = write_report_json(folder_, facts());  // it tells that, too
+  }
+  if (!written) {
+    terminal_.complain(written.error());
+  }
+  std::string folder = folder_;
+  if (written && !report_folder_.replaces.empty() && !vision_was_refused_) {
+    if (auto moved = take_place(report_folder_)) {
+      folder = *moved;
+    } else {
+      terminal_.complain(moved.error());
+      written = tl::unexpected(moved.error());
+    }
+  }
+  const std::string places = written ? fmt::format("report          {}/report.html\n", folder) : "";
+  terminal_.print("\n" + summary(scene_, result_, m, status(), contour, terminal_.coloured()) + places);
+  if (vision_was_refused_) {
+    return exit_bad_input;
+  }
+  const bool complete =
+      written && result_.not_kept.empty() && recorder_.unusable() == 0 && !result_.silent_from_s;
+  const ExitCode code = exit_code(result_.end);
+  return code == exit_done && !complete ? exit_not_done : code;
+}
+
+}  // namespace
+
+int run_scene(const Scene& scene, const RunSettings& settings) {
+  // Before anything exists that an end would leave behind.
+  stop_signal::watch({SIGINT, SIGTERM, SIGHUP, SIGQUIT});
+  signal(SIGPIPE, SIG_IGN);
+  Terminal terminal;
+  const auto refuse = [&terminal](const std::string& why) {
+    terminal.complain(why);
+    return exit_bad_input;
+  };
+  const auto report = prepare_report_folder(scene, settings.report, settings.overwrite);
+  if (!report) {
+    return refuse(report.error());
+  }
+  const std::string& folder = report->folder;
+  const auto refuse_and_leave_nothing = [&](const std::string& why) {
+    discard(*report);
+    return refuse(why);
+  };
+  const std::uint64_t every = rows_every(scene, settings);
+  const auto space = look_for_space(
+      folder, bytes_written(scene, {.seconds = scene.seconds > 0 ? scene.seconds : kOpenEnded_s,
+                                    .rows_every = every,
+                                    .frames = settings.frames && !is_long(scene)}));
+  if (!space) {
+    return refuse_and_leave_nothing(space.error());
+  }
+  if (!space->empty()) {
+    terminal.complain(*space);
+  }
+  if (const std::string& warning = report->lock.not_held(); !warning.empty()) {
+    terminal.complain(warning);
+  }
+  const std::string text = to_toml(scene);
+  if (auto written = write_whole(folder + "/scene.toml", text); !written) {
+    return refuse_and_leave_nothing(written.error());
+  }
+  SpaceReserve reserve(folder);
+  const auto resolved = hal::seal_text("scene", text);
+  if (!resolved) {
+    return refuse_and_leave_nothing(resolved.error());
+  }
+  auto segments = create_segments(scene);
+  if (!segments) {
+    return refuse_and_leave_nothing(segments.error());
+  }
+  auto recorder = Recorder::create(folder, scene, *segments->core,
+                                   segments->bench ? segments->bench->get() : nullptr, every);
+  if (!recorder) {
+    return refuse_and_leave_nothing(recorder.error());
+  }
+  if (stop_signal::count() > 0) {
+    terminal.complain("stopped before anything was started");
+    reserve.give_back();
+    discard(*report);
+    return exit_not_done;
+  }
+  Run run(scene, *resolved, settings, *report, *segments, *recorder, reserve, terminal);
+  return run.run();
+}
 
 }  // namespace punctum::tools

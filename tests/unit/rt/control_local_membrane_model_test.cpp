@@ -284,7 +284,7 @@ TEST(LocalMembraneModel, keeps_the_focal_plane_from_cell_to_cell) {
 }
 
 TEST(LocalMembraneModel, moves_the_entry_in_the_plane_of_the_picture_only_however_the_needle_is_tilted) {
-  Bench b;
+  ModelInWorld b;
   b.world.axis = Vec3(-std::cos(0.2), 0, std::sin(0.2));
   for (int k = 0; k < 500; ++k) {
     b.step();

@@ -15,6 +15,7 @@
 #include "hal/sim/valid.hpp"
 #include "hal/sim/world.hpp"
 #include "tools/punctum/judge.hpp"
+#include "tools/punctum/lab_report.hpp"
 #include "tools/punctum/recorder.hpp"
 #include "tools/punctum/run_report.hpp"
 #include "tools/punctum/terminal.hpp"
@@ -82,14 +83,13 @@ TEST_P(Garbage, in_samples_events_and_status_leaves_a_report_that_can_be_read) {
   RunResult result;
   result.end = judge({.core_exited = true, .has_task = true}, core_->status, recorder->measures());
   result.samples_lost = recorder->lost();
-  const fs::path path = folder_ / "report.json";
-  ASSERT_TRUE(
-      write_report(path, scene_, result, recorder->measures(), recorder->events(), core_->status, {}));
-  std::ifstream in(path);
+  ASSERT_TRUE(write_report_json(
+      folder_, report_facts(scene_, result, recorder->measures(), recorder->events(), core_->status, {})));
+  std::ifstream in(folder_ / "report.json");
   EXPECT_TRUE(nlohmann::json::parse(in, nullptr, false).is_object());
   for (const std::string& text :
-       {summary(scene_, result, recorder->measures(), core_->status, {}),
-        progress_line(scene_, recorder->measures().last, core_->status), missing_rights(core_->status)}) {
+       {summary(scene_, result, recorder->measures(), core_->status, {}, false),
+        progress_line(scene_, recorder->measures().last, core_->status, {}), missing_rights(core_->status)}) {
     for (const char c : text) {
       ASSERT_TRUE(c == '\n' || static_cast<unsigned char>(c) >= 0x20) << text;
     }

@@ -189,11 +189,16 @@ void InjectionPipette::learn(const GradientField& field, const NeedlePose& needl
   if (!needle.ok || template_.empty()) {
     return;
   }
-  NeedlePose walls = needle;
-  walls.tip -= end_offset_ * walls.axis;
-  shape_.learn(field, walls);
-  constexpr double kFaceRate_px = 0.2;  // per frame: the face moves by no more as the shape is averaged
-  end_offset_ += std::clamp(shape_.face().value_or(end_offset_) - end_offset_, -kFaceRate_px, kFaceRate_px);
+  // A needle that stands still shows the same specks beside it again and again.
+  constexpr double kMoved_px = 1;
+  if (cv::norm(needle.tip - learnt_at_) > kMoved_px) {
+    learnt_at_ = needle.tip;
+    NeedlePose walls = needle;
+    walls.tip -= end_offset_ * walls.axis;
+    shape_.learn(field, walls);
+    constexpr double kFaceRate_px = 0.2;  // per frame: the face moves by no more as the shape is averaged
+    end_offset_ += std::clamp(shape_.face().value_or(end_offset_) - end_offset_, -kFaceRate_px, kFaceRate_px);
+  }
   cv::Mat here;
   cv::getRectSubPix(
       field.smooth, template_.size(),

@@ -42,6 +42,7 @@ class InjectionPipette {
   cv::Mat template_;
   Point tip_in_template_;
   NeedleShape shape_;
+  Point learnt_at_;  // the tip in the last frame that the shape was learnt from
   NeedlePose last_;
   Point velocity_;  // px per frame
   int lost_ = 0;    // frames in a row without the tip

@@ -149,7 +149,7 @@ const Result& Tracker::Impl::process(const hal::Frame& frame) {
     }
     classify_contact(membrane_behind_tip);
     if (result.needle.ok && !result.contact && (untouched || !result.gap_px)) {
-      needle.learn(picture.field, result.needle);
+      needle.learn(picture.field, result.needle, picture.noise);
     }
   } else {
     result.punctured = puncture.update({.t_ns = result.exposure_ns});

@@ -111,7 +111,12 @@ TEST_F(LabReport, samples_can_be_read_row_by_row_while_they_grow) {
   const fs::path file = fs::path(report()) / "samples.csv";
   int with_rows = 0;
   for (int i = 0; i < 6000 && alive(run.pid()); ++i, std::this_thread::sleep_for(20ms)) {
-    const std::string text = read_all(file);
+    std::string text = read_all(file);
+    for (int again = 0; again < 20 && !text.empty() && text.back() != '\n';
+         ++again) {  // in the middle of a write
+      std::this_thread::sleep_for(5ms);
+      text = read_all(file);
+    }
     if (!text.empty()) {
       ASSERT_EQ(text.back(), '\n');
       with_rows += std::count(text.begin(), text.end(), '\n') > 1 ? 1 : 0;

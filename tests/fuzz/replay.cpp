@@ -24,9 +24,11 @@ int main(int argc, char** argv) {
   int inputs = 0;
   for (int i = 1; i < argc; ++i) {
     if (fs::is_directory(argv[i])) {
-      for (const fs::directory_entry& entry : fs::directory_iterator(argv[i])) {
-        run(entry.path());
-        ++inputs;
+      for (const fs::directory_entry& entry : fs::recursive_directory_iterator(argv[i])) {
+        if (entry.is_regular_file()) {
+          run(entry.path());
+          ++inputs;
+        }
       }
     } else {
       run(argv[i]);

@@ -56,6 +56,7 @@ Measures::Measures(const Scene& scene)
     : sim_(scene.sim.value_or(sim::SimConfig{})),
       has_phases_(scene.servo.phases.has_value()),
       has_injector_(scene.servo.injector.has_value()),
+      next_frame_s_(scene.recorded ? 3 / scene.recorded->fps : 0),
       position_scale_(scene.servo.mapping.position_scale),
       period_s_(1 / scene.servo.rate_Hz),
       hand_band_(3, TremorBand(scene.servo.rate_Hz)),
@@ -195,7 +196,14 @@ void Measures::tick(const rt::TelemetrySample& s, const sim::Snapshot* world) {
     now_.asked_s += inside && (s.buttons & hal::kButtonInject) != 0 ? period_s_ : 0;
     now_.injected_s = now_.injected_s.value_or(0) + (inside && s.injector_open != 0 ? period_s_ : 0);
   }
-  if (s.obs_age_s < 0 || (s.alarms & rt::alarm_vision_stale) != 0) {
+  // Recorded frames show another needle than the one that moves now: that the core does not believe them is
+  // no failure to see.
+  if (s.observations != observations) {
+    frame_came_s_ = s.t_s;
+  }
+  const bool blind = next_frame_s_ > 0 ? s.observations == 0 || s.t_s > frame_came_s_ + next_frame_s_
+                                       : s.obs_age_s < 0 || (s.alarms & rt::alarm_vision_stale) != 0;
+  if (blind) {
     ++blind_ticks;
   }
   observations = s.observations;
@@ -314,6 +322,9 @@ Whereabouts Measures::believed() const {
       depth_m += (last.tip_m[i] - last.entry_m[i]) * last.axis[i];
     }
     w.depth_m = depth_m;
+    if (w.where == Whereabouts::inside && depth_m < 0) {
+      w.where = Whereabouts::unknown;  // phase and depth contradict each other
+    }
   }
   return w;
 }

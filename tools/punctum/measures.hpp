@@ -168,6 +168,8 @@ class Measures {
 
   sim::SimConfig sim_;
   bool has_phases_, has_injector_;
+  double next_frame_s_;  // the longest wait for a recorded frame; 0: the frames are of this very needle
+  double frame_came_s_ = 0;
   double position_scale_;
   double period_s_;
   std::vector<TremorBand> hand_band_, tip_band_;

@@ -94,6 +94,11 @@ bool unset(Scene& scene, const std::string& key) {
 std::optional<Removal> without(const Scene& scene, const tools::Table& table) {
   Removal r{table.name, {table.name + "=off"}, scene};
   table.put(r.left, false);
+  for (const auto& inner : tools::scene_tables()) {  // that went with it
+    if (inner.name.starts_with(table.name + ".") && inner.kind == tools::Kind::thing && inner.there(scene)) {
+      r.name += " + " + inner.name;
+    }
+  }
   while (const auto problem = tools::check_together(r.left)) {
     const tools::Table* needs_it = table_named(problem->key);
     if (needs_it != nullptr && needs_it->kind == tools::Kind::thing && needs_it->there(r.left)) {

@@ -17,6 +17,7 @@ constexpr double kLeastScore = 0.3;  // of the centred correlation
 constexpr double kJump_px = 4;       // along the axis, from what motion and correlation predict
 constexpr int kJumpsMax = 3;         // frames in a row; then it is where it is seen
 constexpr double kDoubtMax_px = 5;   // an end that is less certain is not seen
+constexpr double kSameEnd_px = 5;    // the walls end where the shape does, but for what either errs
 constexpr int kLostMax = 3;          // frames in a row; then it is looked for from the border
 
 // The best narrow tube of both borders, or of the one that is known.
@@ -74,7 +75,16 @@ bool InjectionPipette::start(const GradientField& field, double noise) {
       last_.tip += *s * last_.axis;
     }
   }
+  step_sign_ = 0;
+  walls_offset_ = 0.15 * last_.half_width;
+  offset_frames_ = 0;
+  calibrate_walls(field, last_, noise);
+  const Point end_by_walls = last_.tip + walls_offset_ * last_.axis;
   learn_shape_anew(field);
+  walls_agree_ = std::abs((end_by_walls - last_.tip).dot(last_.axis)) <= kSameEnd_px;
+  if (walls_agree_) {
+    last_.tip = end_by_walls;
+  }
   if (straight < 0.65 || last_.half_width > 2 * radius_px_ + 1) {
     reason_ = "what enters through the border is not a straight needle";
     return false;
@@ -116,7 +126,7 @@ NeedlePose InjectionPipette::find(const GradientField& field, double noise) {
   // Across the needle the correlation tells its place.
   const Point correlated = p->at + Point(window.x, window.y) + tip_in_template_;
   const Point across(-last_.axis.y, last_.axis.x);
-  needle.tip = last_.tip + velocity_ - end_offset_ * last_.axis;
+  needle.tip = last_.tip + velocity_;
   needle.tip += (correlated - needle.tip).dot(across) * across;
   bool near = false;
   if (!find_end(field, noise, needle, near)) {
@@ -125,7 +135,6 @@ NeedlePose InjectionPipette::find(const GradientField& field, double noise) {
     ++lost_;
     return needle;
   }
-  needle.tip += end_offset_ * needle.axis;
   // Far from where the motion predicts the end, and from where the whole tip is recognised: something else
   // crosses the needle.
   if (!near && std::abs((needle.tip - last_.tip - velocity_).dot(needle.axis)) > kJump_px &&
@@ -155,9 +164,11 @@ NeedlePose InjectionPipette::not_recognised(const GradientField& field, double n
   return needle;
 }
 
-bool InjectionPipette::find_end(const GradientField& field, double noise, NeedlePose& needle,
-                                bool& near) const {
+// Where its learnt shape fits best: walls end at many a granule, a shape does not. Where the walls end there,
+// too, they tell the place more finely.
+bool InjectionPipette::find_end(const GradientField& field, double noise, NeedlePose& needle, bool& near) {
   (void)fit_walls(field, noise, radius_px_, needle);
+  needle.tip -= shape_offset_ * needle.axis;
   // First near where the motion predicts it: what lies further ahead cannot be mistaken for it then.
   auto end = shape_.end(field, needle, 18, 18);
   near = end.has_value();
@@ -172,7 +183,32 @@ bool InjectionPipette::find_end(const GradientField& field, double noise, Needle
   if (const auto again = shape_.end(field, needle, 16, 16)) {
     needle.tip += again->ahead * needle.axis;
   }
+  shape_origin_ = needle.tip;
+  needle.tip += shape_offset_ * needle.axis;
+
+  NeedlePose walls = needle;
+  walls.tip -= walls_offset_ * walls.axis;
+  const auto ahead = end_of_profile(field, walls, 16, 16, noise);
+  walls_agree_ = ahead && std::abs(*ahead) <= kSameEnd_px;
+  if (walls_agree_) {
+    needle.tip += *ahead * needle.axis;
+  }
   return true;
+}
+
+// The profile of the walls ends a little before the end face. How far, the steepest change of grey along the
+// walls tells, averaged over 30 frames.
+void InjectionPipette::calibrate_walls(const GradientField& field, const NeedlePose& walls, double noise) {
+  const auto step = steepest_wall_step(field, walls, 3.5, 3 * field.noise_of_gradient(noise), step_sign_);
+  if (!step) {
+    return;
+  }
+  if (step_sign_ == 0) {
+    const double e = field.gradient(walls.at(-*step, 0.8 * walls.half_width)).dot(walls.axis) +
+                     field.gradient(walls.at(-*step, -0.8 * walls.half_width)).dot(walls.axis);
+    step_sign_ = e > 0 ? 1 : -1;
+  }
+  walls_offset_ += (*step - walls_offset_) / std::min(++offset_frames_, 30);
 }
 
 // The profile tells only roughly where the needle ends: its walls are thin there.
@@ -182,22 +218,28 @@ void InjectionPipette::learn_shape_anew(const GradientField& field) {
     shape_.learn(field, last_);
     last_.tip += shape_.face().value_or(0) * last_.axis;
   }
-  end_offset_ = 0;
+  shape_offset_ = 0;
+  shape_origin_ = last_.tip;
 }
 
-void InjectionPipette::learn(const GradientField& field, const NeedlePose& needle) {
+void InjectionPipette::learn(const GradientField& field, const NeedlePose& needle, double noise) {
   if (!needle.ok || template_.empty()) {
     return;
+  }
+  NeedlePose origin = needle;
+  if (walls_agree_) {
+    origin.tip = needle.tip - walls_offset_ * needle.axis;
+    calibrate_walls(field, origin, noise);
   }
   // A needle that stands still shows the same specks beside it again and again.
   constexpr double kMoved_px = 1;
   if (cv::norm(needle.tip - learnt_at_) > kMoved_px) {
     learnt_at_ = needle.tip;
-    NeedlePose walls = needle;
-    walls.tip -= end_offset_ * walls.axis;
-    shape_.learn(field, walls);
+    origin.tip = shape_origin_;
+    shape_.learn(field, origin);
     constexpr double kFaceRate_px = 0.2;  // per frame: the face moves by no more as the shape is averaged
-    end_offset_ += std::clamp(shape_.face().value_or(end_offset_) - end_offset_, -kFaceRate_px, kFaceRate_px);
+    shape_offset_ +=
+        std::clamp(shape_.face().value_or(shape_offset_) - shape_offset_, -kFaceRate_px, kFaceRate_px);
   }
   cv::Mat here;
   cv::getRectSubPix(

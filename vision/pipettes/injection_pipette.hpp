@@ -21,16 +21,17 @@ class InjectionPipette {
   [[nodiscard]] bool start(const GradientField& field, double noise);
   [[nodiscard]] NeedlePose find(const GradientField& field, double noise);
   // Lets the template of the tip follow slow changes of focus and light. Only while nothing touches the tip.
-  void learn(const GradientField& field, const NeedlePose& needle);
+  void learn(const GradientField& field, const NeedlePose& needle, double noise);
 
   [[nodiscard]] bool started() const noexcept { return started_; }
   [[nodiscard]] Side side() const noexcept { return found_side_; }
 
  private:
   bool cut_template(const GradientField& field);
-  // Along the needle its shaft looks the same everywhere, so there the end of its walls tells its place.
+  // Along the needle its shaft looks the same everywhere, so there its end tells its place.
   // `near`: it was found near where the motion predicts it.
-  [[nodiscard]] bool find_end(const GradientField& field, double noise, NeedlePose& needle, bool& near) const;
+  [[nodiscard]] bool find_end(const GradientField& field, double noise, NeedlePose& needle, bool& near);
+  void calibrate_walls(const GradientField& field, const NeedlePose& walls, double noise);
   void learn_shape_anew(const GradientField& field);
   [[nodiscard]] NeedlePose not_recognised(const GradientField& field, double noise, NeedlePose needle);
 
@@ -42,13 +43,18 @@ class InjectionPipette {
   cv::Mat template_;
   Point tip_in_template_;
   NeedleShape shape_;
-  Point learnt_at_;  // the tip in the last frame that the shape was learnt from
+  Point learnt_at_;     // the tip in the last frame that the shape was learnt from
+  Point shape_origin_;  // where the shape was seen in the last frame
   NeedlePose last_;
   Point velocity_;  // px per frame
   int lost_ = 0;    // frames in a row without the tip
   int jumps_ = 0;   // frames in a row in which the end lay somewhere else
 
-  double end_offset_ = 0;  // from where the learnt shape has its origin to the end face, px
+  double shape_offset_ = 0;   // from where the learnt shape has its origin to the end face, px
+  double walls_offset_ = 0;   // from where the profile of the walls ends to the end face, px
+  int offset_frames_ = 0;     // that walls_offset_ was learnt from
+  double step_sign_ = 0;      // +1: it is brighter ahead of the walls, -1: darker, 0: not known yet
+  bool walls_agree_ = false;  // with the shape, in the last frame
 };
 
 }  // namespace punctum::vision

@@ -230,4 +230,30 @@ std::optional<double> end_of_profile(const GradientField& field, const NeedlePos
   return place[last];
 }
 
+std::optional<double> steepest_wall_step(const GradientField& field, const NeedlePose& needle, double reach,
+                                         double floor, double sign) {
+  constexpr double kStep_px = 0.25;
+  const int n = 2 * static_cast<int>(reach / kStep_px) + 1;
+  std::vector<double> g(static_cast<std::size_t>(n), 0.0);
+  for (int i = 0; i < n; ++i) {
+    const double ahead = (i - n / 2) * kStep_px;
+    double e = 0;
+    for (const double u : {-0.95, -0.8, -0.65, 0.65, 0.8, 0.95}) {
+      e += field.gradient(needle.at(-ahead, u * needle.half_width)).dot(needle.axis) / 6;
+    }
+    g[static_cast<std::size_t>(i)] = sign == 0 ? std::abs(e) : sign * e;
+  }
+  std::optional<std::size_t> best;
+  for (std::size_t k = 1; k + 1 < g.size(); ++k) {
+    if (g[k] > floor && g[k] >= g[k - 1] && g[k] >= g[k + 1] && (!best || g[k] > g[*best])) {
+      best = k;
+    }
+  }
+  if (!best) {
+    return std::nullopt;
+  }
+  const std::size_t k = *best;
+  return (static_cast<int>(k) - n / 2 + vertex_offset(g[k - 1], g[k], g[k + 1])) * kStep_px;
+}
+
 }  // namespace punctum::vision

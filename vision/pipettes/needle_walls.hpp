@@ -18,4 +18,9 @@ namespace punctum::vision {
 [[nodiscard]] std::optional<double> end_of_profile(const GradientField& field, const NeedlePose& needle,
                                                    double back, double ahead, double noise);
 
+// Distance ahead of the tip, within +-reach px, of the steepest change of grey along both walls. sign: of
+// that change going ahead; 0 = either. Changes below `floor` (grey levels per px) do not count.
+[[nodiscard]] std::optional<double> steepest_wall_step(const GradientField& field, const NeedlePose& needle,
+                                                       double reach, double floor, double sign);
+
 }  // namespace punctum::vision

@@ -46,6 +46,7 @@ class RecorderTest : public testing::Test {
       sample_.fault = fault;
       core_->telemetry.push(sample_);
     }
+    core_->status.ticks.store(next_);
   }
   [[nodiscard]] std::size_t lines(const char* file) const {
     std::ifstream in(folder_ / file);
@@ -163,10 +164,17 @@ TEST_F(RecorderTest, the_room_kept_back_is_there_until_it_is_given_back) {
 TEST_F(RecorderTest, two_runs_never_get_the_same_new_folder) {
   const Scene scene = *load_scene("free");
   const std::string wanted = folder_ / "r";
-  const auto first = prepare_report_folder(scene, wanted, false);
-  ASSERT_TRUE(first);
-  EXPECT_EQ(first->folder, wanted);
-  std::ofstream(fs::path(first->folder) / "scene.toml") << "# free" << kResolvedScene << "\n";
+  {
+    const auto first = prepare_report_folder(scene, wanted, false);
+    ASSERT_TRUE(first);
+    EXPECT_EQ(first->folder, wanted);
+    std::ofstream(fs::path(first->folder) / "scene.toml") << "# free" << kResolvedScene << "\n";
+    for (const bool overwrite : {false, true}) {
+      const auto meanwhile = prepare_report_folder(scene, wanted, overwrite);
+      ASSERT_FALSE(meanwhile);
+      EXPECT_NE(meanwhile.error().find("another run writes its report there"), std::string::npos);
+    }
+  }
   const auto second = prepare_report_folder(scene, wanted, false);
   const auto third = prepare_report_folder(scene, wanted, true);
   ASSERT_TRUE(second && third);

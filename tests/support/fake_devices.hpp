@@ -24,6 +24,7 @@ struct FakeHand final : hal::HapticDevice {
   double arm_k = 250, arm_c = 6;
   std::uint32_t buttons = 0;
   Status status = Status::ok;
+  Status write_status = Status::ok;  // its readings may go on while no force reaches it
   bool nan = false;
   double jump_m = 0;
   double turn_rad = 0;  // about y
@@ -84,6 +85,9 @@ struct FakeHand final : hal::HapticDevice {
     return Status::ok;
   }
   Status write_force(const Vec3& f) noexcept override {
+    if (write_status != Status::ok) {
+      return write_status;
+    }
     force = f;
     ++writes;
     return Status::ok;
@@ -94,6 +98,7 @@ struct FakeStage final : hal::Stage {
   Vec3 tip, axis = -Vec3::UnitX(), registration{3e-6, -2e-6, 0}, target, speed = Vec3::Zero();
   bool on = false, stopped = false, off_at_once = false;
   Status status = Status::ok;
+  Status command_status = Status::ok;  // its readings may go on while no set-point reaches it
   double extra_error_m = 0;
   bool nan = false;
   bool frozen = false;         // the encoders stand still, the drive finds nothing wrong
@@ -149,6 +154,9 @@ struct FakeStage final : hal::Stage {
     return Status::ok;
   }
   Status command(const hal::StageCommand& set_point) noexcept override {
+    if (command_status != Status::ok) {
+      return command_status;
+    }
     if (!runaway) {
       target = set_point.tip_m - registration;
     }

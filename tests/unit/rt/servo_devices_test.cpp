@@ -32,6 +32,26 @@ TEST(Servo, survives_a_missing_sample_without_a_step) {
   EXPECT_LT(steepest, 0.05);
 }
 
+TEST(Servo, stops_when_a_device_that_is_still_read_takes_no_commands) {
+  for (const Status refused : {Status::disconnected, Status::fault}) {
+    Bench hand(icsi());
+    hand.run(1);
+    hand.hand.write_status = refused;
+    hand.tick();
+    hand.tick();
+    EXPECT_EQ(hand.servo->fault(), Fault::hand_lost);
+    EXPECT_GE(hand.stage.quick_stops, 1);
+
+    Bench stage(icsi());
+    stage.run(1);
+    stage.stage.command_status = refused;
+    stage.tick();
+    stage.tick();
+    EXPECT_EQ(stage.servo->fault(), refused == Status::disconnected ? Fault::stage_lost : Fault::stage_fault);
+    EXPECT_GE(stage.stage.quick_stops, 1);
+  }
+}
+
 TEST(Servo, notices_a_stage_whose_readings_stand_still_or_run_away_while_its_drive_says_all_is_well) {
   for (const double rate : {1000.0, 8000.0}) {
     for (const int how : {0, 1, 2}) {

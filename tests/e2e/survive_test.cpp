@@ -33,7 +33,8 @@ class Survive : public Programs {
     Programs::TearDown();
   }
   [[nodiscard]] Strings free_run(const Strings& more, const std::string& name = "r") const {
-    Strings args{"run", "free", "--report", report(name), "--no-figure", "--no-frames", "--quiet"};
+    Strings args{"run",         "free",    "--report", report(name), "--no-figure",
+                 "--no-frames", "--quiet", "--set",    kPatientRelay};
     args.insert(args.end(), more.begin(), more.end());
     return args;
   }
@@ -211,7 +212,7 @@ TEST_F(Survive, a_core_that_hangs_before_its_first_tick_is_noticed) {
 
 TEST_F(Survive, every_signal_that_asks_the_run_to_end_ends_it_in_order_with_a_report) {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) {
-    Program run(kPunctum, free_run({"--seconds", "60", "--set", kPatientRelay}), words());
+    Program run(kPunctum, free_run({"--seconds", "60"}), words());
     Look look("free", run.pid());
     ASSERT_TRUE(look.until_started());
     run.send(signal);
@@ -363,7 +364,7 @@ TEST_F(Survive, garbage_in_every_segment_ends_no_reader_in_disorder) {
 #endif
     Program run(kPunctum,
                 {"run", scene, "--seconds", "60", "--report", report(), "--no-frames", "--no-figure",
-                 "--clock", seed % 3 == 0 ? "virtual" : "real"},
+                 "--clock", seed % 3 == 0 ? "virtual" : "real", "--set", kPatientRelay},
                 words());
     Look look(scene, run.pid());
     ASSERT_TRUE(look.until_started()) << said();

@@ -122,7 +122,9 @@ TEST_F(Programs, frames_that_show_nothing_most_of_the_time_are_no_run_that_is_do
       file << "no picture";
     }
   }
-  EXPECT_EQ(punctum({"run", "recorded", "--set", "camera.frames=" + frames.string()}), 1) << said_;
+  EXPECT_EQ(punctum({"run", "recorded", "--set", "camera.frames=" + frames.string(), "--set", kPatientRelay}),
+            1)
+      << said_;
   const auto r = json();
   EXPECT_EQ(r["outcome"], "without vision") << said_;
   EXPECT_GT(r["without_vision_s"].get<double>(), 0.5 * r["seconds"].get<double>());

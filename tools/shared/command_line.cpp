@@ -60,14 +60,14 @@ std::vector<std::string> options_of(const CLI::App& app) {
   return names;
 }
 
-const CLI::App& chosen(const CLI::App& app) {
-  const auto subs = app.get_subcommands();
-  return subs.empty() ? app : *subs.front();
+const CLI::App* chosen(const CLI::App* app) {
+  const auto subs = app->get_subcommands();
+  return subs.empty() ? app : subs.front();
 }
 
 // The option that nobody knows, with what was probably meant; empty where every option is known.
 std::string unknown_option(const CLI::App& app, int argc, char** argv) {
-  const CLI::App& command = chosen(app);
+  const CLI::App& command = *chosen(&app);
   const std::vector<std::string> known = options_of(command);
   for (int i = 1; i < argc; ++i) {
     const std::string_view word = argv[i];

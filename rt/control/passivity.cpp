@@ -44,8 +44,16 @@ constexpr double kSeen = 2;
 constexpr double kBlind = 4;
 // Periods: a longer interval is an event of its own, not a rate.
 constexpr double kSingleDelay = 8;
-// Of the mean period: ticks jitter by 20 %, so that four intervals in a row above this are another period.
-constexpr double kJitter = 1.25;
+// The kept period steps up when its mean exceeds it by more than the mean's own ripple ...
+constexpr double kPeriodUp = 1.03;
+// ... to this above the mean, so that it rarely steps again: more than the jitter of the ticks (20 %), ...
+constexpr double kPeriodReserve = 1.25;
+// ... steps back when the mean is so far below that it will not step up at once (kPeriodReserve squared), ...
+constexpr double kPeriodDown = 1.6;
+// ... and to the nominal one when hardly a tick is late.
+constexpr double kOnTime = 1.005;
+// The stiffness that follows from it moves within this, without a click.
+constexpr double kPeriodUp_s = 0.1;
 // Periods, halfway between one and two: the surplus of a longer interval is kept apart until it is taken.
 constexpr double kLate = 1.5;
 // The velocity is hardly known just after it: the damper aims at half as much again.
@@ -106,18 +114,31 @@ void approach(T& x, const T& to, double dt_s, double tau_s) NONBLOCKING {
 
 }  // namespace
 
-PassivityGuard::Period::Period(double nominal_s) NONBLOCKING : mean_s_(nominal_s) { last_s_.fill(0); }
+PassivityGuard::Period::Period(double nominal_s) NONBLOCKING : nominal_s_(nominal_s),
+                                                               mean_s_(nominal_s),
+                                                               reserved_s_(nominal_s),
+                                                               kept_s_(nominal_s) {
+  last_s_.fill(0);
+}
 
-void PassivityGuard::Period::follow(double interval_s) NONBLOCKING {
+void PassivityGuard::Period::follow(double interval_s, double recover_s) NONBLOCKING {
   // A period that is never kept is another period, at once.
   newest_ = (newest_ + 1) % last_s_.size();
   last_s_[newest_] = interval_s;
   const double least_s = *std::min_element(last_s_.begin(), last_s_.end());
-  if (least_s > kJitter * mean_s_) {
-    mean_s_ = least_s;
+  if (least_s > kPeriodReserve * mean_s_) {
+    mean_s_ = reserved_s_ = least_s;
+    kept_s_ = std::max(kept_s_, least_s);
   }
+
   const double counted_s = std::min(interval_s, kSingleDelay * mean_s_);
   approach(mean_s_, counted_s, counted_s, kMeanPeriod_s);
+  if (mean_s_ < kOnTime * nominal_s_) {
+    reserved_s_ = nominal_s_;
+  } else if (mean_s_ > kPeriodUp * reserved_s_ || kPeriodDown * mean_s_ < reserved_s_) {
+    reserved_s_ = kPeriodReserve * mean_s_;
+  }
+  approach(kept_s_, reserved_s_, counted_s, reserved_s_ > kept_s_ ? kPeriodUp_s : recover_s);
 }
 
 PassivityGuard::PassivityGuard(const GuardParams& params, const HandDevice& device,
@@ -300,11 +321,11 @@ hal::Vec3 PassivityGuard::step(const GuardInput& in) NONBLOCKING {
     forget_interval();
   }
   elapsed_s_ = in.elapsed_s;
-  tick_.follow(in.elapsed_s);
+  tick_.follow(in.elapsed_s, params_.recover_s);
   since_s_ += in.elapsed_s;
   if (in.fresh) {
     const double between_s = in.between_s > 0 ? in.between_s : since_s_;
-    sample_.follow(between_s);
+    sample_.follow(between_s, params_.recover_s);
     gap_ = between_s > kSeen * regular_s();
   }
   lower_gain(in);

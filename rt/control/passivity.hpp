@@ -88,16 +88,18 @@ class PassivityGuard {
  private:
   static constexpr std::size_t kRing = 8;  // written forces; more than the longest delay
 
-  // A period that is really kept: the time-weighted mean of the intervals. By hold, a spring K gives K v^2
-  // T/2 over each interval T, so this mean is the period that gives as much.
+  // A period that is really kept, with some reserve.
   class Period {
    public:
     explicit Period(double nominal_s) NONBLOCKING;
-    void follow(double interval_s) NONBLOCKING;
-    [[nodiscard]] double kept_s() const NONBLOCKING { return mean_s_; }
+    void follow(double interval_s, double recover_s) NONBLOCKING;
+    [[nodiscard]] double kept_s() const NONBLOCKING { return kept_s_; }
 
    private:
-    double mean_s_;
+    double nominal_s_;
+    double mean_s_;      // time-weighted
+    double reserved_s_;  // steps with the mean
+    double kept_s_;      // follows it without a step
     std::array<double, 4> last_s_;
     std::size_t newest_ = 0;
   };

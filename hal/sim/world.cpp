@@ -68,6 +68,7 @@ OperatorView World::view() const NONBLOCKING {
   v.inward = config_.stage.axis.normalized();
   v.hand_m = hand_.state().position_m;
   v.powered = stage_.state().powered != 0 && stage_.state().quick_stopped == 0;
+  v.relay_open = simulated_.estop && !estop_.power() && estop_.state().opened_ns != 0;
   v.cell = cell_.has_value();
   if (cell_) {
     v.centre_m = cell_->centre_m(snapshot_.cell);
@@ -109,7 +110,7 @@ void World::step_piece(std::int64_t to_ns) NONBLOCKING {
   std::copy(failure.begin(), failure.end(), snapshot_.failure.begin());
 
   if (simulated_.estop) {
-    estop_.step(to_ns, from_s, to_s, of(Device::estop));
+    estop_.step(to_ns, from_s, to_s, operator_.state().reset != 0, of(Device::estop));
   }
   const bool power = !simulated_.estop || estop_.power();
 

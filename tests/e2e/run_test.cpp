@@ -440,6 +440,17 @@ TEST_F(Programs, release_and_reset_clear_the_stop_and_the_run_goes_on) {
   EXPECT_EQ(r["faults"][0]["name"], "estop");
 }
 
+TEST_F(Programs, the_operator_resets_a_station_whose_relay_has_opened) {
+  EXPECT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "8", "--set",
+                     "sim.failure=[{device=\"estop\", kind=\"drop\", at_s=1, for_s=0.1}]"}),
+            3)
+      << said_;
+  const auto r = json();
+  EXPECT_EQ(r["outcome"], "done after a fault");
+  ASSERT_EQ(r["faults"].size(), 1U);
+  EXPECT_EQ(r["faults"][0]["name"], "estop_lost");
+}
+
 TEST_F(Programs, a_lost_hand_stops_the_station) {
   EXPECT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "4", "--set",
                      "sim.failure=[{device=\"haptic\", kind=\"disconnect\", at_s=1}]"}),

@@ -34,6 +34,8 @@ constexpr double kClutchMove_s = 1.0;
 constexpr double kButtonPress_s = 0.2;
 constexpr double kEnablingHeld_s = 1.0;  // without power for so long: once more
 constexpr double kEnablingLetGo_s = 0.05;
+constexpr double kResetEvery_s = 2.0;  // while the relay is open
+constexpr double kResetFor_s = 0.2;
 constexpr double kStroke_m = 60e-6;  // without a cell, at the needle
 
 }  // namespace
@@ -397,7 +399,8 @@ void Operator::strokes(double dt_s) NONBLOCKING {
   s.intention_m = Vec3(s.intention_m.vec() + (place(s.activity_s) - place(s.activity_s - dt_s)) * to);
 }
 
-// Holds the enabling device; while the drives stay without power, lets it go and presses it anew.
+// Holds the enabling device; while the drives stay without power, lets it go and presses it anew. A relay that
+// has opened needs the reset button first.
 void Operator::hold_to_run(double dt_s, const OperatorView& view) NONBLOCKING {
   OperatorState& s = state_;
   s.enabling_s += dt_s;
@@ -406,6 +409,8 @@ void Operator::hold_to_run(double dt_s, const OperatorView& view) NONBLOCKING {
     s.enabling = held ? 0U : hal::kButtonEnable;
     s.enabling_s = 0;
   }
+  s.relay_open_s = view.relay_open ? s.relay_open_s + dt_s : 0;
+  s.reset = std::fmod(s.relay_open_s, kResetEvery_s) > kResetEvery_s - kResetFor_s ? 1U : 0U;
 }
 
 void Operator::step(double from_s, double to_s, const OperatorView& view) NONBLOCKING {

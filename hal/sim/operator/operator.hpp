@@ -53,6 +53,7 @@ struct OperatorView {
   std::uint64_t cell_index = 0;
   Vec3 hand_m = Vec3::Zero();  // handle, device frame
   bool powered = false;        // the stage's drives
+  bool relay_open = false;     // the lamp of the relay: it has opened since the start
 };
 
 enum class Activity : std::uint32_t {
@@ -98,6 +99,8 @@ struct OperatorState {
   std::uint32_t buttons = 0;
   std::uint32_t enabling = 0;  // the button of the enabling device
   double enabling_s = 0;       // since it was pressed or let go
+  std::uint32_t reset = 0;     // the reset button of the e-stop chain
+  double relay_open_s = 0;
   std::uint32_t attempts = 0;  // at this cell
   std::uint32_t cells_done = 0;
   std::uint32_t given_up = 0;    // cells of cells_done that were never punctured

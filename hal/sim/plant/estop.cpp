@@ -15,11 +15,11 @@ SimEstop::SimEstop(const SimConfig& config)
       noise_(config.seed, Noise::Stream::estop_reading),
       liar_(config.seed, Device::estop) {}
 
-void SimEstop::step(std::int64_t t_ns, double from_s, double to_s, const Failing& failure) NONBLOCKING {
+void SimEstop::step(std::int64_t t_ns, double from_s, double to_s, bool reset,
+                    const Failing& failure) NONBLOCKING {
   failure_ = failure;
   bool a = true;
   bool b = true;
-  bool reset = false;
   bool pulse = false;
   for (int i = 0; i < event_count_; ++i) {
     const EstopEvent& e = events_[static_cast<std::size_t>(i)];

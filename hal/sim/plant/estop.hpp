@@ -35,7 +35,8 @@ class SimEstop final : public hal::EstopChain {
  public:
   explicit SimEstop(const SimConfig& config);
 
-  void step(std::int64_t t_ns, double from_s, double to_s, const Failing& failure) NONBLOCKING;
+  // reset: the operator presses the button.
+  void step(std::int64_t t_ns, double from_s, double to_s, bool reset, const Failing& failure) NONBLOCKING;
 
   [[nodiscard]] hal::Status read(hal::EstopState& out) NONBLOCKING override;
   void heartbeat(bool level) NONBLOCKING override;

@@ -12,7 +12,7 @@ class SimEstopTest : public testing::Test {
   void tick(SimEstop& chain, bool beats = true) {
     ++ticks;
     chain.step(ticks * 1'000'000, 0.001 * static_cast<double>(ticks - 1), 0.001 * static_cast<double>(ticks),
-               Failure::none);
+               false, Failure::none);
     if (beats) {
       chain.heartbeat(level = !level);
     }
@@ -139,7 +139,7 @@ TEST_F(SimEstopTest, a_dropped_chain_hears_no_heartbeat) {
   for (int i = 0; i < 60; ++i) {
     ++ticks;
     chain.step(ticks * 1'000'000, 0.001 * static_cast<double>(ticks - 1), 0.001 * static_cast<double>(ticks),
-               Failure::drop);
+               false, Failure::drop);
     chain.heartbeat(level = !level);
   }
   EXPECT_FALSE(chain.power());

@@ -223,7 +223,7 @@ TEST(Failures, of_the_estop_chain_are_seen) {
     SimEstop chain(config);
     const auto run = [&](int from, int to, Failure now) {
       for (int k = from; k < to; ++k) {
-        chain.step(k * 1'000'000, 0.001 * (k - 1), 0.001 * k, now);
+        chain.step(k * 1'000'000, 0.001 * (k - 1), 0.001 * k, false, now);
         chain.heartbeat(k % 2 == 0);
       }
     };
@@ -389,7 +389,7 @@ TEST(Failures, every_device_says_when_it_took_a_reading_that_is_fresh_frozen_or_
     expect_sample_times([&](std::int64_t t, Failure now) { stage.step(t, 0.001, true, now); },
                         time_of<hal::StageState>(stage), f, false);
     SimEstop chain{SimConfig{}};
-    expect_sample_times([&](std::int64_t t, Failure now) { chain.step(t, 0, 0.001, now); },
+    expect_sample_times([&](std::int64_t t, Failure now) { chain.step(t, 0, 0.001, false, now); },
                         time_of<hal::EstopState>(chain), f, true);
     SimInjector valve(InjectorParams{0.005});
     expect_sample_times([&](std::int64_t t, Failure now) { valve.step(t, 0.001, true, now); },
@@ -493,7 +493,7 @@ TEST(Failures, noise_is_as_large_as_each_device_says) {
   double both = 0;
   const Spread a = spread_of([&] {
     hal::EstopState seen;
-    chain.step(t += 1'000'000, 0, 0.001, Failure::noise);
+    chain.step(t += 1'000'000, 0, 0.001, false, Failure::noise);
     EXPECT_EQ(chain.read(seen), Status::ok);
     both += !seen.contact_a_closed && !seen.contact_b_closed ? 1.0 / 4000 : 0;
     return seen.contact_a_closed ? 1.0 : 0.0;

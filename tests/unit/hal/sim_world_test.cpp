@@ -433,6 +433,32 @@ TEST(MixedWorld, powers_the_simulated_drives_when_the_estop_chain_is_real) {
   EXPECT_FALSE(run_unattended(config, world.snapshot(), nullptr, 0.5).last.stage.powered);
 }
 
+TEST(World, lets_the_operator_press_reset_when_the_relay_has_opened) {
+  for (const double silent_from_s : {0.0, 2.0}) {  // before the drives ever had power, and in motion
+    const SimConfig config = whole_station();
+    World world(config, nullptr);
+    world.begin(0);
+    bool beat = false;
+    bool lost = false;
+    double back_s = 0;
+    for (std::int64_t tick = 1; tick <= 8000 && back_s == 0; ++tick) {
+      world.step(tick * kTick_ns);
+      const double t_s = 0.001 * static_cast<double>(tick);
+      if (t_s < silent_from_s + 0.01 || t_s > silent_from_s + 0.1) {
+        world.estop().heartbeat(beat = !beat);
+      }
+      hal::HandState hand;
+      ASSERT_EQ(world.hand().read(hand), hal::Status::ok);
+      world.stage().enable((hand.buttons & hal::kButtonEnable) != 0);
+      lost = lost || (t_s > silent_from_s + 0.1 && world.snapshot().stage.powered == 0);
+      back_s = lost && world.snapshot().stage.powered != 0 ? t_s : 0;
+    }
+    EXPECT_TRUE(lost) << silent_from_s;
+    EXPECT_GT(back_s, silent_from_s + 1);
+    EXPECT_LT(back_s, silent_from_s + 4);
+  }
+}
+
 TEST(World, creates_no_energy_at_the_handle) {
   // Arm and tremor off: what the handle has, the amplifier has done.
   SimConfig config;

@@ -147,6 +147,7 @@ NeedlePose InjectionPipette::find(const GradientField& field, double noise) {
   velocity_ = lost_ == 0 ? needle.tip - last_.tip : Point();
   lost_ = 0;
   last_ = needle;
+  backdrop_.learn(field, needle);
   return needle;
 }
 
@@ -170,17 +171,18 @@ bool InjectionPipette::find_end(const GradientField& field, double noise, Needle
   (void)fit_walls(field, noise, radius_px_, needle);
   needle.tip -= shape_offset_ * needle.axis;
   // First near where the motion predicts it: what lies further ahead cannot be mistaken for it then.
-  auto end = shape_.end(field, needle, 18, 18);
+  auto end = shape_.end(field, backdrop_, needle, 18, 18, view_);
   near = end.has_value();
   if (!near) {
-    end = shape_.end(field, needle, 36, 44);
+    end = shape_.end(field, backdrop_, needle, 36, 44, view_);
   }
   if (!end || end->doubt > kDoubtMax_px) {
     return false;
   }
+  view_ = end->view;
   needle.tip += end->ahead * needle.axis;
   (void)fit_walls(field, noise, radius_px_, needle);
-  if (const auto again = shape_.end(field, needle, 16, 16)) {
+  if (const auto again = shape_.end_in(view_, field, backdrop_, needle, 16, 16)) {
     needle.tip += again->ahead * needle.axis;
   }
   shape_origin_ = needle.tip;
@@ -189,7 +191,7 @@ bool InjectionPipette::find_end(const GradientField& field, double noise, Needle
   NeedlePose walls = needle;
   walls.tip -= walls_offset_ * walls.axis;
   const auto ahead = end_of_profile(field, walls, 16, 16, noise);
-  walls_agree_ = ahead && std::abs(*ahead) <= kSameEnd_px;
+  walls_agree_ = view_.blur == 0 && ahead && std::abs(*ahead) <= kSameEnd_px;
   if (walls_agree_) {
     needle.tip += *ahead * needle.axis;
   }
@@ -223,7 +225,7 @@ void InjectionPipette::learn_shape_anew(const GradientField& field) {
 }
 
 void InjectionPipette::learn(const GradientField& field, const NeedlePose& needle, double noise) {
-  if (!needle.ok || template_.empty()) {
+  if (!needle.ok || template_.empty() || view_.blur > 0) {
     return;
   }
   NeedlePose origin = needle;

@@ -7,6 +7,7 @@
 
 #include "vision/config.hpp"
 #include "vision/image/gradient.hpp"
+#include "vision/pipettes/backdrop.hpp"
 #include "vision/pipettes/needle_pose.hpp"
 #include "vision/pipettes/needle_shape.hpp"
 
@@ -43,6 +44,8 @@ class InjectionPipette {
   cv::Mat template_;
   Point tip_in_template_;
   NeedleShape shape_;
+  Backdrop backdrop_;
+  NeedleShape::View view_;  // of the last frame
   Point learnt_at_;     // the tip in the last frame that the shape was learnt from
   Point shape_origin_;  // where the shape was seen in the last frame
   NeedlePose last_;

@@ -29,6 +29,8 @@ class InjectionPipette {
 
  private:
   bool cut_template(const GradientField& field);
+  [[nodiscard]] bool beside_prediction(const GradientField& field, double noise, NeedlePose& needle,
+                                       double aside) const;
   // Along the needle its shaft looks the same everywhere, so there its end tells its place.
   // `near`: it was found near where the motion predicts it.
   [[nodiscard]] bool find_end(const GradientField& field, double noise, NeedlePose& needle, bool& near);

@@ -9,9 +9,9 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr double kBeside_px = 10;     // of the needle's walls: their blur, out of focus
-constexpr double kAhead_px = 40;      // of the tip: it may be seen short of where it is
-constexpr double kPart = 1.0 / 16;    // of a frame in the mean
+constexpr double kBeside_px = 10;   // of the needle's walls: their blur, out of focus
+constexpr double kAhead_px = 40;    // of the tip: it may be seen short of where it is
+constexpr double kPart = 1.0 / 16;  // of a frame in the mean
 
 }  // namespace
 

@@ -14,7 +14,8 @@ class Backdrop {
  public:
   // Takes in what a frame shows far enough from the needle.
   void learn(const GradientField& field, const NeedlePose& needle);
-  // Grey level of the smoothed picture, bilinear; picture coordinates. Empty where the needle was always near.
+  // Grey level of the smoothed picture, bilinear; picture coordinates. Empty where the needle was always
+  // near.
   [[nodiscard]] std::optional<double> grey(const Point& p) const;
 
  private:

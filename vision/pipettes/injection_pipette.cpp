@@ -16,7 +16,7 @@ namespace {
 constexpr double kLeastScore = 0.3;  // of the centred correlation
 constexpr double kJump_px = 4;       // along the axis, from what motion and correlation predict
 constexpr int kJumpsMax = 3;         // frames in a row; then it is where it is seen
-constexpr double kAside_px = 2;      // across the axis, likewise
+constexpr double kAside_px = 2;      // across the axis; further aside the shaft must lie there, too
 constexpr double kDoubtMax_px = 5;   // an end that is less certain is not seen
 constexpr double kSameEnd_px = 5;    // the walls end where the shape does, but for what either errs
 constexpr int kLostMax = 3;          // frames in a row; then it is looked for from the border
@@ -128,9 +128,7 @@ NeedlePose InjectionPipette::find(const GradientField& field, double noise) {
   const Point correlated = p->at + Point(window.x, window.y) + tip_in_template_;
   const Point across(-last_.axis.y, last_.axis.x);
   needle.tip = last_.tip + velocity_;
-  if (NeedlePose aside = needle; beside_prediction(field, noise, aside, (correlated - needle.tip).dot(across))) {
-    needle = aside;
-  }
+  needle.tip += aside(field, noise, needle, (correlated - needle.tip).dot(across)) * across;
   bool near = false;
   if (!find_end(field, noise, needle, near)) {
     needle.reason = "end of the needle not seen";
@@ -154,15 +152,17 @@ NeedlePose InjectionPipette::find(const GradientField& field, double noise) {
   return needle;
 }
 
-// Whether the needle is to be looked for `aside` px across it, where its tip is recognised; then it is moved
-// there. Granules may look like the tip, but not like the shaft: further aside the walls decide.
-bool InjectionPipette::beside_prediction(const GradientField& field, double noise, NeedlePose& needle,
-                                         double aside) const {
-  NeedlePose predicted = needle;
-  needle.tip += aside * Point(-needle.axis.y, needle.axis.x);
-  NeedlePose moved = needle;
-  return std::abs(aside) <= kAside_px || fit_walls(field, noise, radius_px_, moved) >=
-                                             fit_walls(field, noise, radius_px_, predicted);
+// How far across the predicted needle it is, px, when its tip is recognised `correlated` px across. Granules
+// may look like the tip, but not like the shaft: further aside the walls decide.
+double InjectionPipette::aside(const GradientField& field, double noise, const NeedlePose& predicted,
+                               double correlated) const {
+  if (std::abs(correlated) <= kAside_px) {
+    return correlated;
+  }
+  NeedlePose here = predicted, there = predicted;
+  there.tip = predicted.at(0, correlated);
+  return fit_walls(field, noise, radius_px_, there) >= fit_walls(field, noise, radius_px_, here) ? correlated
+                                                                                                 : 0;
 }
 
 NeedlePose InjectionPipette::not_recognised(const GradientField& field, double noise, NeedlePose needle) {

@@ -193,8 +193,8 @@ NeedleShape::Profiles NeedleShape::blurred(double sigma_px) const {
     for (int i = 0; i < static_cast<int>(kLanes); ++i) {
       for (int d = -m; d <= m; ++d) {
         if (i + d >= 0 && i + d < static_cast<int>(kLanes)) {
-          q[static_cast<std::size_t>(i)] += across[static_cast<std::size_t>(d + m)] *
-                                            (p[static_cast<std::size_t>(i + d)] - beside);
+          q[static_cast<std::size_t>(i)] +=
+              across[static_cast<std::size_t>(d + m)] * (p[static_cast<std::size_t>(i + d)] - beside);
         }
       }
     }
@@ -254,8 +254,8 @@ NeedleShape::Fit NeedleShape::fit(const Profiles& seen, View view, int ends) con
     }
   }
   out.best = static_cast<int>(std::max_element(out.gain.begin(), out.gain.end()) - out.gain.begin());
-  // What the surroundings of the needle show is noise to it. Variance of a lane: by the profiles ahead of this
-  // end, and of what is left behind it.
+  // What the surroundings of the needle show is noise to it. Variance of a lane: by the profiles ahead of
+  // this end, and of what is left behind it.
   double sum = 0;
   int count = 0;
   for (int j = 0; j < n && j - out.best < kLeastShaft; ++j) {

@@ -72,8 +72,8 @@ class NeedleShape {
   // The shape without what lay beside the needle in a few frames only.
   void smooth_along_shaft();
 
-  double reach_ = 0;            // to either side of the axis, px
-  Profiles mean_;     // of the frames
+  double reach_ = 0;               // to either side of the axis, px
+  Profiles mean_;                  // of the frames
   std::array<Profiles, 6> shape_;  // likewise, without specks; ever less sharp
   int frames_ = 0;
 };

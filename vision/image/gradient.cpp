@@ -19,6 +19,7 @@ double bilinear(const cv::Mat& m, double x, double y) {
 }  // namespace
 
 void GradientField::compute(const cv::Mat& grey_in, cv::Rect wanted, double sigma_px) {
+  picture = grey_in.size();
   area = wanted & cv::Rect(0, 0, grey_in.cols, grey_in.rows);
   sigma = sigma_px;
   if (area.empty()) {

@@ -8,6 +8,7 @@
 namespace punctum::vision {
 
 struct GradientField {
+  cv::Size picture;  // the whole one
   cv::Rect area;     // of the whole picture; the fields below cover it
   double sigma = 0;  // Gaussian, px
   cv::Mat smooth;    // CV_32F grey levels

@@ -16,6 +16,7 @@ namespace {
 constexpr double kLeastScore = 0.3;  // of the centred correlation
 constexpr double kJump_px = 4;       // along the axis, from what motion and correlation predict
 constexpr int kJumpsMax = 3;         // frames in a row; then it is where it is seen
+constexpr double kAside_px = 2;      // across the axis; further aside the shaft must lie there, too
 constexpr double kDoubtMax_px = 5;   // an end that is less certain is not seen
 constexpr double kSameEnd_px = 5;    // the walls end where the shape does, but for what either errs
 constexpr int kLostMax = 3;          // frames in a row; then it is looked for from the border
@@ -127,7 +128,7 @@ NeedlePose InjectionPipette::find(const GradientField& field, double noise) {
   const Point correlated = p->at + Point(window.x, window.y) + tip_in_template_;
   const Point across(-last_.axis.y, last_.axis.x);
   needle.tip = last_.tip + velocity_;
-  needle.tip += (correlated - needle.tip).dot(across) * across;
+  needle.tip += aside(field, noise, needle, (correlated - needle.tip).dot(across)) * across;
   bool near = false;
   if (!find_end(field, noise, needle, near)) {
     needle.reason = "end of the needle not seen";
@@ -147,7 +148,21 @@ NeedlePose InjectionPipette::find(const GradientField& field, double noise) {
   velocity_ = lost_ == 0 ? needle.tip - last_.tip : Point();
   lost_ = 0;
   last_ = needle;
+  backdrop_.learn(field, needle);
   return needle;
+}
+
+// How far across the predicted needle it is, px, when its tip is recognised `correlated` px across. Granules
+// may look like the tip, but not like the shaft: further aside the walls decide.
+double InjectionPipette::aside(const GradientField& field, double noise, const NeedlePose& predicted,
+                               double correlated) const {
+  if (std::abs(correlated) <= kAside_px) {
+    return correlated;
+  }
+  NeedlePose here = predicted, there = predicted;
+  there.tip = predicted.at(0, correlated);
+  return fit_walls(field, noise, radius_px_, there) >= fit_walls(field, noise, radius_px_, here) ? correlated
+                                                                                                 : 0;
 }
 
 NeedlePose InjectionPipette::not_recognised(const GradientField& field, double noise, NeedlePose needle) {
@@ -170,17 +185,18 @@ bool InjectionPipette::find_end(const GradientField& field, double noise, Needle
   (void)fit_walls(field, noise, radius_px_, needle);
   needle.tip -= shape_offset_ * needle.axis;
   // First near where the motion predicts it: what lies further ahead cannot be mistaken for it then.
-  auto end = shape_.end(field, needle, 18, 18);
+  auto end = shape_.end(field, backdrop_, needle, 18, 18, view_);
   near = end.has_value();
   if (!near) {
-    end = shape_.end(field, needle, 36, 44);
+    end = shape_.end(field, backdrop_, needle, 36, 44, view_);
   }
   if (!end || end->doubt > kDoubtMax_px) {
     return false;
   }
+  view_ = end->view;
   needle.tip += end->ahead * needle.axis;
   (void)fit_walls(field, noise, radius_px_, needle);
-  if (const auto again = shape_.end(field, needle, 16, 16)) {
+  if (const auto again = shape_.end_in(view_, field, backdrop_, needle, 16, 16)) {
     needle.tip += again->ahead * needle.axis;
   }
   shape_origin_ = needle.tip;
@@ -189,7 +205,7 @@ bool InjectionPipette::find_end(const GradientField& field, double noise, Needle
   NeedlePose walls = needle;
   walls.tip -= walls_offset_ * walls.axis;
   const auto ahead = end_of_profile(field, walls, 16, 16, noise);
-  walls_agree_ = ahead && std::abs(*ahead) <= kSameEnd_px;
+  walls_agree_ = view_.blur == 0 && ahead && std::abs(*ahead) <= kSameEnd_px;
   if (walls_agree_) {
     needle.tip += *ahead * needle.axis;
   }
@@ -223,7 +239,7 @@ void InjectionPipette::learn_shape_anew(const GradientField& field) {
 }
 
 void InjectionPipette::learn(const GradientField& field, const NeedlePose& needle, double noise) {
-  if (!needle.ok || template_.empty()) {
+  if (!needle.ok || template_.empty() || view_.blur > 0) {
     return;
   }
   NeedlePose origin = needle;

@@ -7,6 +7,7 @@
 
 #include "vision/config.hpp"
 #include "vision/image/gradient.hpp"
+#include "vision/pipettes/backdrop.hpp"
 #include "vision/pipettes/needle_pose.hpp"
 #include "vision/pipettes/needle_shape.hpp"
 
@@ -28,6 +29,8 @@ class InjectionPipette {
 
  private:
   bool cut_template(const GradientField& field);
+  [[nodiscard]] double aside(const GradientField& field, double noise, const NeedlePose& predicted,
+                             double correlated) const;
   // Along the needle its shaft looks the same everywhere, so there its end tells its place.
   // `near`: it was found near where the motion predicts it.
   [[nodiscard]] bool find_end(const GradientField& field, double noise, NeedlePose& needle, bool& near);
@@ -43,8 +46,10 @@ class InjectionPipette {
   cv::Mat template_;
   Point tip_in_template_;
   NeedleShape shape_;
-  Point learnt_at_;     // the tip in the last frame that the shape was learnt from
-  Point shape_origin_;  // where the shape was seen in the last frame
+  Backdrop backdrop_;
+  NeedleShape::View view_;  // of the last frame
+  Point learnt_at_;         // the tip in the last frame that the shape was learnt from
+  Point shape_origin_;      // where the shape was seen in the last frame
   NeedlePose last_;
   Point velocity_;  // px per frame
   int lost_ = 0;    // frames in a row without the tip

@@ -8,15 +8,22 @@
 #include <vector>
 
 #include "vision/image/gradient.hpp"
+#include "vision/pipettes/backdrop.hpp"
 #include "vision/pipettes/needle_pose.hpp"
 
 namespace punctum::vision {
 
 class NeedleShape {
  public:
+  // How the needle is looked at.
+  struct View {
+    bool over_backdrop = false;  // by what it changes of what was seen without it
+    std::size_t blur = 0;        // how much less sharp than learnt; 0: as learnt
+  };
   struct End {
     double ahead = 0;  // of the tip of the given pose, px
     double doubt = 0;  // px: ends further away than this are much less likely
+    View view;         // in which it is seen best
   };
 
   [[nodiscard]] bool known() const noexcept { return frames_ > 0; }
@@ -28,9 +35,13 @@ class NeedleShape {
   // Distance of the end face ahead of the tip of the poses that it was learnt from, px; sub-pixel.
   [[nodiscard]] std::optional<double> face() const;
   // The most likely end, from `back` px behind the tip to `ahead` px ahead of it. Empty when it is not there,
-  // or when the shape is not known.
-  [[nodiscard]] std::optional<End> end(const GradientField& field, const NeedlePose& needle, double back,
-                                       double ahead) const;
+  // or when the shape is not known. backdrop: what would be seen there without the needle, as far as known.
+  // The views near the given one are tried.
+  [[nodiscard]] std::optional<End> end(const GradientField& field, const Backdrop& backdrop,
+                                       const NeedlePose& needle, double back, double ahead, View near) const;
+  // In this view alone.
+  [[nodiscard]] std::optional<End> end_in(View view, const GradientField& field, const Backdrop& backdrop,
+                                          const NeedlePose& needle, double back, double ahead) const;
 
  private:
   static constexpr int kReliable = 8;  // frames
@@ -38,16 +49,32 @@ class NeedleShape {
   // Absorption across the needle, as a share of the light, without mean and slope.
   using Profile = std::array<double, kLanes>;
 
-  [[nodiscard]] static double square(const Profile& p);
-  [[nodiscard]] std::optional<Profile> profile(const GradientField& field, const NeedlePose& needle,
-                                               double behind) const;
+  using Profiles = std::vector<Profile>;  // every half pixel along the needle, from ahead of the tip
+  [[nodiscard]] static double product(const Profile& a, const Profile& b);
+  static void remove_mean_and_slope(Profile& p);
+  // backdrop: null: the picture as it is.
+  [[nodiscard]] std::optional<Profile> profile(const GradientField& field, const Backdrop* backdrop,
+                                               const NeedlePose& needle, double behind) const;
+  [[nodiscard]] Profiles profiles(const GradientField& field, const Backdrop* backdrop,
+                                  const NeedlePose& needle, double ahead, int ends) const;
+  [[nodiscard]] Profiles blurred(double sigma_px) const;
+
+  struct Fit {
+    std::vector<double> gain;  // of each end, over no needle; in squares of the absorption
+    int best = 0;
+    double variance = 0;  // of a lane, once the needle is taken off
+    View view;
+    [[nodiscard]] double top() const { return gain[static_cast<std::size_t>(best)]; }
+  };
+  [[nodiscard]] Fit fit(const Profiles& seen, View view, int ends) const;
+  [[nodiscard]] static std::optional<End> end_of(const Fit& fit, double ahead);
 
   // The shape without what lay beside the needle in a few frames only.
   void smooth_along_shaft();
 
-  double reach_ = 0;            // to either side of the axis, px
-  std::vector<Profile> mean_;   // of the frames, every half pixel, from a little ahead of the tip
-  std::vector<Profile> shape_;  // likewise
+  double reach_ = 0;               // to either side of the axis, px
+  Profiles mean_;                  // of the frames
+  std::array<Profiles, 6> shape_;  // likewise, without specks; ever less sharp
   int frames_ = 0;
 };
 

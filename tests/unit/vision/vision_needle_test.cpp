@@ -1,0 +1,184 @@
+// The injection pipette where its end is hard to see. Drawn here, by another renderer than the simulated
+// microscope: a cone of glass whose walls are about a pixel thick near the tip.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <random>
+
+#include "vision/image/gradient.hpp"
+#include "vision/pipettes/backdrop.hpp"
+#include "vision/pipettes/injection_pipette.hpp"
+
+namespace cone {
+namespace {
+
+using namespace punctum::vision;
+
+constexpr int kW = 420, kH = 120;
+constexpr double kTipRadius = 2.3, kTaper = 0.035, kAxis_y = 60.2, kYolk_x = 240;
+constexpr double kNoise = 2, kSmoothing_px = 1.1;
+
+struct Drawing {
+  double tip = 330;     // x of the end face; the needle comes from the right
+  double blur = 1.2;    // px, of the needle
+  double granules = 0;  // deviation of the yolk's grey level, left of kYolk_x
+  unsigned frame = 0;
+};
+
+// Share of the light that a needle takes, before blur.
+cv::Mat glass(double tip) {
+  cv::Mat m = cv::Mat::zeros(kH, kW, CV_32F);
+  for (int y = 0; y < kH; ++y) {
+    for (int x = 0; x < kW; ++x) {
+      for (int k = 0; k < 16; ++k) {
+        const double s = x + (k % 4 - 1.5) / 4 - tip, u = std::abs(y + (k / 4 - 1.5) / 4 - kAxis_y);
+        const double w = kTipRadius + kTaper * s;
+        if (s > 0 && u < w) {
+          m.at<float>(y, x) += static_cast<float>((u > 0.62 * w ? 0.3 : -0.06) / 16);
+        }
+      }
+    }
+  }
+  return m;
+}
+
+// Everywhere the same granules: they stand still.
+cv::Mat yolk(double granules) {
+  std::mt19937 random(11);
+  std::normal_distribution<float> normal;
+  cv::Mat m(kH, kW, CV_32F);
+  for (int y = 0; y < kH; ++y) {
+    for (int x = 0; x < kW; ++x) {
+      m.at<float>(y, x) = normal(random);
+    }
+  }
+  cv::GaussianBlur(m, m, cv::Size(0, 0), 1.5);
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(m, mean, deviation);
+  m = (m - mean[0]) * (granules / deviation[0]) - 45;
+  m(cv::Rect(static_cast<int>(kYolk_x), 0, kW - static_cast<int>(kYolk_x), kH)).setTo(0);
+  return m;
+}
+
+GradientField draw(const Drawing& d) {
+  cv::Mat m(kH, kW, CV_32F, cv::Scalar(150));
+  if (d.granules > 0) {
+    m += yolk(d.granules);
+  }
+  cv::Mat take = glass(d.tip);
+  cv::GaussianBlur(take, take, cv::Size(0, 0), d.blur);
+  m = m.mul(1 - take);
+  std::mt19937 random(1000 + d.frame);
+  std::normal_distribution<float> noise(0, static_cast<float>(kNoise));
+  cv::Mat grey(kH, kW, CV_8U);
+  for (int y = 0; y < kH; ++y) {
+    for (int x = 0; x < kW; ++x) {
+      grey.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(m.at<float>(y, x) + noise(random));
+    }
+  }
+  GradientField field;
+  field.compute(grey, cv::Rect(0, 0, kW, kH), kSmoothing_px);
+  return field;
+}
+
+// The needle comes from the right to the yolk, in focus and in clear medium, and is learnt meanwhile.
+class Needle : public testing::Test {
+ protected:
+  void approach(Drawing& d) {
+    ASSERT_TRUE(needle_.start(draw(d), kNoise));
+    for (; d.tip > kYolk_x + 6; d.tip -= 2.5) {
+      const NeedlePose seen = look(d);
+      ASSERT_TRUE(seen.ok) << d.tip << seen.reason;
+      ASSERT_NEAR(seen.tip.x, d.tip, 1.5);
+    }
+    learns_ = false;
+  }
+  NeedlePose look(Drawing& d) {
+    ++d.frame;
+    const GradientField field = draw(d);
+    const NeedlePose seen = needle_.find(field, kNoise);
+    if (learns_) {
+      needle_.learn(field, seen, kNoise);
+    }
+    return seen;
+  }
+  InjectionPipette needle_{Side::right, kTipRadius};
+  bool learns_ = true;
+};
+
+TEST_F(Needle, ends_where_it_ends_when_it_leaves_the_plane_of_focus_and_comes_back) {
+  Drawing d;
+  approach(d);
+  learns_ = true;  // nothing touches it: what is out of focus may be offered, and must do no harm
+  for (int i = 0; i <= 60; ++i) {
+    d.blur = 1.2 + 1.2 * std::sin(CV_PI * i / 60);
+    d.tip -= 0.5;
+    const NeedlePose seen = look(d);
+    ASSERT_TRUE(seen.ok) << i << seen.reason;
+    EXPECT_NEAR(seen.tip.x, d.tip, 3) << i << ", blur " << d.blur;
+  }
+}
+
+TEST_F(Needle, is_told_from_granules_that_were_there_before_it_came) {
+  Drawing d;
+  d.granules = 12;
+  approach(d);
+  int seen = 0, frames = 0;
+  for (; d.tip > 150; d.tip -= 1, ++frames) {
+    if (const NeedlePose n = look(d); n.ok) {
+      ++seen;
+      EXPECT_NEAR(n.tip.x, d.tip, 6);
+      EXPECT_NEAR(n.tip.y, kAxis_y, 1);
+    }
+  }
+  EXPECT_GT(seen, frames * 9 / 10);
+}
+
+// Out of focus, granules look more like the tip in focus than the tip itself does.
+TEST_F(Needle, is_not_led_aside_by_granules_that_look_like_its_tip) {
+  Drawing d;
+  d.granules = 12;
+  approach(d);
+  d.blur = 2.5;
+  int seen = 0, frames = 0;
+  for (; d.tip > 165; d.tip -= 1, ++frames) {
+    if (const NeedlePose n = look(d); n.ok) {
+      ++seen;
+      EXPECT_NEAR(n.tip.y, kAxis_y, 2) << d.tip;
+    }
+  }
+  EXPECT_GT(seen, frames * 9 / 10);
+}
+
+TEST(Backdrop, is_the_picture_where_the_needle_was_never_near) {
+  Backdrop backdrop;
+  EXPECT_FALSE(backdrop.grey({10, 10}));
+  NeedlePose needle;
+  needle.ok = true;
+  needle.half_width = kTipRadius;
+  needle.tip = {330, kAxis_y};
+  Drawing d;
+  d.granules = 12;
+  for (; d.frame < 30; ++d.frame) {
+    backdrop.learn(draw(d), needle);
+  }
+  Drawing without = d;
+  without.tip = 1000;
+  const GradientField empty = draw(without);
+  for (double x = 30; x < 280; x += 7.3) {
+    const auto grey = backdrop.grey({x, kAxis_y});
+    ASSERT_TRUE(grey) << x;
+    EXPECT_NEAR(*grey, empty.grey({x, kAxis_y}), 2.5) << x;  // one frame's noise
+  }
+  EXPECT_FALSE(backdrop.grey({310, kAxis_y}));  // ahead of the tip
+  EXPECT_FALSE(backdrop.grey({360, kAxis_y}));
+  EXPECT_TRUE(backdrop.grey({360, 20}));
+  EXPECT_FALSE(backdrop.grey({-1, 20}));
+  EXPECT_FALSE(backdrop.grey({20, kH - 0.5}));
+}
+
+}  // namespace
+}  // namespace cone

@@ -1,0 +1,50 @@
+#include "vision/pipettes/backdrop.hpp"
+
+#include <cstdint>
+#include <opencv2/imgproc.hpp>
+
+#include "vision/pipettes/pipette_mask.hpp"
+
+namespace punctum::vision {
+
+namespace {
+
+constexpr double kBeside_px = 10;   // of the needle's walls: their blur, out of focus
+constexpr double kAhead_px = 40;    // of the tip: it may be seen short of where it is
+constexpr double kPart = 1.0 / 16;  // of a frame in the mean
+
+}  // namespace
+
+void Backdrop::learn(const GradientField& field, const NeedlePose& needle) {
+  if (field.area.empty()) {
+    return;
+  }
+  if (mean_.size() != field.picture) {
+    mean_ = cv::Mat::zeros(field.picture, CV_32F);
+    known_ = cv::Mat::zeros(field.picture, CV_8U);
+  }
+  cv::Mat covered = cv::Mat::zeros(field.picture, CV_8U);
+  draw_mask(covered, {needle_polygon(needle, field.picture, kBeside_px, kAhead_px)});
+  const cv::Mat free = covered(field.area) == 0;
+  cv::Mat mean = mean_(field.area), known = known_(field.area);
+  field.smooth.copyTo(mean, free & ~known);
+  cv::accumulateWeighted(field.smooth, mean, kPart, free);
+  known |= free;
+}
+
+std::optional<double> Backdrop::grey(const Point& p) const {
+  if (!(p.x >= 0) || !(p.y >= 0) || p.x >= mean_.cols - 1 || p.y >= mean_.rows - 1) {
+    return std::nullopt;
+  }
+  const int x = static_cast<int>(p.x), y = static_cast<int>(p.y);
+  const std::uint8_t *k0 = known_.ptr(y) + x, *k1 = known_.ptr(y + 1) + x;
+  if ((k0[0] & k0[1] & k1[0] & k1[1]) == 0) {
+    return std::nullopt;
+  }
+  const float *a = mean_.ptr<float>(y) + x, *b = mean_.ptr<float>(y + 1) + x;
+  const double u = p.x - x, v = p.y - y;
+  return (1 - v) * ((1 - u) * static_cast<double>(a[0]) + u * static_cast<double>(a[1])) +
+         v * ((1 - u) * static_cast<double>(b[0]) + u * static_cast<double>(b[1]));
+}
+
+}  // namespace punctum::vision

@@ -162,7 +162,7 @@ class Lies : public Programs, public testing::WithParamInterface<Row> {
       if ((*bench)->finished.load() != 0 || !alive(running.pid())) {
         ++after;  // once more: what was pushed between
       }
-      std::this_thread::sleep_for(100us);
+      std::this_thread::sleep_for(1ms);  // the ring holds 8 s
     }
     code_ = running.wait();
     said_ = running.output();

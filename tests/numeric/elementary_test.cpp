@@ -222,9 +222,9 @@ TEST(Elementary, each_unary_function_is_within_its_bound_of_mpfr) {
 }
 
 // A function of two arguments against MPFR's, point by point; at the end, whether it is within its bound.
-class Binary {
+class AgainstMpfr {
  public:
-  Binary(const char* name, double (*ours)(double, double), Exact2 exact)
+  AgainstMpfr(const char* name, double (*ours)(double, double), Exact2 exact)
       : name_(name), ours_(ours), exact_(exact) {}
   void operator()(double x, double y) { worst_.add(precise_.error_ulp(ours_(x, y), exact_, x, y), x, y); }
   void is_within(double bound_ulp) const {
@@ -242,7 +242,7 @@ class Binary {
 };
 
 TEST(Elementary, atan2_is_within_its_bound_of_mpfr) {
-  Binary check("atan2", atan2, mpfr_atan2);
+  AgainstMpfr check("atan2", atan2, mpfr_atan2);
   GridRandom random(11);
   for (int i = 0; i < 60'000; ++i) {
     check(random.number(-1074, 1023, true), random.number(-1074, 1023, true));
@@ -257,7 +257,7 @@ TEST(Elementary, atan2_is_within_its_bound_of_mpfr) {
 }
 
 TEST(Elementary, pow_is_within_its_bound_of_mpfr) {
-  Binary check("pow", pow, mpfr_pow);
+  AgainstMpfr check("pow", pow, mpfr_pow);
   GridRandom random(13);
   for (int i = 0; i < 30'000; ++i) {
     check(random.number(-8, 7, false), random.number(-8, 7, true));
@@ -282,7 +282,7 @@ TEST(Elementary, pow_is_within_its_bound_of_mpfr) {
 }
 
 TEST(Elementary, hypot_is_within_its_bound_of_mpfr) {
-  Binary check("hypot", hypot, mpfr_hypot);
+  AgainstMpfr check("hypot", hypot, mpfr_hypot);
   GridRandom random(17);
   for (int i = 0; i < 60'000; ++i) {
     const double x = random.number(-1074, 1023, true);

@@ -1,7 +1,6 @@
 // What a run keeps when the machine under it fails: full disks, output that nobody takes, earlier reports,
 // a parent that is too slow. The programs as built, started as a person starts them.
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 
@@ -82,13 +81,6 @@ TEST_F(Programs, a_title_gives_the_terminal_no_orders) {
 }
 
 // ---- a disk that fills ----
-
-// From now on no file that this process writes may grow beyond so many bytes. It takes the place of a full
-// disk: a test may set it without rights, and the program sees the same, a write that fails.
-void let_no_file_grow(pid_t pid, rlim_t bytes) {
-  const rlimit limit{.rlim_cur = bytes, .rlim_max = RLIM_INFINITY};
-  ASSERT_EQ(prlimit(pid, RLIMIT_FSIZE, &limit, nullptr), 0);
-}
 
 TEST_F(Programs, a_run_whose_files_cannot_grow_goes_on_and_says_at_once_what_it_does_not_keep) {
   Running run({"run", "free", "--clock", "virtual", "--seconds", "60", "--no-figure", "--report", report()},

@@ -232,8 +232,10 @@ TEST_F(Survive, vision_that_dies_at_every_start_is_started_six_times_and_no_more
   const fs::path starts = folder_ / "starts";
   std::ofstream(bin / "punctum-vision") << "#!/bin/sh\necho once more >>" << starts.string() << "\nexit 1\n";
   fs::permissions(bin / "punctum-vision", fs::perms::owner_all);
-  Program run(bin / "punctum", {"run", "icsi", "--seconds", "300", "--report", report(), "--no-figure"},
-              words());
+  Program run(
+      bin / "punctum",
+      {"run", "icsi", "--seconds", "300", "--report", report(), "--no-figure", "--set", kPatientRelay},
+      words());
   for (int i = 0; i < 6000 && said().find("are enough") == std::string::npos; ++i) {
     std::this_thread::sleep_for(10ms);
   }

@@ -1,7 +1,6 @@
 // Vision that hangs, is ended or sees nothing for a while, and what a run says of it, of the dose and of the
 // needle at its end: the programs as built.
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 
@@ -13,41 +12,6 @@ namespace {
 using Strings = std::vector<std::string>;
 
 // ---- its health ----
-
-// Waits for a vision process other than this one; 0 after 30 s.
-pid_t other_vision(const Look& look, pid_t than) {
-  for (int i = 0; i < 3000; ++i) {
-    if (look.vision() != 0 && look.vision() != than) {
-      return look.vision();
-    }
-    std::this_thread::sleep_for(10ms);
-  }
-  return 0;
-}
-
-TEST_F(Programs, vision_that_hangs_or_that_somebody_ends_is_started_again_and_the_run_says_so) {
-  Running run({"run", "icsi", "--set", "vision.method=truth", "--set", kPatientRelay, "--report", report(),
-               "--no-figure", "--no-frames"},
-              words());
-  Look look("icsi", run);
-  ASSERT_TRUE(look.until_started()) << run.output();
-  const pid_t first = other_vision(look, 0);
-  ASSERT_GT(first, 1) << run.output();
-  kill(first, SIGTERM);
-  ASSERT_GT(other_vision(look, first), 1) << run.output();
-  ASSERT_TRUE(look.until(rt::Phase::indentation)) << run.output();
-  const pid_t hung = look.vision();
-  kill(hung, SIGSTOP);
-  ASSERT_GT(other_vision(look, hung), 1) << run.output();
-  run.send(SIGINT);
-  EXPECT_EQ(run.wait(), 1) << run.output();
-  EXPECT_NE(run.output().find("a signal asked it to stop"), std::string::npos) << run.output();
-  EXPECT_NE(run.output().find("vision hung for"), std::string::npos) << run.output();
-  const auto r = json();
-  EXPECT_EQ(r["outcome"], "stopped");
-  ASSERT_EQ(r["vision_restarts"].size(), 2U) << run.output();
-  EXPECT_NE(r["vision_restarts"][1]["why"].get<std::string>().find("hung"), std::string::npos);
-}
 
 TEST_F(Programs, vision_finds_the_needle_again_after_seconds_without_a_frame_in_contact) {
   ASSERT_EQ(punctum({"run", "icsi", "--clock", "virtual", "--seconds", "40", "--set",
@@ -65,9 +29,8 @@ TEST_F(Programs, vision_goes_on_when_none_of_its_files_can_be_kept) {
               words());
   Look look("icsi", run);
   ASSERT_TRUE(look.until_started()) << run.output();
-  const rlimit limit{.rlim_cur = 3000, .rlim_max = RLIM_INFINITY};  // in place of a full disk
   ASSERT_GT(look.vision(), 1);
-  ASSERT_EQ(prlimit(look.vision(), RLIMIT_FSIZE, &limit, nullptr), 0);
+  let_no_file_grow(look.vision(), 3000);
   EXPECT_EQ(run.wait(), 1) << run.output();
   const std::string said = run.output();
   const auto r = json();
@@ -109,45 +72,6 @@ TEST_F(Programs, a_part_of_the_dose_is_not_done_and_the_report_tells_what_was_gi
   EXPECT_NEAR(r["dose"]["given_s"].get<double>(), 0.39, 0.01);
   EXPECT_EQ(r["cells"]["injected_in_part"], 1);
   EXPECT_NE(said_.find("0.39 s of 1.50 s"), std::string::npos) << said_;
-}
-
-TEST_F(Programs, frames_that_show_nothing_most_of_the_time_are_no_run_that_is_done) {
-  const fs::path frames = folder_ / "frames";
-  fs::create_directory(frames);
-  for (int i = 0; i < 60; ++i) {
-    std::ofstream file(frames / (std::to_string(1000 + i) + ".pgm"), std::ios::binary);
-    if (i < 5) {
-      file << "P5 320 240 255\n" << std::string(std::size_t{320} * 240, static_cast<char>(120 + i));
-    } else {
-      file << "no picture";
-    }
-  }
-  EXPECT_EQ(punctum({"run", "recorded", "--set", "camera.frames=" + frames.string(), "--set", kPatientRelay}),
-            1)
-      << said_;
-  const auto r = json();
-  EXPECT_EQ(r["outcome"], "without vision") << said_;
-  EXPECT_GT(r["without_vision_s"].get<double>(), 0.5 * r["seconds"].get<double>());
-  EXPECT_EQ(r["vision_restarts"].size(), 0U) << "frames that cannot be read are no vision that hangs";
-}
-
-TEST_F(Programs, ctrl_c_tells_that_the_needle_is_still_inside_the_cell) {
-  Running run({"run", "icsi", "--set", "vision.method=truth", "--set", kPatientRelay, "--report", report(),
-               "--no-figure", "--no-frames"},
-              words());
-  Look look("icsi", run);
-  ASSERT_TRUE(look.until(rt::Phase::puncture)) << run.output();
-  run.send(SIGINT);
-  EXPECT_EQ(run.wait(), 1) << run.output();
-  const auto r = json();
-  EXPECT_EQ(r["outcome"], "stopped");
-  EXPECT_EQ(r["needle_at_end"]["where"], "inside");
-  EXPECT_EQ(r["needle_at_end"]["known_from"], "truth");
-  sim::Snapshot last;
-  std::uint64_t index = 0;
-  ASSERT_EQ(look.bench().snapshots.newest(last, index), hal::Read::ok);
-  EXPECT_NEAR(r["needle_at_end"]["depth_um"].get<double>(), last.cell_reading.depth_m * 1e6, 1);
-  EXPECT_NE(run.output().find("INSIDE THE CELL"), std::string::npos) << run.output();
 }
 
 }  // namespace

@@ -221,12 +221,28 @@ TEST(Elementary, each_unary_function_is_within_its_bound_of_mpfr) {
   }
 }
 
+// A function of two arguments against MPFR's, point by point; at the end, whether it is within its bound.
+class AgainstMpfr {
+ public:
+  AgainstMpfr(const char* name, double (*ours)(double, double), Exact2 exact)
+      : name_(name), ours_(ours), exact_(exact) {}
+  void operator()(double x, double y) { worst_.add(precise_.error_ulp(ours_(x, y), exact_, x, y), x, y); }
+  void is_within(double bound_ulp) const {
+    EXPECT_LE(worst_.ulp, bound_ulp) << name_ << " at " << std::hexfloat << worst_.x << " " << worst_.y;
+    std::printf("%-6s %7d points, worst %.4f ulp at %.17g, %.17g\n", name_, worst_.points, worst_.ulp,
+                worst_.x, worst_.y);
+  }
+
+ private:
+  const char* name_;
+  double (*ours_)(double, double);
+  Exact2 exact_;
+  Precise precise_;
+  Worst worst_;
+};
+
 TEST(Elementary, atan2_is_within_its_bound_of_mpfr) {
-  Precise precise;
-  Worst worst;
-  const auto check = [&](double y, double x) {
-    worst.add(precise.error_ulp(atan2(y, x), mpfr_atan2, y, x), y, x);
-  };
+  AgainstMpfr check("atan2", atan2, mpfr_atan2);
   GridRandom random(11);
   for (int i = 0; i < 60'000; ++i) {
     check(random.number(-1074, 1023, true), random.number(-1074, 1023, true));
@@ -237,17 +253,11 @@ TEST(Elementary, atan2_is_within_its_bound_of_mpfr) {
     const double y = random.number(std::max(e - 5, -1074), std::min(e + 5, 1023), true);
     check(y, x);
   }
-  EXPECT_LE(worst.ulp, 0.6) << std::hexfloat << worst.x << " " << worst.y;
-  std::printf("%-6s %7d points, worst %.4f ulp at %.17g, %.17g\n", "atan2", worst.points, worst.ulp, worst.x,
-              worst.y);
+  check.is_within(0.6);
 }
 
 TEST(Elementary, pow_is_within_its_bound_of_mpfr) {
-  Precise precise;
-  Worst worst;
-  const auto check = [&](double x, double y) {
-    worst.add(precise.error_ulp(pow(x, y), mpfr_pow, x, y), x, y);
-  };
+  AgainstMpfr check("pow", pow, mpfr_pow);
   GridRandom random(13);
   for (int i = 0; i < 30'000; ++i) {
     check(random.number(-8, 7, false), random.number(-8, 7, true));
@@ -268,17 +278,11 @@ TEST(Elementary, pow_is_within_its_bound_of_mpfr) {
       }
     }
   }
-  EXPECT_LE(worst.ulp, 0.77) << std::hexfloat << worst.x << " " << worst.y;
-  std::printf("%-6s %7d points, worst %.4f ulp at %.17g, %.17g\n", "pow", worst.points, worst.ulp, worst.x,
-              worst.y);
+  check.is_within(0.77);
 }
 
 TEST(Elementary, hypot_is_within_its_bound_of_mpfr) {
-  Precise precise;
-  Worst worst;
-  const auto check = [&](double x, double y) {
-    worst.add(precise.error_ulp(hypot(x, y), mpfr_hypot, x, y), x, y);
-  };
+  AgainstMpfr check("hypot", hypot, mpfr_hypot);
   GridRandom random(17);
   for (int i = 0; i < 60'000; ++i) {
     const double x = random.number(-1074, 1023, true);
@@ -288,9 +292,7 @@ TEST(Elementary, hypot_is_within_its_bound_of_mpfr) {
   }
   check(kMax, kMax / 2);
   check(kMax, 0x1p960);
-  EXPECT_LE(worst.ulp, 0.77) << std::hexfloat << worst.x << " " << worst.y;
-  std::printf("%-6s %7d points, worst %.4f ulp at %.17g, %.17g\n", "hypot", worst.points, worst.ulp, worst.x,
-              worst.y);
+  check.is_within(0.77);
 }
 
 TEST(Elementary, results_that_are_doubles_are_exact) {

@@ -4,6 +4,7 @@
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -214,6 +215,23 @@ class Look {
   std::optional<hal::Shared<const sim::Bench>> bench_;
   std::optional<hal::Shared<const sim::CameraAnswers>> camera_;
 };
+
+// What the core left of the simulated devices, by the bench's newest snapshot.
+inline void expect_devices_off(const sim::Bench& bench) {
+  sim::Snapshot last;
+  std::uint64_t index = 0;
+  ASSERT_EQ(bench.snapshots.newest(last, index), hal::Read::ok);
+  EXPECT_EQ(hal::Vec3(last.hand.commanded_N).norm(), 0);
+  EXPECT_EQ(last.injector.gate, 0U);
+  EXPECT_EQ(last.stage.enable_line, 0);
+}
+
+// From now on no file that this process writes may grow beyond so many bytes. It takes the place of a full
+// disk: a test may set it without rights, and the program sees the same, a write that fails.
+inline void let_no_file_grow(pid_t pid, rlim_t bytes) {
+  const rlimit limit{.rlim_cur = bytes, .rlim_max = RLIM_INFINITY};
+  ASSERT_EQ(prlimit(pid, RLIMIT_FSIZE, &limit, nullptr), 0);
+}
 
 inline bool alive(pid_t pid) {
   const std::string stat = read_all("/proc/" + std::to_string(pid) + "/stat");

@@ -139,123 +139,109 @@ std::string failures(Scene s) {
   return out;
 }
 
-}  // namespace
+std::string task_text(const Scene& s) {
+  return fmt::format("  task       {}{}\n  clock      {}\n",
+                     !s.servo.phases     ? "none, runs until its time limit"
+                     : s.servo.cells > 0 ? fmt::format("inject {} cell(s)", s.servo.cells)
+                                         : "open-ended",
+                     s.seconds > 0 ? fmt::format(", at most {} s", s.seconds) : ", no time limit",
+                     s.clock == ClockKind::real ? "real" : "virtual: as fast as everybody is ready");
+}
 
-std::string explain(const Scene& s) {
-  std::string out;
-  const auto line = [&out](const std::string& text) { out += text + "\n"; };
-  const double rate = s.servo.rate_Hz;
-  line(fmt::format("{}: {}", printable(s.name), printable(s.title.empty() ? s.source : s.title, 200)));
-  line(fmt::format("  task       {}{}",
-                   !s.servo.phases     ? "none, runs until its time limit"
-                   : s.servo.cells > 0 ? fmt::format("inject {} cell(s)", s.servo.cells)
-                                       : "open-ended",
-                   s.seconds > 0 ? fmt::format(", at most {} s", s.seconds) : ", no time limit"));
-  line(fmt::format("  clock      {}",
-                   s.clock == ClockKind::real ? "real" : "virtual: as fast as everybody is ready"));
-
-  line(fmt::format("{} processes of one thread each", s.vision ? 3 : 2));
-  line("  punctum         ordinary, memory not locked: starts, watches, records, reports");
-  line(fmt::format(
-      "  punctum-core    one real-time thread: SCHED_FIFO {}, {}, memory locked, {} Hz (every {:g} us)",
-      s.core_priority, cpu(s.core_cpu), rate, 1e6 / rate));
+std::string processes_text(const Scene& s) {
+  std::string out = fmt::format(
+      "{} processes of one thread each\n"
+      "  punctum         ordinary, memory not locked: starts, watches, records, reports\n"
+      "  punctum-core    one real-time thread: SCHED_FIFO {}, {}, memory locked, {} Hz (every "
+      "{:g} us)\n",
+      s.vision ? 3 : 2, s.core_priority, cpu(s.core_cpu), s.servo.rate_Hz, 1e6 / s.servo.rate_Hz);
   if (s.vision) {
-    line(fmt::format("  punctum-vision  nice {}, {}, one observation per frame", s.vision_nice,
-                     cpu(s.vision_cpu)));
+    out += fmt::format("  punctum-vision  nice {}, {}, one observation per frame\n", s.vision_nice,
+                       cpu(s.vision_cpu));
   }
-  std::string met = "  they meet in    the station segment";
-  if (s.sim) {
-    met += " and the bench segment of the simulated world";
-  }
-  line(met);
+  return out + "  they meet in    the station segment" +
+         (s.sim ? " and the bench segment of the simulated world" : "") + "\n";
+}
 
-  line("one tick of the core, in this order");
-  if (s.sim) {
-    line("  the simulated plant steps to now");
-  }
-  std::string devices = "hand, stage, e-stop contacts";
-  if (s.servo.vacuum) {
-    devices += ", holding vacuum";
-  }
-  if (s.servo.force_sensor) {
-    devices += ", force sensor";
-  }
-  line("  read devices          " + devices);
-  if (s.vision) {
-    line("  newest observation    from vision, compared with the pose at its exposure");
-  }
-  const rt::VelocityParams& v = s.servo.velocity;
-  line("  velocity              " +
-       (v.method == rt::VelocityParams::Method::kalman
-            ? fmt::format("Kalman filter, jerk {:g} m/s^3/sqrt(Hz), encoder step {:g} mm", v.jerk_m_s3_rtHz,
-                          v.d_m * 1e3)
-            : fmt::format("FOAW, window {} at 1 kHz, +-{:g} mm", v.window, v.d_m * 1e3)) +
-       (v.smooth_s > 0 ? fmt::format(", low-pass {:g} ms", v.smooth_s * 1e3) : ""));
-  if (s.servo.phases) {
-    line("  phase                 free > contact > indentation > puncture > injection > withdrawal > clear");
-  }
+std::string velocity_text(const rt::VelocityParams& v) {
+  return (v.method == rt::VelocityParams::Method::kalman
+              ? fmt::format("Kalman filter, jerk {:g} m/s^3/sqrt(Hz), encoder step {:g} mm", v.jerk_m_s3_rtHz,
+                            v.d_m * 1e3)
+              : fmt::format("FOAW, window {} at 1 kHz, +-{:g} mm", v.window, v.d_m * 1e3)) +
+         (v.smooth_s > 0 ? fmt::format(", low-pass {:g} ms", v.smooth_s * 1e3) : "");
+}
+
+std::string effects_text(const rt::ServoConfig& servo) {
   std::string effects;
-  int effects_there = 0;
-#define PUNCTUM_EFFECT(name, Class)                                           \
-  if (s.servo.name) {                                                         \
-    effects += (effects.empty() ? "" : ", ") + text_of(#name, *s.servo.name); \
-    ++effects_there;                                                          \
+  int there = 0;
+#define PUNCTUM_EFFECT(name, Class)                                         \
+  if (servo.name) {                                                         \
+    effects += (effects.empty() ? "" : ", ") + text_of(#name, *servo.name); \
+    ++there;                                                                \
   }
   PUNCTUM_EFFECTS(PUNCTUM_EFFECT)
 #undef PUNCTUM_EFFECT
-  line("  force effects         " +
-       (effects.empty() ? std::string("none") : fmt::format("{}: {}", effects_there, effects)));
-  if (const auto& g = s.servo.guard) {
+  return there == 0 ? std::string("none") : fmt::format("{}: {}", there, effects);
+}
+
+std::string tick_text(const Scene& s) {
+  const rt::ServoConfig& servo = s.servo;
+  const double rate = servo.rate_Hz;
+  std::string out = "one tick of the core, in this order\n";
+  const auto line = [&out](const std::string& text) { out += text + "\n"; };
+  if (s.sim) {
+    line("  the simulated plant steps to now");
+  }
+  line(std::string("  read devices          hand, stage, e-stop contacts") +
+       (servo.vacuum ? ", holding vacuum" : "") + (servo.force_sensor ? ", force sensor" : ""));
+  if (s.vision) {
+    line("  newest observation    from vision, compared with the pose at its exposure");
+  }
+  line("  velocity              " + velocity_text(servo.velocity));
+  if (servo.phases) {
+    line("  phase                 free > contact > indentation > puncture > injection > withdrawal > clear");
+  }
+  line("  force effects         " + effects_text(servo));
+  if (const auto& g = servo.guard) {
     line(
         fmt::format("  passivity guard       stiffness up to {:g} N/m, {:g} of what the device keeps passive",
-                    g->margin * rt::passive_stiffness_N_m(s.servo.device, 1 / rate), g->margin));
+                    g->margin * rt::passive_stiffness_N_m(servo.device, 1 / rate), g->margin));
   }
   line(fmt::format(
       "  limits                hand {:g} N, stage {:g} um/s, depth {:g} um, far wall {:g} um, tip {:g} uN",
-      s.servo.limits.hand_force_N, s.servo.limits.stage_velocity_m_s * 1e6,
-      s.servo.limits.penetration_depth_m * 1e6, s.servo.limits.far_wall_m * 1e6,
-      s.servo.limits.tip_force_hard_N * 1e6));
-  line(fmt::format("  stage set-point       every {} tick ({:g} Hz), hand / {:g}, tremor filter {}",
-                   s.servo.stage_divisor, rate / s.servo.stage_divisor, s.servo.mapping.position_scale,
-                   s.servo.mapping.tremor_cutoff_Hz > 0
-                       ? fmt::format("{:g} Hz", s.servo.mapping.tremor_cutoff_Hz)
-                       : "off"));
+      servo.limits.hand_force_N, servo.limits.stage_velocity_m_s * 1e6,
+      servo.limits.penetration_depth_m * 1e6, servo.limits.far_wall_m * 1e6,
+      servo.limits.tip_force_hard_N * 1e6));
+  line(fmt::format(
+      "  stage set-point       every {} tick ({:g} Hz), hand / {:g}, tremor filter {}", servo.stage_divisor,
+      rate / servo.stage_divisor, servo.mapping.position_scale,
+      servo.mapping.tremor_cutoff_Hz > 0 ? fmt::format("{:g} Hz", servo.mapping.tremor_cutoff_Hz) : "off"));
   line(std::string("  write devices         force to the hand, stage, heartbeat") +
-       (s.servo.injector ? fmt::format(", injector gate (at most {:g} s)", s.servo.injector->max_open_s)
-                         : ""));
+       (servo.injector ? fmt::format(", injector gate (at most {:g} s)", servo.injector->max_open_s) : ""));
   line("  telemetry             one sample, no system call");
+  return out;
+}
 
-  if (s.vision) {
-    line("one frame of vision");
-    line(camera_text(s));
-    if (s.vision->method == vision::Method::truth) {
-      line("  truth                 the simulated world's own; no picture is drawn or looked at");
-    } else {
-      std::string stages;
-      if (s.vision->holder) {
-        stages += "holding pipette (correlation), ";
-      }
-      if (s.vision->needle) {
-        stages += "injection pipette and tip, erase pipettes, ";
-      }
-      stages += "impurities, outer membrane";
-      if (s.vision->inner) {
-        stages += " and inner membrane";
-      }
-      stages +=
-          fmt::format(" (snake, {} nodes{}), ", s.vision->snake.nodes, s.vision->refine ? ", refined" : "");
-      if (s.vision->needle) {
-        stages += "contact, puncture, ";
-      }
-      line("  " + stages + "w_d, a, R");
-      const int far = vision_stages(*s.vision);
-      line(s.vision->needle
-               ? fmt::format("  {} stages far from the cell, where no contact is looked for, {} at it", far,
-                             far + 1)
-               : fmt::format("  {} stages", far));
-    }
+std::string frame_text(const Scene& s) {
+  const vision::VisionConfig& v = *s.vision;
+  std::string out = "one frame of vision\n" + camera_text(s) + "\n";
+  if (v.method == vision::Method::truth) {
+    return out + "  truth                 the simulated world's own; no picture is drawn or looked at\n";
   }
+  out += fmt::format("  {}{}impurities, outer membrane{} (snake, {} nodes{}), {}w_d, a, R\n",
+                     v.holder ? "holding pipette (correlation), " : "",
+                     v.needle ? "injection pipette and tip, erase pipettes, " : "",
+                     v.inner ? " and inner membrane" : "", v.snake.nodes, v.refine ? ", refined" : "",
+                     v.needle ? "contact, puncture, " : "");
+  const int far = vision_stages(v);
+  return out + (v.needle
+                    ? fmt::format("  {} stages far from the cell, where no contact is looked for, {} at it\n",
+                                  far, far + 1)
+                    : fmt::format("  {} stages\n", far));
+}
 
+// Empty where nothing is left out.
+std::string left_out_text(const Scene& s) {
   std::string absent;
   for (const auto& t : tables(s)) {
     if (t.present) {
@@ -270,13 +256,24 @@ std::string explain(const Scene& s) {
   if (s.vision && s.vision->method == vision::Method::paper && !s.vision->inner) {
     absent += fmt::format("  {:<15} {}\n", "vision.inner", "no edge is looked for inside the outer membrane");
   }
-  if (!absent.empty()) {
-    out += "left out, and nothing is spent on it (`punctum-report scenes` counts)\n" + absent;
+  return absent.empty() ? ""
+                        : "left out, and nothing is spent on it (`punctum-report scenes` counts)\n" + absent;
+}
+
+}  // namespace
+
+std::string explain(const Scene& s) {
+  std::string out =
+      fmt::format("{}: {}\n", printable(s.name), printable(s.title.empty() ? s.source : s.title, 200));
+  out += task_text(s) + processes_text(s) + tick_text(s);
+  if (s.vision) {
+    out += frame_text(s);
   }
+  out += left_out_text(s);
   if (s.sim && s.sim->failure_count + s.sim->estop_event_count > 0) {
-    line(fmt::format("staged           {} device failures, {} e-stop presses", s.sim->failure_count,
-                     s.sim->estop_event_count));
-    out += failures(s);
+    out += fmt::format("staged           {} device failures, {} e-stop presses\n", s.sim->failure_count,
+                       s.sim->estop_event_count) +
+           failures(s);
   }
   return out;
 }

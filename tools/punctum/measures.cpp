@@ -159,31 +159,10 @@ void Measures::change_phase(const rt::TelemetrySample& s) {
 }
 
 void Measures::tick(const rt::TelemetrySample& s, const sim::Snapshot* world) {
-  if (!any_) {
-    any_ = true;
-    open_ = {s.cell, s.phase, s.t_s, s.t_s};
-    now_.cell = s.cell;
-    closed_cell_ = !sim_.cell && !(has_phases_ && has_injector_);
+  if (any_) {
+    see_changes(s);
   } else {
-    if (s.phase != open_.phase || s.cell != open_.cell) {
-      change_phase(s);
-    }
-    if (s.tick > last.tick + 1) {
-      gaps += s.tick - last.tick - 1;
-    }
-    if (s.fault != last.fault && s.fault != rt::Fault::none) {
-      ++fault_count;
-      if (faults.size() < kKept) {
-        faults.push_back({s.fault, s.t_s});
-      }
-    }
-    if ((s.alarms & ~last.alarms & rt::alarm_vision_stale) != 0) {
-      ++stale_spells;
-    }
-  }
-  if (ticks == 0 && s.fault != rt::Fault::none) {
-    ++fault_count;
-    faults.push_back({s.fault, s.t_s});
+    begin(s);
   }
   ++ticks;
   for (std::size_t i = 0; i < alarm_ticks.size(); ++i) {
@@ -196,11 +175,64 @@ void Measures::tick(const rt::TelemetrySample& s, const sim::Snapshot* world) {
     now_.asked_s += inside && (s.buttons & hal::kButtonInject) != 0 ? period_s_ : 0;
     now_.injected_s = now_.injected_s.value_or(0) + (inside && s.injector_open != 0 ? period_s_ : 0);
   }
-  // Recorded frames show another needle than the one that moves now: that the core does not believe them is
-  // no failure to see.
+  count_vision(s);
+  const double hand_N = norm(s.force_N);
+  now_.peak_hand_N = std::max(now_.peak_hand_N, hand_N);
+  peak_hand_N = std::max(peak_hand_N, hand_N);
+
+  if (world != nullptr) {
+    measure_tremor(s, *world);
+    const sim::GlassClearance clearance = sim::glass_clearance(sim_, *world);
+    keep_least(least_floor_m, clearance.floor_m);
+    keep_least(least_holder_m, clearance.holder_m);
+    // The plant puts a fresh cell in place a tick or more before the core knows.
+    if (world->has_cell != 0 && world->cell_index == s.cell) {
+      compare_with_truth(s, *world);
+    }
+    delivered_s_ = world->injector.delivered_s;
+  }
+  last = s;
+  last_s = s.t_s;
+}
+
+void Measures::begin(const rt::TelemetrySample& s) {
+  any_ = true;
+  open_ = {s.cell, s.phase, s.t_s, s.t_s};
+  now_.cell = s.cell;
+  closed_cell_ = !sim_.cell && !(has_phases_ && has_injector_);
+  if (s.fault != rt::Fault::none) {
+    add_fault(s);
+  }
+}
+
+void Measures::see_changes(const rt::TelemetrySample& s) {
+  if (s.phase != open_.phase || s.cell != open_.cell) {
+    change_phase(s);
+  }
+  if (s.tick > last.tick + 1) {
+    gaps += s.tick - last.tick - 1;
+  }
+  if (s.fault != last.fault && s.fault != rt::Fault::none) {
+    add_fault(s);
+  }
+  if ((s.alarms & ~last.alarms & rt::alarm_vision_stale) != 0) {
+    ++stale_spells;
+  }
+}
+
+void Measures::add_fault(const rt::TelemetrySample& s) {
+  ++fault_count;
+  if (faults.size() < kKept) {
+    faults.push_back({s.fault, s.t_s});
+  }
+}
+
+void Measures::count_vision(const rt::TelemetrySample& s) {
   if (s.observations != observations) {
     frame_came_s_ = s.t_s;
   }
+  // Recorded frames show another needle than the one that moves now: that the core does not believe them is
+  // no failure to see.
   const bool blind = next_frame_s_ > 0 ? s.observations == 0 || s.t_s > frame_came_s_ + next_frame_s_
                                        : s.obs_age_s < 0 || (s.alarms & rt::alarm_vision_stale) != 0;
   if (blind) {
@@ -208,88 +240,87 @@ void Measures::tick(const rt::TelemetrySample& s, const sim::Snapshot* world) {
   }
   observations = s.observations;
   stale_ticks = s.stale_ticks;
-  const double hand_N = norm(s.force_N);
-  now_.peak_hand_N = std::max(now_.peak_hand_N, hand_N);
-  peak_hand_N = std::max(peak_hand_N, hand_N);
+}
 
-  if (world != nullptr) {
-    // Tremor: hand and tip as they really move.
-    if ((s.buttons & hal::kButtonClutch) != 0) {
-      clutch_until_s_ = s.t_s + kSettle_s;
-    }
-    const bool counts = s.t_s > kSettle_s && s.t_s > clutch_until_s_;
-    const hal::Vec3 hand = world->hand.position_m, tip = world->stage.tip_m;
-    for (int i = 0; i < 3; ++i) {
-      const double h = hand_band_[static_cast<std::size_t>(i)].next(hand[i]);
-      const double t = tip_band_[static_cast<std::size_t>(i)].next(tip[i]);
-      if (counts) {
-        tremor_hand2 += h * h;
-        tremor_tip2 += t * t;
-      }
-    }
-    tremor_ticks += counts ? 1U : 0U;
-    const sim::GlassClearance clearance = sim::glass_clearance(sim_, *world);
-    keep_least(least_floor_m, clearance.floor_m);
-    keep_least(least_holder_m, clearance.holder_m);
-
-    // The plant puts a fresh cell in place a tick or more before the core knows.
-    if (world->has_cell != 0 && world->cell_index == s.cell) {
-      const sim::Truth truth = sim::truth_of(sim_, *world);
-      true_end_ = in_truth(truth);
-      if (truth.contact && !was_contact_) {
-        true_contact_s_ = s.t_s;
-      }
-      was_contact_ = truth.contact;
-      if (truth.contact && !now_.lateral_contact_m) {
-        now_.lateral_contact_m = truth.lateral_m;
-      }
-      if (truth.zona_punctured && !zona_seen_) {
-        zona_seen_ = true;
-        now_.lateral_error_m = truth.lateral_m;
-        if (phase_contact_s_ >= 0 && true_contact_s_ >= 0) {
-          now_.contact_delay_s = phase_contact_s_ - true_contact_s_;
-        }
-      }
-      if (truth.zona_punctured && phase_puncture_s_ >= 0 && !now_.puncture_delay_s) {
-        now_.puncture_delay_s = phase_puncture_s_ - truth.zona_puncture_s;
-      }
-      const double depth = -truth.gap_m;
-      const double delivered_s = world->injector.delivered_s - delivered_s_;
-      const bool inside = truth.zona_punctured && depth > 0;
-      now_.injected_s = now_.injected_s.value_or(0) + (inside ? delivered_s : 0);
-      if (has_injector_ && inside && (s.buttons & hal::kButtonInject) != 0) {
-        now_.asked_s += period_s_;
-      }
-      if (truth.punctured) {
-        if (!puncture_seen_) {
-          puncture_seen_ = true;
-          puncture_depth_m_ = depth;
-        }
-        now_.beyond_puncture_m = std::max(now_.beyond_puncture_m.value_or(0), depth - puncture_depth_m_);
-        if (phase_puncture_s_ >= 0 && !now_.inner_delay_s) {
-          now_.inner_delay_s = phase_puncture_s_ - truth.puncture_s;
-        }
-      }
-      if (truth.contact) {
-        now_.max_depth_m = std::max(now_.max_depth_m, depth);
-        now_.peak_force_N = std::max(now_.peak_force_N, truth.axial_force_N);
-      }
-      now_.lost = now_.lost || truth.lost;
-      max_depth_m = std::max(max_depth_m, now_.max_depth_m);
-      peak_force_N = std::max(peak_force_N, now_.peak_force_N);
-      if ((s.phase == rt::Phase::contact || s.phase == rt::Phase::indentation) && truth.contact &&
-          !truth.zona_punctured) {
-        const double e = s.tip_force_N - truth.axial_force_N;
-        force_error2 += e * e;
-        force_error_sum += e;
-        true_force2 += truth.axial_force_N * truth.axial_force_N;
-        ++force_ticks;
-      }
-    }
-    delivered_s_ = world->injector.delivered_s;
+// Of hand and tip as they really move.
+void Measures::measure_tremor(const rt::TelemetrySample& s, const sim::Snapshot& world) {
+  if ((s.buttons & hal::kButtonClutch) != 0) {
+    clutch_until_s_ = s.t_s + kSettle_s;
   }
-  last = s;
-  last_s = s.t_s;
+  const bool counts = s.t_s > kSettle_s && s.t_s > clutch_until_s_;
+  const hal::Vec3 hand = world.hand.position_m, tip = world.stage.tip_m;
+  for (int i = 0; i < 3; ++i) {
+    const double h = hand_band_[static_cast<std::size_t>(i)].next(hand[i]);
+    const double t = tip_band_[static_cast<std::size_t>(i)].next(tip[i]);
+    if (counts) {
+      tremor_hand2 += h * h;
+      tremor_tip2 += t * t;
+    }
+  }
+  tremor_ticks += counts ? 1U : 0U;
+}
+
+void Measures::compare_with_truth(const rt::TelemetrySample& s, const sim::Snapshot& world) {
+  const sim::Truth truth = sim::truth_of(sim_, world);
+  true_end_ = in_truth(truth);
+  measure_delays(s, truth);
+  measure_dose_and_depth(s, truth, world.injector.delivered_s - delivered_s_);
+  now_.lost = now_.lost || truth.lost;
+  max_depth_m = std::max(max_depth_m, now_.max_depth_m);
+  peak_force_N = std::max(peak_force_N, now_.peak_force_N);
+  if ((s.phase == rt::Phase::contact || s.phase == rt::Phase::indentation) && truth.contact &&
+      !truth.zona_punctured) {
+    const double e = s.tip_force_N - truth.axial_force_N;
+    force_error2 += e * e;
+    force_error_sum += e;
+    true_force2 += truth.axial_force_N * truth.axial_force_N;
+    ++force_ticks;
+  }
+}
+
+// The core's contact and puncture after the true ones, and how far beside the cell's centre the needle was.
+void Measures::measure_delays(const rt::TelemetrySample& s, const sim::Truth& truth) {
+  if (truth.contact && !was_contact_) {
+    true_contact_s_ = s.t_s;
+  }
+  was_contact_ = truth.contact;
+  if (truth.contact && !now_.lateral_contact_m) {
+    now_.lateral_contact_m = truth.lateral_m;
+  }
+  if (truth.zona_punctured && !zona_seen_) {
+    zona_seen_ = true;
+    now_.lateral_error_m = truth.lateral_m;
+    if (phase_contact_s_ >= 0 && true_contact_s_ >= 0) {
+      now_.contact_delay_s = phase_contact_s_ - true_contact_s_;
+    }
+  }
+  if (truth.zona_punctured && phase_puncture_s_ >= 0 && !now_.puncture_delay_s) {
+    now_.puncture_delay_s = phase_puncture_s_ - truth.zona_puncture_s;
+  }
+  if (truth.punctured && phase_puncture_s_ >= 0 && !now_.inner_delay_s) {
+    now_.inner_delay_s = phase_puncture_s_ - truth.puncture_s;
+  }
+}
+
+void Measures::measure_dose_and_depth(const rt::TelemetrySample& s, const sim::Truth& truth,
+                                      double delivered_s) {
+  const double depth_m = -truth.gap_m;
+  const bool inside = truth.zona_punctured && depth_m > 0;
+  now_.injected_s = now_.injected_s.value_or(0) + (inside ? delivered_s : 0);
+  if (has_injector_ && inside && (s.buttons & hal::kButtonInject) != 0) {
+    now_.asked_s += period_s_;
+  }
+  if (truth.punctured) {
+    if (!puncture_seen_) {
+      puncture_seen_ = true;
+      puncture_depth_m_ = depth_m;
+    }
+    now_.beyond_puncture_m = std::max(now_.beyond_puncture_m.value_or(0), depth_m - puncture_depth_m_);
+  }
+  if (truth.contact) {
+    now_.max_depth_m = std::max(now_.max_depth_m, depth_m);
+    now_.peak_force_N = std::max(now_.peak_force_N, truth.axial_force_N);
+  }
 }
 
 // As the core saw it. Its model tells a depth once it knows a membrane; its phases, whether the tip is

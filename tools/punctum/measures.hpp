@@ -163,6 +163,14 @@ class Measures {
   void change_phase(const rt::TelemetrySample& s);
   void close_phase(double end_s);
   void close_cell();
+  void begin(const rt::TelemetrySample& s);
+  void see_changes(const rt::TelemetrySample& s);
+  void add_fault(const rt::TelemetrySample& s);
+  void count_vision(const rt::TelemetrySample& s);
+  void measure_tremor(const rt::TelemetrySample& s, const sim::Snapshot& world);
+  void compare_with_truth(const rt::TelemetrySample& s, const sim::Snapshot& world);
+  void measure_delays(const rt::TelemetrySample& s, const sim::Truth& truth);
+  void measure_dose_and_depth(const rt::TelemetrySample& s, const sim::Truth& truth, double delivered_s);
 
   [[nodiscard]] Whereabouts believed() const;
 

@@ -161,6 +161,15 @@ class Ticks {
   bool late_ = false;
 };
 
+// The effect of a wall that has moved.
+Wall::At effect_at(const Wall& still, const Motion::At& moved, double x_m) {
+  Wall::At a = still.at(x_m - moved.shift_m);
+  a.force_N *= moved.part;
+  a.stiffness_N_m *= moved.part;
+  a.energy_J *= moved.part;
+  return a;
+}
+
 // What an effect can give back through an amplifier that saturates: the work of its force over the way out.
 double returnable_J(const Wall& wall, const Motion::At& moved, double x_m, double gain, double force_max_N) {
   const Wall::At effect = wall.at(x_m - moved.shift_m);
@@ -176,184 +185,322 @@ double returnable_J(const Wall& wall, const Motion::At& moved, double x_m, doubl
   return part * wall.at(saturated_m).energy_J + force_max_N * (x_m - moved.shift_m - saturated_m);
 }
 
+// What follows from a cell before its first tick.
+struct Setting {
+  Setting(const LoopCell& cell, const Wall& still) : T_s(1 / cell.rate_Hz) {
+    estimate.d_m = std::max(cell.device.encoder_step_m, 1e-6);
+    damping_Ns_m = cell.damping_share * rt::stable_damping_Ns_m(cell.device, T_s, estimate);
+    moves = cell.motion != WallMotion::still;
+    const double delay_s = T_s * (0.5 * cell.ticks_per_sample + cell.device.delay_ticks);
+    passive_N_m = cell.device.damping_Ns_m / delay_s;
+    const double soft_N_m = std::min(still.at(1e-3).stiffness_N_m, 0.9 * passive_N_m);
+    push_N =
+        moves || cell.holder == Holder::arm ? 0 : cell.coulomb_N + std::min(cell.push_N, 0.01 * soft_N_m);
+    enough_m = std::max(4 * cell.device.encoder_step_m, kSmallest_m);
+    moves_s = moves ? kMoves_s + kStops_s : 0;
+    const double settles_s =
+        cell.holder == Holder::nobody ? 24 * cell.device.mass_kg / cell.device.damping_Ns_m : 14;
+    longest_s = moves_s + (cell.holder == Holder::arm
+                               ? 12
+                               : std::min(kLongest_s, std::max(settles_s, 8 + 6 * damping_Ns_m / soft_N_m)));
+  }
+
+  double T_s;
+  rt::VelocityParams estimate;
+  double damping_Ns_m = 0;  // rendered beside the wall
+  bool moves = false;       // the wall does
+  double passive_N_m = 0;
+  double push_N = 0;
+  double enough_m = 0;  // a swing that is more than this is a motion
+  double moves_s = 0;   // until the wall stands still
+  double longest_s = 0;
+};
+
+// The handle, and the hand that pushes it into the wall or swings it there.
+class HeldHandle {
+ public:
+  HeldHandle(const LoopCell& cell, const Setting& setting)
+      : cell_(cell), setting_(setting), handle_{-kFrom_m, cell.speed_m_s} {
+    hand_.mass_kg = cell.device.mass_kg;
+    hand_.damping_Ns_m = cell.device.damping_Ns_m;
+    hand_.coulomb_N = cell.coulomb_N;
+    if (cell.holder == Holder::fingertip) {
+      arm_.damping_Ns_m = 1;
+    }
+    if (cell.holder == Holder::arm) {
+      arm_ = {250, 6};
+    }
+    if (setting.moves && cell.holder != Holder::arm) {
+      arm_.stiffness_N_m = cell.holder == Holder::nobody ? 10 : 50;
+    }
+  }
+
+  [[nodiscard]] double x_m() const { return handle_.x_m; }
+  void step(double t_s, double dt_s, double applied_N) {
+    const double to_m = reaches_m(t_s, dt_s);
+    const double pace_m_s = (to_m - intention_m_) / dt_s;
+    sim::advance(handle_, hand_, arm_, applied_N + setting_.push_N, intention_m_, pace_m_s, dt_s);
+    intention_m_ = to_m;
+  }
+
+ private:
+  [[nodiscard]] double reaches_m(double t_s, double dt_s) const {
+    if (setting_.moves) {  // to and fro about a place in the wall
+      const double omega = std::numbers::pi * std::min(cell_.frequency_Hz, 4.0);
+      const double pace_m_s = (t_s < kReach_s ? kReach_m / kReach_s : 0) +
+                              (t_s < setting_.moves_s ? kSwing_m * omega * std::cos(omega * t_s) : 0);
+      return intention_m_ + pace_m_s * dt_s;
+    }
+    return cell_.holder == Holder::arm ? std::min(intention_m_ + 0.05 * dt_s, 0.02) : intention_m_;
+  }
+
+  const LoopCell& cell_;
+  const Setting& setting_;
+  sim::HandParams hand_;
+  sim::ArmImpedance arm_;
+  sim::HandAxis handle_;
+  double intention_m_ = -kFrom_m;
+};
+
+// The device's position sensor: its step, and a new value on one tick of so many.
+class Sensed {
+ public:
+  Sensed(const LoopCell& cell, const Setting& setting)
+      : cell_(cell), velocity_(setting.estimate, cell.rate_Hz) {}
+  // Whether this tick has a new value.
+  bool tick(std::int64_t n, double handle_m, double dt_s) {
+    between_s_ += dt_s;
+    if (n % cell_.ticks_per_sample != 0) {
+      return false;
+    }
+    const double step_m = cell_.device.encoder_step_m;
+    x_m = step_m > 0 ? step_m * std::round(handle_m / step_m) : handle_m;
+    v_m_s = velocity_.step(x_m, between_s_);
+    between_s_ = 0;
+    return true;
+  }
+  double x_m = 0, v_m_s = 0;
+
+ private:
+  const LoopCell& cell_;
+  Velocity velocity_;
+  double between_s_ = 0;
+};
+
+// The device's amplifier: it limits the force and its slew, and the force acts some ticks later.
+class Amplifier {
+ public:
+  explicit Amplifier(const LoopCell& cell) : cell_(cell) {}
+  // What of a force is written.
+  double limit(double force_N, double dt_s) {
+    force_N = std::clamp(force_N, -cell_.device.force_max_N, cell_.device.force_max_N);
+    if (cell_.slew_N_s > 0) {
+      force_N = std::clamp(force_N, written_N_ - cell_.slew_N_s * dt_s, written_N_ + cell_.slew_N_s * dt_s);
+    }
+    written_N_ = force_N;
+    return force_N;
+  }
+  // Of the force that was written in tick n, and those before it: what acts.
+  double acting_N(std::int64_t n) {
+    commands_[static_cast<std::size_t>(n % kRing)] = written_N_;
+    const std::int64_t acting = n - cell_.device.delay_ticks;
+    return acting >= 0 ? commands_[static_cast<std::size_t>(acting % kRing)] : 0;
+  }
+
+ private:
+  const LoopCell& cell_;
+  double written_N_ = 0;
+  std::array<double, kRing> commands_{};
+};
+
+// The passivity guard in the loop, and what is told of it. Without one, effect and damping as they are.
+class Guarded {
+ public:
+  Guarded(const LoopCell& cell, const Setting& setting) : B_(setting.damping_Ns_m) {
+    if (cell.guarded) {
+      guard_.emplace(rt::GuardParams{}, cell.device, setting.estimate, cell.rate_Hz);
+    }
+  }
+  double force_N(const Wall::At& effect, const Sensed& sensed, bool fresh, double t_s, double dt_s,
+                 LoopResult& r) {
+    if (!guard_) {
+      return effect.force_N - B_ * sensed.v_m_s;
+    }
+    rt::GuardInput in;
+    in.position_m = {sensed.x_m, 0, 0};
+    in.storing[0] = {{effect.force_N, 0, 0}, {sensed.x_m, 0, 0}};
+    in.dissipative_N = {-B_ * sensed.v_m_s, 0, 0};
+    in.stiffness_N_m = effect.stiffness_N_m;
+    in.damping_Ns_m = B_;
+    in.stored_J = effect.energy_J;
+    in.elapsed_s = dt_s;
+    in.fresh = fresh;
+    const double force_N = guard_->step(in).x();
+    r.least_gain = std::min(r.least_gain, guard_->gain());
+    owed_from_s_ =
+        guard_->net_J() < -0.25 * rt::PassivityGuard::kAllowed_J ? t_s + kRecovers_s : owed_from_s_;
+    r.damper_Ns_m = std::max(r.damper_Ns_m, guard_->damper_Ns_m());
+    noise_N2_ += guard_->damper_N().squaredNorm();
+    ++noise_ticks_;
+    return force_N;
+  }
+  void wrote(double force_N) {
+    if (guard_) {
+      guard_->wrote({force_N, 0, 0});
+    }
+  }
+  [[nodiscard]] double gain() const { return guard_ ? guard_->gain() : 1; }
+  [[nodiscard]] bool owes(double t_s) const { return t_s > owed_from_s_; }
+  // Rms force of its damper since the last call.
+  double take_rest_N() {
+    const double rest_N = noise_ticks_ > 0 ? std::sqrt(noise_N2_ / static_cast<double>(noise_ticks_)) : 0;
+    noise_N2_ = 0;
+    noise_ticks_ = 0;
+    return rest_N;
+  }
+
+ private:
+  double B_;
+  std::optional<rt::PassivityGuard> guard_;
+  double owed_from_s_ = 0;
+  double noise_N2_ = 0;
+  std::int64_t noise_ticks_ = 0;
+};
+
+// The energy that has come out of the port, and the part of it that the effect still stores.
+struct PortEnergy {
+  // One tick's work; then what is stored, and the energy of the whole effect at the same place.
+  void tick(double work_J, double stored, double effect_J, double gain, double t_s) {
+    port_J += work_J;
+    most_tick_J = std::max(most_tick_J, work_J);
+    stored_J = stored;
+    stored_max_J = std::max(stored_max_J, stored);
+    const double beyond_J = port_J - rt::PassivityGuard::kAllowed_W * t_s;
+    lowest_J_ = std::min(lowest_J_, beyond_J + stored);
+    net_J = std::max(net_J, beyond_J - lowest_J_);
+    raised_J += std::max(0.0, gain - gain_before_) * effect_J;
+    gain_before_ = gain;
+  }
+  double port_J = 0, stored_J = 0, stored_max_J = 0, net_J = 0;
+  double raised_J = 0;  // stored by a stiffness that came back
+  double most_tick_J = 0;
+
+ private:
+  double lowest_J_ = 0;
+  double gain_before_ = 1;
+};
+
+// How far the handle swings in every second, and whether it has come to rest.
+class Swings {
+ public:
+  Swings(const LoopCell& cell, const Setting& setting, double x_m)
+      : cell_(cell), setting_(setting), low_m_(x_m), high_m_(x_m), began_m_(x_m) {}
+  // True at the end of a second.
+  bool tick(double t_s, double x_m, double port_J) {
+    low_m_ = std::min(low_m_, x_m);
+    high_m_ = std::max(high_m_, x_m);
+    if (t_s - second_s_ < 1) {
+      return false;
+    }
+    // What a wall brought up under the handle may not push out at once creeps out: that is no swing.
+    swings_m_.push_back(high_m_ - low_m_ - (setting_.moves ? std::abs(x_m - began_m_) : 0));
+    if (high_m_ - low_m_ > setting_.enough_m) {
+      counted_J_ += port_J - port_before_J_;
+    }
+    port_before_J_ = port_J;
+    second_s_ = t_s;
+    low_m_ = high_m_ = began_m_ = x_m;
+    return true;
+  }
+  // After a second: at rest, or in a swing that lasts.
+  [[nodiscard]] bool decided(double t_s) const {
+    const std::size_t n = swings_m_.size();
+    const double enough_m = setting_.enough_m;
+    if (t_s > setting_.moves_s + 4 && swings_m_[n - 1] < 0.3 * enough_m && swings_m_[n - 2] < enough_m) {
+      return true;
+    }
+    return !cell_.guarded && t_s > setting_.moves_s + 6 && swings_m_[n - 1] > 5 * enough_m &&
+           swings_m_[n - 1] > 0.98 * swings_m_[n - 3];
+  }
+  [[nodiscard]] double last_m() const {
+    return swings_m_.empty() ? std::numeric_limits<double>::infinity() : swings_m_.back();
+  }
+  [[nodiscard]] double counted_J() const { return counted_J_; }  // over the seconds with a motion
+
+ private:
+  const LoopCell& cell_;
+  const Setting& setting_;
+  double low_m_, high_m_, began_m_;
+  double second_s_ = 0;
+  double counted_J_ = 0, port_before_J_ = 0;
+  std::vector<double> swings_m_;
+};
+
+void judge(const LoopCell& cell, const Setting& setting, const PortEnergy& energy, const Swings& swings,
+           LoopResult& r) {
+  r.peak_to_peak_m = swings.last_m();
+  r.moving = !(r.peak_to_peak_m <= setting.enough_m);
+  r.stored_max_J = energy.stored_max_J;
+  r.net_J = energy.net_J;
+  r.surplus_J = swings.counted_J() + energy.stored_J;
+  const double count_J =
+      4 * cell.device.encoder_step_m * std::min(cell.device.force_max_N, setting.push_N + 0.1);
+  const double allowed_J = kEnergyPart * r.stored_max_J + count_J;
+  if (!setting.moves) {
+    r.active = !(r.surplus_J <= allowed_J);
+    r.active_at_rest = !(energy.port_J + energy.stored_J - energy.raised_J <= allowed_J);
+  }
+  r.given = !(r.net_J <= rt::PassivityGuard::kAllowed_J + allowed_J +
+                             energy.most_tick_J * (cell.ticks_per_sample + cell.device.delay_ticks));
+}
+
 }  // namespace
 
 LoopResult run_loop(const LoopCell& cell) {
-  const double T = 1 / cell.rate_Hz;
-  rt::VelocityParams estimate;
-  estimate.d_m = std::max(cell.device.encoder_step_m, 1e-6);
-  const double B_limit = rt::stable_damping_Ns_m(cell.device, T, estimate);
-  const double B = cell.damping_share * B_limit;
-
-  sim::HandParams hand;
-  hand.mass_kg = cell.device.mass_kg;
-  hand.damping_Ns_m = cell.device.damping_Ns_m;
-  hand.coulomb_N = cell.coulomb_N;
-  sim::ArmImpedance arm;
-  if (cell.holder == Holder::fingertip) {
-    arm.damping_Ns_m = 1;
-  }
-  if (cell.holder == Holder::arm) {
-    arm = {250, 6};
-  }
-  const bool moves = cell.motion != WallMotion::still;
-  if (moves && cell.holder != Holder::arm) {
-    arm.stiffness_N_m = cell.holder == Holder::nobody ? 10 : 50;
-  }
-
   const Wall still(cell);
+  const Setting setting(cell, still);
   Motion motion(cell);
-  Motion::At moved;
-  const auto wall = [&](double x_m) {
-    Wall::At a = still.at(x_m - moved.shift_m);
-    a.force_N *= moved.part;
-    a.stiffness_N_m *= moved.part;
-    a.energy_J *= moved.part;
-    return a;
-  };
-  Velocity velocity(estimate, cell.rate_Hz);
-  Ticks ticks(cell.timing, T, cell.seed);
-  std::optional<rt::PassivityGuard> guard;
-  if (cell.guarded) {
-    guard.emplace(rt::GuardParams{}, cell.device, estimate, cell.rate_Hz);
-  }
+  Ticks ticks(cell.timing, setting.T_s, cell.seed);
+  HeldHandle handle(cell, setting);
+  Sensed sensed(cell, setting);
+  Guarded guarded(cell, setting);
+  Amplifier amplifier(cell);
+  PortEnergy energy;
+  Swings swings(cell, setting, handle.x_m());
 
   LoopResult r;
-  const double delay_s = T * (0.5 * cell.ticks_per_sample + cell.device.delay_ticks);
-  r.passive_N_m = cell.device.damping_Ns_m / delay_s;
-  const double soft_N_m = std::min(still.at(1e-3).stiffness_N_m, 0.9 * r.passive_N_m);
-  const double push_N =
-      moves || cell.holder == Holder::arm ? 0 : cell.coulomb_N + std::min(cell.push_N, 0.01 * soft_N_m);
-  const double enough_m = std::max(4 * cell.device.encoder_step_m, kSmallest_m);
-  const double settles_s =
-      cell.holder == Holder::nobody ? 24 * cell.device.mass_kg / cell.device.damping_Ns_m : 14;
-  const double moves_s = moves ? kMoves_s + kStops_s : 0;
-  const double longest_s =
-      moves_s +
-      (cell.holder == Holder::arm ? 12 : std::min(kLongest_s, std::max(settles_s, 8 + 6 * B / soft_N_m)));
-
-  sim::HandAxis handle{-kFrom_m, cell.speed_m_s};
-  double intention_m = -kFrom_m;
-  std::array<double, kRing> commands{};
-  double t = 0, dt = T;
-  double port_J = 0, counted_J = 0, port_before_J = 0;
-  double low = handle.x_m, high = handle.x_m, began_m = handle.x_m, second = 0;
-  double owed_from_s = 0;
-  std::vector<double> swings;
-  double stored_J = 0, raised_J = 0, gain_before = 1;
-  double lowest_J = 0, most_tick_J = 0;
-  double x = 0, v = 0, between_s = 0, written_N = 0;
-  double noise_N2 = 0;
-  std::int64_t noise_ticks = 0;
-  while (t < longest_s) {
-    const double step_m = cell.device.encoder_step_m;
-    const bool fresh = r.ticks % cell.ticks_per_sample == 0;
-    between_s += dt;
-    if (fresh) {
-      x = step_m > 0 ? step_m * std::round(handle.x_m / step_m) : handle.x_m;
-      v = velocity.step(x, between_s);
-      between_s = 0;
-    }
-    moved = motion.at(t);
-    const Wall::At effect = wall(x);
-    double force_N = effect.force_N - B * v;
-    double gain = 1;
-    if (guard) {
-      rt::GuardInput in;
-      in.position_m = {x, 0, 0};
-      in.storing[0] = {{effect.force_N, 0, 0}, {x, 0, 0}};
-      in.dissipative_N = {-B * v, 0, 0};
-      in.stiffness_N_m = effect.stiffness_N_m;
-      in.damping_Ns_m = B;
-      in.stored_J = effect.energy_J;
-      in.elapsed_s = dt;
-      in.fresh = fresh;
-      force_N = guard->step(in).x();
-      gain = guard->gain();
-      r.least_gain = std::min(r.least_gain, gain);
-      owed_from_s = guard->net_J() < -0.25 * rt::PassivityGuard::kAllowed_J ? t + kRecovers_s : owed_from_s;
-      r.damper_Ns_m = std::max(r.damper_Ns_m, guard->damper_Ns_m());
-      noise_N2 += guard->damper_N().squaredNorm();
-      ++noise_ticks;
-    }
-    force_N = std::clamp(force_N, -cell.device.force_max_N, cell.device.force_max_N);
-    if (cell.slew_N_s > 0) {
-      force_N = std::clamp(force_N, written_N - cell.slew_N_s * dt, written_N + cell.slew_N_s * dt);
-    }
-    written_N = force_N;
-    if (guard) {
-      guard->wrote({force_N, 0, 0});
-    }
-    commands[static_cast<std::size_t>(r.ticks % kRing)] = force_N;
-    const std::int64_t acting = r.ticks - cell.device.delay_ticks;
-    const double applied_N = acting >= 0 ? commands[static_cast<std::size_t>(acting % kRing)] : 0;
+  r.passive_N_m = setting.passive_N_m;
+  double t_s = 0, dt_s = setting.T_s;
+  while (t_s < setting.longest_s) {
+    const bool fresh = sensed.tick(r.ticks, handle.x_m(), dt_s);
+    const Motion::At moved = motion.at(t_s);
+    const Wall::At effect = effect_at(still, moved, sensed.x_m);
+    const double wanted_N = guarded.force_N(effect, sensed, fresh, t_s, dt_s, r);
+    const double gain = guarded.gain();
+    guarded.wrote(amplifier.limit(wanted_N, dt_s));
     r.commanded_N_m = effect.stiffness_N_m;
     r.rendered_N_m = gain * effect.stiffness_N_m;
 
-    dt = ticks.next(t);
-    const double before_m = handle.x_m;
-    double reached_m = cell.holder == Holder::arm ? std::min(intention_m + 0.05 * dt, 0.02) : intention_m;
-    if (moves) {  // to and fro about a place in the wall
-      const double omega = std::numbers::pi * std::min(cell.frequency_Hz, 4.0);
-      const double pace_m_s = (t < kReach_s ? kReach_m / kReach_s : 0) +
-                              (t < moves_s ? kSwing_m * omega * std::cos(omega * t) : 0);
-      reached_m = intention_m + pace_m_s * dt;
-    }
-    const double pace = (reached_m - intention_m) / dt;
-    sim::advance(handle, hand, arm, applied_N + push_N, intention_m, pace, dt);
-    intention_m = reached_m;
-    const double tick_J = applied_N * (handle.x_m - before_m);
-    port_J += tick_J;
-    most_tick_J = std::max(most_tick_J, tick_J);
-    t += dt;
+    dt_s = ticks.next(t_s);
+    const double applied_N = amplifier.acting_N(r.ticks);
+    const double before_m = handle.x_m();
+    handle.step(t_s, dt_s, applied_N);
+    t_s += dt_s;
     ++r.ticks;
-    stored_J = returnable_J(still, moved, handle.x_m, gain, cell.device.force_max_N);
-    const double beyond_J = port_J - rt::PassivityGuard::kAllowed_W * t;
-    lowest_J = std::min(lowest_J, beyond_J + stored_J);
-    r.net_J = std::max(r.net_J, beyond_J - lowest_J);
-    raised_J += std::max(0.0, gain - gain_before) * wall(handle.x_m).energy_J;
-    gain_before = gain;
-    r.stored_max_J = std::max(r.stored_max_J, stored_J);
+    const double x_m = handle.x_m();
+    energy.tick(applied_N * (x_m - before_m), returnable_J(still, moved, x_m, gain, cell.device.force_max_N),
+                effect_at(still, moved, x_m).energy_J, gain, t_s);
 
-    low = std::min(low, handle.x_m);
-    high = std::max(high, handle.x_m);
-    if (t - second < 1) {
-      continue;
-    }
-    // What a wall brought up under the handle may not push out at once creeps out: that is no swing.
-    swings.push_back(high - low - (moves ? std::abs(handle.x_m - began_m) : 0));
-    if (high - low > enough_m) {
-      counted_J += port_J - port_before_J;
-    }
-    port_before_J = port_J;
-    r.rest_N = noise_ticks > 0 ? std::sqrt(noise_N2 / static_cast<double>(noise_ticks)) : 0;
-    noise_N2 = 0;
-    noise_ticks = 0;
-    second = t;
-    low = high = began_m = handle.x_m;
-    const std::size_t n = swings.size();
-    if (t > moves_s + 4 && swings[n - 1] < 0.3 * enough_m && swings[n - 2] < enough_m) {
-      break;
-    }
-    const bool lasts = !cell.guarded && t > moves_s + 6 && swings[n - 1] > 5 * enough_m &&
-                       swings[n - 1] > 0.98 * swings[n - 3];
-    if (lasts || !std::isfinite(handle.x_m)) {
-      break;
+    if (swings.tick(t_s, x_m, energy.port_J)) {
+      r.rest_N = guarded.take_rest_N();
+      if (swings.decided(t_s) || !std::isfinite(x_m)) {
+        break;
+      }
     }
   }
-  r.end_s = t;
-  r.owes = t > owed_from_s;
-  r.peak_to_peak_m = swings.empty() ? std::numeric_limits<double>::infinity() : swings.back();
-  r.moving = !(r.peak_to_peak_m <= enough_m);
-  r.surplus_J = counted_J + stored_J;
-  const double count_J = 4 * cell.device.encoder_step_m * std::min(cell.device.force_max_N, push_N + 0.1);
-  const double allowed_J = kEnergyPart * r.stored_max_J + count_J;
-  if (cell.motion == WallMotion::still) {
-    r.active = !(r.surplus_J <= allowed_J);
-    r.active_at_rest = !(port_J + stored_J - raised_J <= allowed_J);
-  }
-  r.given = !(r.net_J <= rt::PassivityGuard::kAllowed_J + allowed_J +
-                             most_tick_J * (cell.ticks_per_sample + cell.device.delay_ticks));
+  r.end_s = t_s;
+  r.owes = guarded.owes(t_s);
+  judge(cell, setting, energy, swings, r);
   return r;
 }
 

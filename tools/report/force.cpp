@@ -342,53 +342,68 @@ Box over_the_box(int places, Progress& progress) {
   return box;
 }
 
-}  // namespace
+// ---- times ----
 
-Result run_force(const Job& job) {
+std::vector<Method> all_methods(bool quick) {
   std::vector<Method> methods;
-  add_methods<double>(methods, "double", job.quick);
-  add_methods<float>(methods, "float", job.quick);
+  add_methods<double>(methods, "double", quick);
+  add_methods<float>(methods, "float", quick);
   for (Method& m : methods) {
     m.shipped = m.name == "stable form, double" && m.narrowest == 1e-9 && m.knob[0] == '1';
   }
+  return methods;
+}
 
-  // In a tick a law also gives stiffness, energy, stress and pressure.
-  const SceneCell oocyte = cell_of("icsi");
-  const std::array<SceneCell, 2> cells = {oocyte, cell_of("zebrafish")};
+// One time per method of eq. 5, then those of the two laws of a tick: the paper's, the large deflection. In a
+// tick a law also gives stiffness, energy, stress and pressure.
+auto times_of(const std::vector<Method>& methods, const SceneCell& cell, const Job& job) {
   std::vector<double> depths(256);
   for (std::size_t i = 0; i < depths.size(); ++i) {
-    depths[i] = oocyte.puncture_m * static_cast<double>(i + 1) / static_cast<double>(depths.size());
+    depths[i] = cell.puncture_m * static_cast<double>(i + 1) / static_cast<double>(depths.size());
   }
   std::vector<Timed> timed;
   for (const Method& m : methods) {
     timed.push_back(m.timed);
   }
   for (const auto law : {rt::MembraneParams::Law::paper, rt::MembraneParams::Law::large_deflection}) {
-    rt::MembraneParams params = oocyte.params;
+    rt::MembraneParams params = cell.params;
     params.law = law;
-    timed.emplace_back([params, depths, cell = oocyte](std::size_t i) {
+    timed.emplace_back([params, depths, cell](std::size_t i) {
       return rt::membrane_law(params, depths[i % depths.size()], cell.R_m, cell.dimple_scale).force_N;
     });
   }
   job.progress.start("times", 1);
-  const auto times =
+  auto times =
       time_interleaved(timed, {.batches = job.quick ? 200 : 1000, .seconds = job.quick ? 2.0 : 20.0});
   job.progress.step();
+  return times;
+}
 
-  std::vector<Work> works;
+// Where each method of eq. 5 errs most.
+Table worst_table(const std::vector<Method>& methods) {
   Table worst{.name = "force_worst",
               .columns = {"method", "knob", "worst_relative_error", "zeta", "one_minus_zeta", "wd_over_a"}};
-  for (std::size_t i = 0; i < methods.size(); ++i) {
-    const Method& m = methods[i];
-    works.push_back({m.name, m.knob, m.worst, times[i], m.shipped});
+  for (const Method& m : methods) {
     if (m.narrowest == 1e-9) {
       worst.add({m.name, m.knob, m.worst, m.where.c_m / m.where.a_m, narrowness(m.where),
                  m.where.wd_m / m.where.a_m});
     }
   }
-  Table law_table{.name = "force_laws",
-                  .columns = {"cell", "law", "relative_error_rms", "worst_relative_error", "worst_at_wd_m",
-                              "true_force_rms_N", "puncture_wd_m", "tick_median_ns", "shipped"}};
+  return worst;
+}
+
+}  // namespace
+
+Result run_force(const Job& job) {
+  const std::array<SceneCell, 2> cells = {cell_of("icsi"), cell_of("zebrafish")};
+  const std::vector<Method> methods = all_methods(job.quick);
+  const auto times = times_of(methods, cells[0], job);
+
+  std::vector<Work> works;
+  for (std::size_t i = 0; i < methods.size(); ++i) {
+    const Method& m = methods[i];
+    works.push_back({m.name, m.knob, m.worst, times[i], m.shipped});
+  }
   Figure figure{.name = "force",
                 .note =
                     "Error of eq. 5 is the worst of 600 dimples against 60 digits of the printed formula by "
@@ -396,10 +411,14 @@ Result run_force(const Job& job) {
                     "solved for each depth; a cell is undeformed at 0 and gives way at the mark."};
   const Limit half_ulp[] = {{"rounding of double", 1.1e-16}, {"rounding of float", 6e-8}};
   figure.panels.push_back(work_precision("eq. 5, evaluated", "worst relative error", works, half_ulp));
+
+  Table law_table{.name = "force_laws",
+                  .columns = {"cell", "law", "relative_error_rms", "worst_relative_error", "worst_at_wd_m",
+                              "true_force_rms_N", "puncture_wd_m", "tick_median_ns", "shipped"}};
   const auto all = laws();
   const int points = job.quick ? 24 : 120, places = job.quick ? 60 : 600;
   job.progress.start("laws against the large-deflection equations", 2 * points + places);
-  std::array<Fit, 3> of_oocyte;
+  std::vector<Fit> of_oocyte;
   for (const SceneCell& cell : cells) {
     Compared compared = compare(cell, all, points, job.progress);
     for (std::size_t i = 0; i < all.size(); ++i) {
@@ -409,9 +428,9 @@ Result run_force(const Job& job) {
           i == 0 ? std::numeric_limits<double>::quiet_NaN() : times[methods.size() + i - 1].median_ns;
       law_table.add({cell.name, all[i].name, f.rms(), f.worst, f.worst_at_m,
                      std::sqrt(f.true_square / f.points), cell.puncture_m, tick_ns, all[i].shipped});
-      if (&cell == &cells[0]) {
-        of_oocyte[i] = f;
-      }
+    }
+    if (&cell == &cells[0]) {
+      of_oocyte = std::move(compared.fits);
     }
     figure.panels.push_back(std::move(compared.panel));
   }
@@ -419,7 +438,7 @@ Result run_force(const Job& job) {
   figure.panels.push_back(std::move(box.panel));
 
   Result result;
-  result.tables = {work_table("force", "worst_relative_error", works), std::move(worst),
+  result.tables = {work_table("force", "worst_relative_error", works), worst_table(methods),
                    std::move(law_table)};
   result.figures = {std::move(figure)};
   const auto to_hand = [](double error) { return error < kJustNoticeable ? "below" : "above"; };

@@ -199,14 +199,15 @@ Table moving_counts_table(const std::vector<Swept>& with, const std::vector<Swep
   return t;
 }
 
-// What the hand does not get back of its work on walls that are stable without the guard.
-struct Lost {
+// A table, and the worst of what stands in it.
+struct WithWorst {
   Table table;
-  double largest = 0;
+  double worst = 0;
 };
 
-Lost transparency(Progress& progress) {
-  Lost out;
+// What the hand does not get back of its work on walls that are stable without the guard.
+WithWorst transparency(Progress& progress) {
+  WithWorst out;
   out.table = {
       "stability_transparency",
       {"rate_Hz", "delay_ticks", "ticks_per_sample", "of_passive", "lost_part", "unguarded_lost_part"}};
@@ -239,7 +240,7 @@ Lost transparency(Progress& progress) {
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const LoopCell& c = cells[i];
     out.table.add({c.rate_Hz, c.device.delay_ticks, c.ticks_per_sample, parts[i], with[i], without[i]});
-    out.largest = std::max(out.largest, std::abs(with[i]));
+    out.worst = std::max(out.worst, std::abs(with[i]));
   }
   return out;
 }
@@ -341,13 +342,8 @@ Boundaries boundaries(bool quick, Progress& progress) {
 }
 
 // Colgate & Schenkel's formula against the energy of imposed motions.
-struct Passivity {
-  Table table;
-  double worst = 0;
-};
-
-Passivity passivity(Progress& progress) {
-  Passivity out;
+WithWorst passivity(Progress& progress) {
+  WithWorst out;
   out.table = {
       "stability_passivity",
       {"rate_Hz", "delay_ticks", "K_N_m", "B_Ns_m", "tau_s", "formula_b_Ns_m", "slow_sinusoid_b_Ns_m",
@@ -558,14 +554,14 @@ CallTime guard_time() {
 
 Result run_stability(const Job& job) {
   Result out;
-  const std::size_t n = job.quick ? 1500 : 20000;
+  const std::size_t n = job.quick ? 200 : 20000;
   const auto with = sweep(Walls::still, n, true, job.progress);
   const auto without = sweep(Walls::still, n, false, job.progress);
   const auto moving_with = sweep(Walls::moving, n, true, job.progress);
   const auto moving_without = sweep(Walls::moving, n, false, job.progress);
-  Lost lost = transparency(job.progress);
+  WithWorst lost = transparency(job.progress);
   Boundaries bounds = boundaries(job.quick, job.progress);
-  Passivity passive = passivity(job.progress);
+  WithWorst passive = passivity(job.progress);
   Maps map = maps(job.quick, job.progress);
   Maps modulated = modulated_maps(job.quick, job.progress);
   Rendered largest = rendered(job.quick, job.progress);
@@ -599,7 +595,7 @@ Result run_stability(const Job& job) {
       1e3 * rt::PassivityGuard::kAllowed_J, 1e3 * rt::PassivityGuard::kAllowed_W, unstable(moving_with),
       std::count_if(moving_with.begin(), moving_with.end(),
                     [](const Swept& s) { return !faithful(s.cell, s.result); }),
-      100 * lost.largest);
+      100 * lost.worst);
 
   Table guard{"stability_guard", {"what"}};
   for (const auto& c : time_columns()) {

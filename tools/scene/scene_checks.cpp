@@ -28,51 +28,53 @@ double rounded_down(double v) {
 
 // ---- things that need other things ----
 
+// What needs what, and why.
+struct Need {
+  const char* what;
+  const char* needed;
+  const char* why;
+};
+constexpr Need kNeeds[] = {
+    {"vision", "camera", "vision looks at pictures"},
+    {"camera", "vision", "nobody looks at the pictures"},
+    {"phases", "vision", "vision sees contact and puncture"},
+    {"local_model", "vision", "vision corrects the local model"},
+    {"membrane", "local_model", "it says where the membrane is"},
+    {"cone", "local_model", "it says where the entry point is"},
+    {"axis", "phases", "withdrawal is a phase"},
+    {"axis", "local_model", "it says where the entry point is"},
+    {"phases", "local_model", "the phases follow its depth"},
+    {"repulsive", "local_model", "it says where the cell is"},
+    {"vibration", "phases", "contact and puncture are phases"},
+};
+
 Found check_needs(const Scene& s) {
-  const auto& servo = s.servo;
-  const auto needs = [](bool there, const char* what, bool has, const char* needed,
-                        const char* why) -> Found {
-    if (!there || has) {
-      return std::nullopt;
-    }
-    return Problem{
-        what, fmt::format("needs [{}] ({}), allowed: add [{}] or leave [{}] out", needed, why, needed, what)};
+  const auto unmet = [](const Need& n) {
+    return Problem{n.what, fmt::format("needs [{}] ({}), allowed: add [{}] or leave [{}] out", n.needed,
+                                       n.why, n.needed, n.what)};
   };
-  const bool camera = !s.devices.camera.empty();
-  const bool drawn = s.simulated_camera();
-  const bool cell = s.sim && s.sim->cell;
-  const bool holder = s.sim && s.sim->holder;
-  for (const auto& p : {
-           needs(s.vision.has_value(), "vision", camera, "camera", "vision looks at pictures"),
-           needs(camera, "camera", s.vision.has_value(), "vision", "nobody looks at the pictures"),
-           needs(servo.phases.has_value(), "phases", s.vision.has_value(), "vision",
-                 "vision sees contact and puncture"),
-           needs(servo.local_model.has_value(), "local_model", s.vision.has_value(), "vision",
-                 "vision corrects the local model"),
-           needs(servo.membrane.has_value(), "membrane", servo.local_model.has_value(), "local_model",
-                 "it says where the membrane is"),
-           needs(servo.cone.has_value(), "cone", servo.local_model.has_value(), "local_model",
-                 "it says where the entry point is"),
-           needs(servo.axis.has_value(), "axis", servo.phases.has_value(), "phases", "withdrawal is a phase"),
-           needs(servo.axis.has_value(), "axis", servo.local_model.has_value(), "local_model",
-                 "it says where the entry point is"),
-           needs(servo.phases.has_value(), "phases", servo.local_model.has_value(), "local_model",
-                 "the phases follow its depth"),
-           needs(servo.repulsive.has_value(), "repulsive", servo.local_model.has_value(), "local_model",
-                 "it says where the cell is"),
-           needs(servo.vibration.has_value(), "vibration", servo.phases.has_value(), "phases",
-                 "contact and puncture are phases"),
-           needs(drawn && s.vision, "camera", cell, "sim.cell", "there is nothing to look at"),
-           needs(holder, "sim.holder", cell, "sim.cell", "there is nothing to hold"),
-           needs(s.devices.vacuum == kSimulated, "vacuum", holder, "sim.holder", "suction needs a pipette"),
-           needs(s.vision && s.vision->holder && drawn, "vision.holder", holder, "sim.holder",
-                 "there is no holding pipette to find"),
-           needs(s.vision && s.vision->inner && drawn, "vision.inner", !cell || s.sim->cell->inner,
-                 "sim.cell.inner", "there is no inner membrane to follow"),
-       }) {
-    if (p) {
-      return p;
+  for (const Need& n : kNeeds) {
+    if (table_named(n.what)->there(s) && !table_named(n.needed)->there(s)) {
+      return unmet(n);
     }
+  }
+  // What only a simulated device, or a picture that is drawn, needs of the simulation.
+  const bool cell = s.sim && s.sim->cell, holder = s.sim && s.sim->holder;
+  const bool drawn = s.vision && s.simulated_camera();
+  if (drawn && !cell) {
+    return unmet({"camera", "sim.cell", "there is nothing to look at"});
+  }
+  if (holder && !cell) {
+    return unmet({"sim.holder", "sim.cell", "there is nothing to hold"});
+  }
+  if (s.devices.vacuum == kSimulated && !holder) {
+    return unmet({"vacuum", "sim.holder", "suction needs a pipette"});
+  }
+  if (drawn && s.vision->holder && !holder) {
+    return unmet({"vision.holder", "sim.holder", "there is no holding pipette to find"});
+  }
+  if (drawn && s.vision->inner && cell && !s.sim->cell->inner) {
+    return unmet({"vision.inner", "sim.cell.inner", "there is no inner membrane to follow"});
   }
   return std::nullopt;
 }

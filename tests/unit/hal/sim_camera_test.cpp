@@ -219,26 +219,31 @@ TEST(SimCameraFailure, delay_gives_old_pictures_under_their_own_time) {
   EXPECT_EQ(seen, watch(failing(Failure::delay), 990));
 }
 
+// The picture at 0.3 s, and what a camera that draws none says then.
+std::vector<std::uint8_t> picture(const SimConfig& config, hal::Status without_picture) {
+  const auto bench = std::make_unique<LocalBench>();
+  World world(config, bench.get(), 0);
+  SimCamera camera(config, *bench, bench->camera);
+  SimCamera blind(config, *bench, bench->camera, SimCamera::Picture::none);
+  for (int i = 1; i <= 300; ++i) {
+    world.step(i * kMs);
+  }
+  hal::Frame frame;
+  EXPECT_EQ(blind.next(frame, 0), without_picture);
+  EXPECT_EQ(camera.next(frame, 0), hal::Status::ok);
+  return {frame.pixels, frame.pixels + frame.width * frame.height};
+}
+
 TEST(SimCameraFailure, a_white_picture_is_white_and_noise_is_noise) {
   for (const Failure kind : {Failure::saturate, Failure::nan}) {
-    const SimConfig config = failing(kind, 0);
-    const auto bench = std::make_unique<LocalBench>();
-    World world(config, bench.get(), 0);
-    SimCamera camera(config, *bench, bench->camera);
-    SimCamera blind(config, *bench, bench->camera, SimCamera::Picture::none);
-    for (int i = 1; i <= 300; ++i) {
-      world.step(i * kMs);
-    }
-    hal::Frame frame;
-    EXPECT_EQ(blind.next(frame, 0), hal::Status::fault);
-    ASSERT_EQ(camera.next(frame, 0), hal::Status::ok);
+    const std::vector<std::uint8_t> pixels = picture(failing(kind, 0), hal::Status::fault);
     double sum = 0;
     double sum2 = 0;
-    const int n = frame.width * frame.height;
-    for (int i = 0; i < n; ++i) {
-      sum += frame.pixels[i];
-      sum2 += double{frame.pixels[i] * 1.0} * frame.pixels[i];
+    for (const double grey : pixels) {
+      sum += grey;
+      sum2 += grey * grey;
     }
+    const double n = static_cast<double>(pixels.size());
     const double mean = sum / n;
     const double variance = sum2 / n - mean * mean;
     if (kind == Failure::saturate) {
@@ -251,21 +256,8 @@ TEST(SimCameraFailure, a_white_picture_is_white_and_noise_is_noise) {
 }
 
 TEST(SimCameraFailure, interference_is_added_to_the_picture_and_the_truth_has_none) {
-  const auto picture = [](const SimConfig& config) {
-    const auto bench = std::make_unique<LocalBench>();
-    World world(config, bench.get(), 0);
-    SimCamera camera(config, *bench, bench->camera);
-    SimCamera blind(config, *bench, bench->camera, SimCamera::Picture::none);
-    for (int i = 1; i <= 300; ++i) {
-      world.step(i * kMs);
-    }
-    hal::Frame frame;
-    EXPECT_EQ(blind.next(frame, 0), hal::Status::ok);
-    EXPECT_EQ(camera.next(frame, 0), hal::Status::ok);
-    return std::vector<std::uint8_t>(frame.pixels, frame.pixels + frame.width * frame.height);
-  };
-  const std::vector<std::uint8_t> clean = picture(station());
-  const std::vector<std::uint8_t> disturbed = picture(failing(Failure::noise, 0));
+  const std::vector<std::uint8_t> clean = picture(station(), hal::Status::ok);
+  const std::vector<std::uint8_t> disturbed = picture(failing(Failure::noise, 0), hal::Status::ok);
   ASSERT_EQ(clean.size(), disturbed.size());
   double sum2 = 0;
   int n = 0;

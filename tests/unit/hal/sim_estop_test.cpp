@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <initializer_list>
+
 #include "hal/sim/plant/estop.hpp"
 #include "hal/sim/plant/injector.hpp"
 
@@ -27,15 +30,19 @@ class SimEstopTest : public testing::Test {
     EXPECT_EQ(chain.read(s), hal::Status::ok);
     return s;
   }
+  // A chain whose contacts open as the script says.
+  SimEstop scripted(std::initializer_list<EstopEvent> events) {
+    std::copy(events.begin(), events.end(), config.estop_events.begin());
+    config.estop_event_count = static_cast<int>(events.size());
+    return SimEstop(config);
+  }
   SimConfig config;
   std::int64_t ticks = 0;
   bool level = false;
 };
 
 TEST_F(SimEstopTest, opens_the_contacts_that_the_script_names) {
-  config.estop_events[0] = {0.010, 0.005, true, false, false};
-  config.estop_event_count = 1;
-  SimEstop chain(config);
+  SimEstop chain = scripted({{0.010, 0.005, true, false, false}});
   run(chain, 9);
   EXPECT_TRUE(read(chain).contact_a_closed);
   tick(chain);
@@ -46,9 +53,7 @@ TEST_F(SimEstopTest, opens_the_contacts_that_the_script_names) {
 }
 
 TEST_F(SimEstopTest, presses_reset_after_the_release_if_the_script_says_so) {
-  config.estop_events[0] = {0.010, 0.100, true, true, true};
-  config.estop_event_count = 1;
-  SimEstop chain(config);
+  SimEstop chain = scripted({{0.010, 0.100, true, true, true}});
   int pressed = 0;
   int first = 0;
   for (int i = 1; i <= 600; ++i) {
@@ -65,9 +70,7 @@ TEST_F(SimEstopTest, presses_reset_after_the_release_if_the_script_says_so) {
 }
 
 TEST_F(SimEstopTest, sees_a_pulse_shorter_than_a_tick) {
-  config.estop_events[0] = {0.0103, 0.0004, true, true, false};
-  config.estop_event_count = 1;
-  SimEstop chain(config);
+  SimEstop chain = scripted({{0.0103, 0.0004, true, true, false}});
   run(chain, 10);
   EXPECT_FALSE(read(chain).pulse_seen);
   tick(chain);
@@ -78,10 +81,7 @@ TEST_F(SimEstopTest, sees_a_pulse_shorter_than_a_tick) {
 }
 
 TEST_F(SimEstopTest, keeps_a_pulse_until_it_is_read) {
-  config.estop_events[0] = {0.0103, 0.0004, true, false, false};
-  config.estop_events[1] = {0.0203, 0.0015, true, false, false};
-  config.estop_event_count = 2;
-  SimEstop chain(config);
+  SimEstop chain = scripted({{0.0103, 0.0004, true, false, false}, {0.0203, 0.0015, true, false, false}});
   for (const int until : {15, 25}) {  // both lie within one late tick
     run(chain, until - static_cast<int>(ticks));
     EXPECT_TRUE(read(chain).pulse_seen);
@@ -121,9 +121,7 @@ TEST_F(SimEstopTest, a_level_that_does_not_change_is_no_heartbeat) {
 }
 
 TEST_F(SimEstopTest, needs_a_reset_before_power_comes_back) {
-  config.estop_events[0] = {0.100, 0.100, true, true, true};  // reset pressed from 0.4 to 0.5 s
-  config.estop_event_count = 1;
-  SimEstop chain(config);
+  SimEstop chain = scripted({{0.100, 0.100, true, true, true}});  // reset pressed from 0.4 to 0.5 s
   run(chain, 10);
   run(chain, 60, false);
   ASSERT_FALSE(chain.power());

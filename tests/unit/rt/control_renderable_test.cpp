@@ -17,6 +17,18 @@ ServoConfig bare() {
   return config;
 }
 
+// Refused for this, and with this asked of the handle; the limits are what each test looks at.
+NotRenderable refused(const ServoConfig& config, What what, double asked) {
+  const auto found = find_not_renderable(config);
+  EXPECT_TRUE(found);
+  if (!found) {
+    return {};
+  }
+  EXPECT_EQ(found->what, what);
+  EXPECT_EQ(found->asked, asked);
+  return *found;
+}
+
 TEST(Renderable, a_bare_handle_can_render_nothing_wrong) { EXPECT_FALSE(find_not_renderable(bare())); }
 
 TEST(Renderable, damping_above_the_stable_limit_is_found_with_the_limit) {
@@ -25,16 +37,9 @@ TEST(Renderable, damping_above_the_stable_limit_is_found_with_the_limit) {
   EXPECT_FALSE(find_not_renderable(config));
 
   config.damping->B2_Ns_m = 17.4;
-  auto found = find_not_renderable(config);
-  ASSERT_TRUE(found);
-  EXPECT_EQ(found->what, What::damping_inside);
-  EXPECT_EQ(found->asked, 17.4);
-  EXPECT_NEAR(found->most, 17.35, 0.01);
-
+  EXPECT_NEAR(refused(config, What::damping_inside, 17.4).most, 17.35, 0.01);
   config.damping->B1_Ns_m = 18;
-  found = find_not_renderable(config);
-  ASSERT_TRUE(found);
-  EXPECT_EQ(found->what, What::damping_outside);
+  refused(config, What::damping_outside, 18);
 }
 
 TEST(Renderable, damping_of_the_axis_adds_to_the_damping_inside) {
@@ -43,11 +48,8 @@ TEST(Renderable, damping_of_the_axis_adds_to_the_damping_inside) {
   config.axis = AxisParams{.K_N_m = 0, .B_inward_Ns_m = 13};
   EXPECT_FALSE(find_not_renderable(config));
   config.axis->B_inward_Ns_m = 14;
-  const auto found = find_not_renderable(config);
-  ASSERT_TRUE(found);
-  EXPECT_EQ(found->what, What::damping_inward);
-  EXPECT_EQ(found->asked, 14);
-  EXPECT_EQ(found->beside_Ns_m, 4);
+  const NotRenderable found = refused(config, What::damping_inward, 14);
+  EXPECT_EQ(found.beside_Ns_m, 4);
 }
 
 TEST(Renderable, a_spring_that_swings_by_itself_is_found_beside_its_damping) {
@@ -58,14 +60,11 @@ TEST(Renderable, a_spring_that_swings_by_itself_is_found_beside_its_damping) {
   config.friction = FrictionParams{.F_c_N = 0.1, .K_N_m = 489};
   EXPECT_FALSE(find_not_renderable(config));
   config.friction->K_N_m = 490;
-  const auto found = find_not_renderable(config);
-  ASSERT_TRUE(found);
-  EXPECT_EQ(found->what, What::unstable);
-  EXPECT_EQ(found->asked, 490);
-  EXPECT_NEAR(found->most, 489.7, 0.1);
-  EXPECT_EQ(found->beside_Ns_m, 1);
-  EXPECT_EQ(found->spring_count, 1);
-  EXPECT_EQ(found->stiffest, Spring::Of::friction);
+  const NotRenderable found = refused(config, What::unstable, 490);
+  EXPECT_NEAR(found.most, 489.7, 0.1);
+  EXPECT_EQ(found.beside_Ns_m, 1);
+  EXPECT_EQ(found.spring_count, 1);
+  EXPECT_EQ(found.stiffest, Spring::Of::friction);
 }
 
 TEST(Renderable, without_a_guard_the_sum_of_the_springs_must_be_passive) {
@@ -76,13 +75,10 @@ TEST(Renderable, without_a_guard_the_sum_of_the_springs_must_be_passive) {
   config.repulsive = RepulsiveParams{.K_N_m = 24};
   EXPECT_FALSE(find_not_renderable(config));
   config.repulsive->K_N_m = 26;
-  const auto found = find_not_renderable(config);
-  ASSERT_TRUE(found);
-  EXPECT_EQ(found->what, What::not_passive);
-  EXPECT_EQ(found->asked, 41);
-  EXPECT_DOUBLE_EQ(found->most, 40);
-  EXPECT_EQ(found->spring_count, 2);
-  EXPECT_EQ(found->stiffest, Spring::Of::repulsive);
+  const NotRenderable found = refused(config, What::not_passive, 41);
+  EXPECT_DOUBLE_EQ(found.most, 40);
+  EXPECT_EQ(found.spring_count, 2);
+  EXPECT_EQ(found.stiffest, Spring::Of::repulsive);
   config.guard = GuardParams{};
   EXPECT_FALSE(find_not_renderable(config));
 }

@@ -3,8 +3,6 @@
 #include "tools/punctum/recorder.hpp"
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -12,33 +10,18 @@
 #include <memory>
 #include <string>
 
+#include "tests/support/full_disk.hpp"
 #include "tools/punctum/disk_space.hpp"
 #include "tools/punctum/report_folder.hpp"
 #include "tools/punctum/vision_watchdog.hpp"
-#include "tools/shared/program_start.hpp"
 
 namespace punctum::tools {
 namespace {
 
 namespace fs = std::filesystem;
 
-class RecorderTest : public testing::Test {
+class RecorderTest : public FullDisk {
  protected:
-  void SetUp() override {
-    std::string name = (fs::temp_directory_path() / "punctum-recorder-XXXXXX").string();
-    ASSERT_NE(::mkdtemp(name.data()), nullptr);
-    folder_ = name;
-    start_program();
-    ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before_), 0);
-  }
-  void TearDown() override {
-    ::setrlimit(RLIMIT_FSIZE, &before_);
-    fs::remove_all(folder_);
-  }
-  void full_beyond(rlim_t bytes) const {
-    const rlimit limit{.rlim_cur = bytes, .rlim_max = before_.rlim_max};
-    ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &limit), 0);
-  }
   void tick(std::uint64_t n, rt::Fault fault = rt::Fault::none) {
     for (std::uint64_t i = 0; i < n; ++i) {
       sample_.tick = next_++;
@@ -60,8 +43,6 @@ class RecorderTest : public testing::Test {
     return std::move(*Recorder::create(folder_.string(), *load_scene("free"), *core_, nullptr, 1));
   }
 
-  fs::path folder_;
-  rlimit before_{};
   std::unique_ptr<rt::CoreSegment> core_ = std::make_unique<rt::CoreSegment>();
   rt::TelemetrySample sample_;
   std::uint64_t next_ = 0;

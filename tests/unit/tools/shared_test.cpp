@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/full_disk.hpp"
 #include "tools/shared/csv.hpp"
 #include "tools/shared/program_start.hpp"
 #include "tools/shared/row_file.hpp"
@@ -72,29 +73,11 @@ std::string read_all(const fs::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-// A folder, and while it is wanted no file that grows beyond some bytes: a disk that is full.
-class FilesTest : public testing::Test {
+class FilesTest : public FullDisk {
  protected:
-  void SetUp() override {
-    std::string name = (fs::temp_directory_path() / "punctum-files-XXXXXX").string();
-    ASSERT_NE(::mkdtemp(name.data()), nullptr);
-    folder_ = name;
-    start_program();
-    ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before_), 0);
-  }
-  void TearDown() override {
-    ::setrlimit(RLIMIT_FSIZE, &before_);
-    fs::remove_all(folder_);
-  }
-  void full_beyond(rlim_t bytes) const {
-    const rlimit limit{.rlim_cur = bytes, .rlim_max = before_.rlim_max};
-    ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &limit), 0);
-  }
   [[nodiscard]] std::size_t files() const {
     return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()));
   }
-  fs::path folder_;
-  rlimit before_{};
 };
 
 TEST_F(FilesTest, a_file_is_written_whole_and_nothing_lies_beside_it) {
@@ -155,7 +138,7 @@ TEST_F(FilesTest, rows_that_find_no_room_are_cut_off_at_a_line_end_and_the_failu
   rows->flush();
   EXPECT_FALSE(rows->failure().empty());
   EXPECT_EQ(read_all(file), whole);
-  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &before_), 0);
+  has_room_again();
   rows->append("later\n");
   rows->flush();
   EXPECT_EQ(read_all(file), whole) << "after a failure there are no rows: none is missing in between";

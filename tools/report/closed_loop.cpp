@@ -161,6 +161,12 @@ class Ticks {
   bool late_ = false;
 };
 
+// The part of the effect that acts, where the written force is limited in its rate: it is still there when the
+// gain has fallen already, and what the handle has put into it comes back until it has come down.
+double acting_part(const Wall::At& effect, double gain, double written_N) {
+  return effect.force_N < 0 ? std::max(gain, std::min(1.0, written_N / effect.force_N)) : gain;
+}
+
 // What an effect can give back through an amplifier that saturates: the work of its force over the way out.
 double returnable_J(const Wall& wall, const Motion::At& moved, double x_m, double gain, double force_max_N) {
   const Wall::At effect = wall.at(x_m - moved.shift_m);
@@ -215,7 +221,8 @@ LoopResult run_loop(const LoopCell& cell) {
   Ticks ticks(cell.timing, T, cell.seed);
   std::optional<rt::PassivityGuard> guard;
   if (cell.guarded) {
-    guard.emplace(rt::GuardParams{}, cell.device, estimate, cell.rate_Hz);
+    guard.emplace(rt::GuardParams{}, cell.device, estimate, cell.rate_Hz,
+                  cell.slew_N_s > 0 ? cell.slew_N_s : std::numeric_limits<double>::infinity());
   }
 
   LoopResult r;
@@ -307,7 +314,8 @@ LoopResult run_loop(const LoopCell& cell) {
     most_tick_J = std::max(most_tick_J, tick_J);
     t += dt;
     ++r.ticks;
-    stored_J = returnable_J(still, moved, handle.x_m, gain, cell.device.force_max_N);
+    const double as_written = cell.slew_N_s > 0 ? acting_part(wall(handle.x_m), gain, written_N) : gain;
+    stored_J = returnable_J(still, moved, handle.x_m, as_written, cell.device.force_max_N);
     const double beyond_J = port_J - rt::PassivityGuard::kAllowed_W * t;
     lowest_J = std::min(lowest_J, beyond_J + stored_J);
     r.net_J = std::max(r.net_J, beyond_J - lowest_J);
@@ -348,7 +356,8 @@ LoopResult run_loop(const LoopCell& cell) {
   r.surplus_J = counted_J + stored_J;
   const double count_J = 4 * cell.device.encoder_step_m * std::min(cell.device.force_max_N, push_N + 0.1);
   const double allowed_J = kEnergyPart * r.stored_max_J + count_J;
-  if (cell.motion == WallMotion::still) {
+  // A limit of the force's rate is a delay of its own, which no such part of the energy holds for.
+  if (cell.motion == WallMotion::still && cell.slew_N_s == 0) {
     r.active = !(r.surplus_J <= allowed_J);
     r.active_at_rest = !(port_J + stored_J - raised_J <= allowed_J);
   }

@@ -18,7 +18,8 @@ constexpr double kFastCompensation = 0.9;
 constexpr double kSlow_s = 0.016;
 // Of the damping that the device can render: the limit leaves out quantisation and a spring beside it.
 constexpr double kDamperShare = 0.5;
-// Dissipation counts as long as the slowest oscillation that it may belong to takes for a turn, 10 Hz.
+// Dissipation counts as long as the slowest oscillation that it may belong to takes for a turn, 10 Hz. Within
+// that the stiffness moves to what a longer period allows, a fifth less at most: without a click.
 constexpr double kForget_s = 0.1;
 // Surplus is remembered over several turns of a handle that swings to and fro between a push and a wall ...
 constexpr double kSurplusStays_s = 5;
@@ -52,8 +53,6 @@ constexpr double kPeriodReserve = 1.25;
 constexpr double kPeriodDown = 1.6;
 // ... and to the nominal one when hardly a tick is late.
 constexpr double kOnTime = 1.005;
-// The stiffness that follows from it moves within this, without a click.
-constexpr double kPeriodUp_s = 0.1;
 // Periods, halfway between one and two: the surplus of a longer interval is kept apart until it is taken.
 constexpr double kLate = 1.5;
 // The velocity is hardly known just after it: the damper aims at half as much again.
@@ -136,7 +135,7 @@ void PassivityGuard::Period::follow(double interval_s, double recover_s) NONBLOC
   } else if (mean_s_ > kPeriodUp * reserved_s_ || kPeriodDown * mean_s_ < reserved_s_) {
     reserved_s_ = kPeriodReserve * mean_s_;
   }
-  approach(kept_s_, reserved_s_, counted_s, reserved_s_ > kept_s_ ? kPeriodUp_s : recover_s);
+  approach(kept_s_, reserved_s_, counted_s, reserved_s_ > kept_s_ ? kForget_s : recover_s);
 }
 
 PassivityGuard::PassivityGuard(const GuardParams& params, const HandDevice& device,

@@ -130,7 +130,8 @@ TEST(SafetyStop, distrusts_a_drive_that_keeps_its_power_for_longer_than_its_brak
     SafetyOutput out;
     int without = 0;
     for (int k = 0; k < 1000; ++k) {
-      without += stop.step(k == 0 ? Fault::estop : Fault::none, kForce, readings, 1e-3).latch.drive_power ? 0 : 1;
+      without +=
+          stop.step(k == 0 ? Fault::estop : Fault::none, kForce, readings, 1e-3).latch.drive_power ? 0 : 1;
       readings.stage.powered = without < keeps_ms;
       out = stop.step(Fault::none, kForce, readings, 0);
     }

@@ -9,7 +9,7 @@ namespace punctum::rt {
 namespace {
 
 constexpr double kSoftHysteresis = 0.9;  // of the soft tip-force limit
-constexpr double kLongestStep = 2;  // nominal periods: a late tick is no licence for a leap
+constexpr double kLongestStep = 2;       // nominal periods: a late tick is no licence for a leap
 
 }  // namespace
 

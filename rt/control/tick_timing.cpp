@@ -23,8 +23,8 @@ TickTiming::TickTiming(const ServoConfig& config, bool degraded) NONBLOCKING
       real_actuators_(config.real_actuators),
       standing_alarms_(degraded ? alarm_degraded : 0U) {}
 
-// Three say how long it was: the period that was measured, the clock, and the place on the grid. The one between
-// the others counts: a single one that is wrong shortens no time-out and lengthens none.
+// Three say how long it was: the period that was measured, the clock, and the place on the grid. The one
+// between the others counts: a single one that is wrong shortens no time-out and lengthens none.
 double TickTiming::voted_s(const TickInfo& now, double told_s) const NONBLOCKING {
   const double clock_s = 1e-9 * static_cast<double>(now.start_ns - last_start_ns_);
   const double grid_s = nominal_s_ * static_cast<double>(now.tick - last_tick_);

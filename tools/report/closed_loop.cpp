@@ -161,8 +161,8 @@ class Ticks {
   bool late_ = false;
 };
 
-// The part of the effect that acts, where the written force is limited in its rate: it is still there when the
-// gain has fallen already, and what the handle has put into it comes back until it has come down.
+// The part of the effect that acts, where the written force is limited in its rate: it is still there when
+// the gain has fallen already, and what the handle has put into it comes back until it has come down.
 double acting_part(const Wall::At& effect, double gain, double written_N) {
   return effect.force_N < 0 ? std::max(gain, std::min(1.0, written_N / effect.force_N)) : gain;
 }

@@ -199,7 +199,7 @@ struct Bounds {
   double shortest_opening_s = 0.02;
   double brake_s = 0.03;      // v/a, and two periods of the slowest check
   double relay_s = 0.02;      // beyond the stop's own time
-  double settles_m = 11e-6;   // a stage without power: its bearings and its encoders
+  double settles_m = 13e-6;   // a stage without power: its bearings, and two ticks at 1 mm/s
   double region_m = 0.05e-6;  // the checker's balls are up to 10 um apart
   double nearer_m = 3e-6;     // a needle comes to a region per tick, by its way and its tilt
   int punctured_frames = 2;

@@ -752,9 +752,11 @@ class Invariants {
       const double stop_takes_s = b_.c.estop.power_off_after_s + b_.relay_s;
       at_most(I::relay_inputs_fresh, stage_known_ ? stage_silent_s_ - b_.c.stage_timeout_s : 0, stop_takes_s);
       at_most(I::relay_inputs_fresh, estop_silent_s_ - 0.05, stop_takes_s);
-      at_most(I::relay_stage_obeys, powered_s_, 0.1 + b_.relay_s);
-      at_most(I::relay_stage_obeys, moves_s_, 0.25 + b_.relay_s);
-      at_most(I::relay_stage_obeys, away_s_, b_.relay_s);
+      if (t.stop == StopStage::stopped) {  // a reset makes a new beginning
+        at_most(I::relay_stage_obeys, powered_s_, 0.1 + b_.relay_s);
+        at_most(I::relay_stage_obeys, moves_s_, 0.25 + b_.relay_s);
+        at_most(I::relay_stage_obeys, away_s_, b_.relay_s);
+      }
       must(I::relay_off_when_distrusted, !(t.stop == StopStage::stopped && stop_ == StopStage::stopped &&
                                            asks_for(t.fault, SafetyAction::heartbeat_off)));
     }

@@ -32,11 +32,14 @@ class DriveCheck {
     if (!stopped) {
       return;
     }
-    const bool quiet = stands_ && still_s_ >= kAtRest_s && !readings.stage.powered;
-    disobeys_s_ = quiet ? 0 : std::min(disobeys_s_ + elapsed_s, kLongest_s);
-    stood_ = stood_ || quiet;
+    const bool off = seen && !readings.stage.powered;
+    const bool at_rest = stands_ && still_s_ >= kAtRest_s;
+    powered_s_ = off ? 0 : std::min(powered_s_ + elapsed_s, kLongest_s);
+    restless_s_ = at_rest ? 0 : std::min(restless_s_ + elapsed_s, kLongest_s);
+    stood_ = stood_ || (off && at_rest);
     // Not one standstill until the power went: the quick stop has failed.
-    obeys_ = stood_ && disobeys_s_ <= kPowerOff_s && !(seen && creeps(readings.stage.tip_m));
+    obeys_ = stood_ && powered_s_ <= kPowerOff_s && restless_s_ <= kComesToRest_s &&
+             !(seen && creeps(readings.stage.tip_m));
   }
 
   // Seen to stand on this tick.
@@ -49,9 +52,11 @@ class DriveCheck {
   static constexpr double kStill_m = 1e-6;
   static constexpr double kStill_s = 0.01;
   static constexpr double kAtRest_s = 0.1;
-  // A drive without power has come to rest, says so and has been read again within this time: a CAN drive
-  // answers in a few milliseconds, a holding brake closes in up to 50, the rest is watched for kAtRest_s.
-  static constexpr double kPowerOff_s = 0.25;
+  // A drive whose power is taken says so and has been read again within this time: a CAN drive answers in a
+  // few milliseconds, and its motor holds until a holding brake has closed, up to 50.
+  static constexpr double kPowerOff_s = 0.1;
+  // By then it has settled in its bearings and was watched for kAtRest_s.
+  static constexpr double kComesToRest_s = 0.25;
   // Without power a stage settles by its backlash and by what its bearings give, less than this.
   static constexpr double kCreep_m = 10e-6;
   static constexpr double kLongest_s = 1e6;
@@ -78,7 +83,9 @@ class DriveCheck {
   bool placed_ = false;
   hal::Vec3 place_m_ = hal::Vec3::Zero();
   bool stands_ = false, stood_ = false, obeys_ = true;
-  double disobeys_s_ = 0;  // without power: since a sample that shows it at rest
+  // While its power is taken, since a sample that shows it
+  double powered_s_ = 0;   // without power
+  double restless_s_ = 0;  // at rest
   bool left_ = false;
   hal::Vec3 left_m_ = hal::Vec3::Zero();  // where the tip was when its power went
 };

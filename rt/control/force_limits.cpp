@@ -9,11 +9,7 @@ namespace punctum::rt {
 namespace {
 
 constexpr double kSoftHysteresis = 0.9;  // of the soft tip-force limit
-// No device needs to change its force faster. It is 3 N in 10 ms: a handle of 75 g that nobody holds has then
-// moved by 0.7 mm, where a leap of 3 N would have thrown it 2 mm. Injections without a fault stay below 50
-// N/s.
-constexpr double kSlew_N_s = 300;
-constexpr double kLongestStep = 2;  // nominal periods: a late tick is no licence for a leap
+constexpr double kLongestStep = 2;       // nominal periods: a late tick is no licence for a leap
 
 }  // namespace
 

@@ -18,7 +18,8 @@ constexpr double kFastCompensation = 0.9;
 constexpr double kSlow_s = 0.016;
 // Of the damping that the device can render: the limit leaves out quantisation and a spring beside it.
 constexpr double kDamperShare = 0.5;
-// Dissipation counts as long as the slowest oscillation that it may belong to takes for a turn, 10 Hz.
+// Dissipation counts as long as the slowest oscillation that it may belong to takes for a turn, 10 Hz. Within
+// that the stiffness moves to what a longer period allows, a fifth less at most: without a click.
 constexpr double kForget_s = 0.1;
 // Surplus is remembered over several turns of a handle that swings to and fro between a push and a wall ...
 constexpr double kSurplusStays_s = 5;
@@ -52,14 +53,10 @@ constexpr double kPeriodReserve = 1.25;
 constexpr double kPeriodDown = 1.6;
 // ... and to the nominal one when hardly a tick is late.
 constexpr double kOnTime = 1.005;
-// The stiffness that follows from it moves within this, without a click.
-constexpr double kPeriodUp_s = 0.1;
 // Periods, halfway between one and two: the surplus of a longer interval is kept apart until it is taken.
 constexpr double kLate = 1.5;
 // The velocity is hardly known just after it: the damper aims at half as much again.
 constexpr double kLateReserve = 1.5;
-// A force that changes more slowly, as it fades in, is not held up by a limit of its rate.
-constexpr double kSlowest_N_s = 200;
 // Of kAllowed_J: so much the handle is left; at the other end as much is kept for what is on its way.
 constexpr double kUnnoticed = 0.25;
 // Rad of lag, 35 degrees: a damper with more of it hardly damps.
@@ -138,14 +135,15 @@ void PassivityGuard::Period::follow(double interval_s, double recover_s) NONBLOC
   } else if (mean_s_ > kPeriodUp * reserved_s_ || kPeriodDown * mean_s_ < reserved_s_) {
     reserved_s_ = kPeriodReserve * mean_s_;
   }
-  approach(kept_s_, reserved_s_, counted_s, reserved_s_ > kept_s_ ? kPeriodUp_s : recover_s);
+  approach(kept_s_, reserved_s_, counted_s, reserved_s_ > kept_s_ ? kForget_s : recover_s);
 }
 
 PassivityGuard::PassivityGuard(const GuardParams& params, const HandDevice& device,
-                               const VelocityParams& velocity, double rate_Hz) NONBLOCKING
+                               const VelocityParams& velocity, double rate_Hz, double slew_N_s) NONBLOCKING
     : params_(params),
       device_(device),
       T_s_(1 / rate_Hz),
+      slew_N_s_(slew_N_s),
       own_(fast_enough(device, T_s_, params.margin* passive_stiffness_N_m(device, T_s_))),
       velocity_(own_, T_s_),
       own_stable_Ns_m_(stable_damping_Ns_m(device, T_s_, own_)),
@@ -258,8 +256,8 @@ void PassivityGuard::account(const GuardInput& in, const hal::Vec3& moved_m, con
   if (net_J_ < 0) {
     net_J_ = std::min(0.0, net_J_ + kAllowed_W * since_s_);
   }
-  // As much again, over hold and delay, is on its way already, and what a limit of the force's rate leaves.
-  const double falls_s = slowness_s_N_ * written_[newest_].passive_N.norm();
+  // As much again, over hold and delay, is on its way already, and what the force gives as it comes down.
+  const double falls_s = written_[newest_].passive_N.norm() / slew_N_s_;
   const double coming_s = sample_.kept_s() + device_.delay_ticks * tick_.kept_s() + 0.5 * falls_s;
   const double soon_J = net_J_ - std::max(given_W, 0.0) * coming_s;
   const double most = std::clamp(2 * (1 - kUnnoticed + soon_J / kAllowed_J), 0.0, 1.0);
@@ -320,7 +318,6 @@ hal::Vec3 PassivityGuard::step(const GuardInput& in) NONBLOCKING {
     velocity_.restart();
     forget_interval();
   }
-  elapsed_s_ = in.elapsed_s;
   tick_.follow(in.elapsed_s, params_.recover_s);
   since_s_ += in.elapsed_s;
   if (in.fresh) {
@@ -375,20 +372,9 @@ hal::Vec3 PassivityGuard::step(const GuardInput& in) NONBLOCKING {
 }
 
 void PassivityGuard::wrote(const hal::Vec3& force_N) NONBLOCKING {
-  const hal::Vec3 before_N = written_[newest_].passive_N + written_[newest_].active_N;
   newest_ = (newest_ + 1) % kRing;
   written_[newest_] = {};
   if (force_N.allFinite()) {
-    // More than a step behind what was asked, at the same rate twice: that is its limit.
-    const double step_N = (force_N - before_N).norm();
-    const bool behind = (asked_.passive_N + asked_.active_N - force_N).norm() > step_N;
-    const double rate_N_s = behind && step_N > kSlowest_N_s * elapsed_s_ ? step_N / elapsed_s_ : 0;
-    if (rate_N_s > 0 && std::abs(rate_N_s - rate_N_s_) < 0.01 * rate_N_s) {
-      slowness_s_N_ = 1 / rate_N_s;
-    } else {
-      approach(slowness_s_N_, 0.0, elapsed_s_, params_.recover_s);
-    }
-    rate_N_s_ = rate_N_s;
     // A limit takes the same part of both.
     const double asked_N = (asked_.passive_N + asked_.active_N).norm();
     const double written_N = force_N.norm();

@@ -32,6 +32,7 @@
 
 #include <array>
 #include <cstddef>
+#include <limits>
 
 #include "hal/devices.hpp"
 #include "hal/parameters.hpp"
@@ -69,9 +70,10 @@ class PassivityGuard {
   static constexpr double kActive_J = 1e-3;   // of active effects: 20 bursts of a vibration at its default
   static constexpr double kActive_W = 1e-3;   // and as many each second
 
-  // velocity: of the scene, the estimate that the dissipative effects get.
+  // velocity: of the scene, the estimate that the dissipative effects get. slew_N_s: a limit behind the guard
+  // lets the force change no faster.
   PassivityGuard(const GuardParams& params, const HandDevice& device, const VelocityParams& velocity,
-                 double rate_Hz) NONBLOCKING;
+                 double rate_Hz, double slew_N_s = std::numeric_limits<double>::infinity()) NONBLOCKING;
 
   // The force to render. Input that is not finite passes through as it is and changes nothing here.
   [[nodiscard]] hal::Vec3 step(const GuardInput& in) NONBLOCKING;
@@ -133,6 +135,7 @@ class PassivityGuard {
   GuardParams params_;
   HandDevice device_;
   double T_s_;
+  double slew_N_s_;
   VelocityParams own_;  // of the guard's own velocity
   Kalman velocity_;
   double own_stable_Ns_m_;
@@ -149,9 +152,6 @@ class PassivityGuard {
   std::array<Forces, kRing> written_;
   std::size_t newest_ = 0;
   Forces asked_;                           // on the last step
-  double elapsed_s_ = 0;                   // before it
-  double rate_N_s_ = 0;                    // of what was written last
-  double slowness_s_N_ = 0;                // of a limit of that rate; 0: none seen
   hal::Vec3 acted_N_ = hal::Vec3::Zero();  // mean over the samples' interval before the last
   std::array<Way, 3> way_;                 // of each coordinate
 

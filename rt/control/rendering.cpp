@@ -1,6 +1,7 @@
 #include "rt/control/rendering.hpp"
 
 #include "hal/frames.hpp"
+#include "rt/control/force_limits.hpp"
 #include "rt/station/alarm.hpp"
 
 namespace punctum::rt {
@@ -18,7 +19,7 @@ constexpr double kStiffnessKept = 0.9;  // of the commanded one; less raises an 
 Rendering::Rendering(const ServoConfig& config) NONBLOCKING : return_s_(config.mapping.coupling_s),
                                                               effects_(config, setup_of(config)) {
   if (config.guard) {
-    guard_.emplace(*config.guard, config.device, config.velocity, config.rate_Hz);
+    guard_.emplace(*config.guard, config.device, config.velocity, config.rate_Hz, ForceLimits::kSlew_N_s);
   }
 }
 

@@ -122,8 +122,7 @@ SafetyOutput Servo::latch(const TickTime& time, const Readings& readings, const 
   cause = first_of(cause, limited.fault);
   const SafetyOutput safety = safety_.step(cause, limited.hand_force_N, readings, time.elapsed_s);
   if (safety.latch.cleared) {
-    rendering_.restart();
-    stage_set_point_.anchor(readings);
+    rendering_.restart();  // the needle's path began anew on this tick already, see follow_hand
   }
   return safety;
 }

@@ -34,7 +34,7 @@ std::uint32_t StageSetPoint::follow_hand(const Readings& readings, const FollowI
     mapping_.set_position_scale(in.position_scale);
   }
   if (!holding || !mapping_.anchored() || readings.hand_begins) {
-    anchor(readings);
+    anchor(readings.hand, readings.stage.tip_m, readings.stage.axis);
     uncoupled_ = true;
     return 0;
   }
@@ -43,7 +43,7 @@ std::uint32_t StageSetPoint::follow_hand(const Readings& readings, const FollowI
   const bool way_closes_or_opens = in.constraint.withdrawal_only != last_withdrawal_only_;
   // What the hand did meanwhile is forgotten: the needle does not catch up by itself.
   if (in.elapsed_s > kLongestGap_s) {
-    anchor_at(readings.hand, limits_.set_point().tip_m, limits_.set_point().axis);
+    anchor(readings.hand, limits_.set_point().tip_m, limits_.set_point().axis);
   } else if (hand_moves_again || hand_had_a_gap || way_closes_or_opens) {
     mapping_.anchor(readings.hand, limits_.stops_at_m(), limits_.set_point().axis);
   }
@@ -80,13 +80,7 @@ std::uint32_t StageSetPoint::step(const StageConstraint& constraint, double dt_s
   return limits_.alarms();
 }
 
-void StageSetPoint::anchor(const Readings& readings) NONBLOCKING {
-  if (readings.hand_seen && readings.needle_known()) {
-    anchor_at(readings.hand, readings.stage.tip_m, readings.stage.axis);
-  }
-}
-
-void StageSetPoint::anchor_at(const hal::HandState& hand, const hal::Vec3& tip_m, const hal::Vec3& axis)
+void StageSetPoint::anchor(const hal::HandState& hand, const hal::Vec3& tip_m, const hal::Vec3& axis)
     NONBLOCKING {
   mapping_.anchor(hand, tip_m, axis);
   limits_.restart(tip_m, axis);

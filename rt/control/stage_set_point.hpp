@@ -28,14 +28,12 @@ class StageSetPoint {
  public:
   explicit StageSetPoint(const ServoConfig& config) NONBLOCKING;
 
-  // Moves hand_point_m() with the hand. Alarms of the limits that hold it.
+  // Moves hand_point_m() with the hand, once both were seen; in a stop and without power it stays at the
+  // needle, from where the motion goes on afterwards. Alarms of the limits that hold it.
   [[nodiscard]] std::uint32_t follow_hand(const Readings& readings, const FollowInput& in) NONBLOCKING;
 
   // The set-point of this tick, once hand and needle are coupled. Alarms of the limits that hold it.
   [[nodiscard]] std::uint32_t step(const StageConstraint& constraint, double dt_s) NONBLOCKING;
-
-  // From here on the hand moves the needle relative to where both are now, once both were seen.
-  void anchor(const Readings& readings) NONBLOCKING;
 
   [[nodiscard]] bool anchored() const NONBLOCKING { return mapping_.anchored(); }
   [[nodiscard]] bool uncoupled() const NONBLOCKING {
@@ -50,7 +48,8 @@ class StageSetPoint {
   [[nodiscard]] const hal::StageCommand& set_point() const NONBLOCKING { return limits_.set_point(); }
 
  private:
-  void anchor_at(const hal::HandState& hand, const hal::Vec3& tip_m, const hal::Vec3& axis) NONBLOCKING;
+  // From here on the hand moves the needle relative to where both are now.
+  void anchor(const hal::HandState& hand, const hal::Vec3& tip_m, const hal::Vec3& axis) NONBLOCKING;
 
   MasterToStage mapping_;
   StageLimits limits_;

@@ -34,12 +34,16 @@ class TickTiming {
   [[nodiscard]] TickTime step(const TickInfo& now) NONBLOCKING;
 
  private:
+  [[nodiscard]] double voted_s(const TickInfo& now, double told_s) const NONBLOCKING;
+
   double nominal_s_;
   std::uint64_t missed_limit_;
   bool real_actuators_;
   std::uint32_t standing_alarms_;
   bool stepped_ = false;
-  std::int64_t last_ns_ = 0;
+  std::int64_t last_ns_ = 0;  // as counted
+  std::uint64_t last_tick_ = 0;
+  std::int64_t last_start_ns_ = 0;
 };
 
 }  // namespace punctum::rt

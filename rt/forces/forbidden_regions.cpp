@@ -11,6 +11,7 @@ namespace {
 constexpr double kShaft_m = 10e-3;
 // Golden sections of it: 10 mm become 5 nm.
 constexpr int kSections = 30;
+constexpr double kFinest_m = 5e-9;
 constexpr double kGolden = 0.6180339887498949;
 // On the axis of the holder every direction across it is as good as another.
 constexpr double kOnAxis_m = 1e-12;
@@ -18,28 +19,46 @@ constexpr double kParallel = 1e-9;
 // A direction with more of the holder's axis in it than rounding leaves is not apart from a body without end.
 constexpr double kBackwards = 1e-9;
 
-struct FromHolder {
-  double distance_m = 0;  // of a point from its surface, < 0 inside
-  hal::Vec3 away = hal::Vec3::UnitX();
+// How far a point is behind the mouth, and how far outside the side.
+struct InHolder {
+  double behind_m = 0;
+  double r_m = 0;  // from its axis
+  double outside_m = 0;
+  hal::Vec3 across = hal::Vec3::Zero();
 };
 
-FromHolder from_holder(const HolderBodyParams& holder, const hal::Vec3& point_m) NONBLOCKING {
+InHolder in_holder(const HolderBodyParams& holder, const hal::Vec3& point_m) NONBLOCKING {
   const hal::Vec3 V = point_m - holder.mouth_m;
   const double behind_m = holder.axis.dot(V);
   const hal::Vec3 across = V - behind_m * holder.axis;
   const double r_m = across.norm();
-  const double outside_m = r_m - holder.radius_m;
-  const hal::Vec3 outwards = r_m > kOnAxis_m ? hal::Vec3(across / r_m) : hal::Vec3(-holder.axis);
-  if (outside_m <= 0 && behind_m >= 0) {
-    return outside_m > -behind_m ? FromHolder{outside_m, outwards} : FromHolder{-behind_m, -holder.axis};
+  return {behind_m, r_m, r_m - holder.radius_m, across};
+}
+
+double distance_m(const HolderBodyParams& holder, const hal::Vec3& point_m) NONBLOCKING {
+  const InHolder at = in_holder(holder, point_m);
+  if (at.outside_m <= 0 && at.behind_m >= 0) {
+    return std::max(at.outside_m, -at.behind_m);
   }
-  const double sideways_m = std::max(outside_m, 0.0);
-  const double before_m = std::max(-behind_m, 0.0);
-  const double distance_m = std::sqrt(sideways_m * sideways_m + before_m * before_m);
-  if (!(distance_m > 0)) {  // on its rim
-    return {0, -holder.axis};
+  const double sideways_m = std::max(at.outside_m, 0.0);
+  const double before_m = std::max(-at.behind_m, 0.0);
+  return std::sqrt(sideways_m * sideways_m + before_m * before_m);
+}
+
+// The direction from the holder's surface to a point.
+hal::Vec3 away_from(const HolderBodyParams& holder, const hal::Vec3& point_m) NONBLOCKING {
+  const InHolder at = in_holder(holder, point_m);
+  const hal::Vec3 outwards = at.r_m > kOnAxis_m ? hal::Vec3(at.across / at.r_m) : hal::Vec3(-holder.axis);
+  if (at.outside_m <= 0 && at.behind_m >= 0) {
+    return at.outside_m > -at.behind_m ? outwards : hal::Vec3(-holder.axis);
   }
-  return {distance_m, (sideways_m * outwards - before_m * holder.axis) / distance_m};
+  const double sideways_m = std::max(at.outside_m, 0.0);
+  const double before_m = std::max(-at.behind_m, 0.0);
+  const double off_m = std::sqrt(sideways_m * sideways_m + before_m * before_m);
+  if (!(off_m > 0)) {  // on its rim
+    return -holder.axis;
+  }
+  return (sideways_m * outwards - before_m * holder.axis) / off_m;
 }
 
 // The unit vector next to `direction` across a needle that grows thicker with this slope from its tip
@@ -85,34 +104,36 @@ hal::Vec3 ForbiddenRegions::away(Region region, const NeedlePose& needle) const 
 hal::Vec3 ForbiddenRegions::away_from_holder(const NeedlePose& needle) const NONBLOCKING {
   const HolderBodyParams& holder = *params_.holder;
   const auto gap_m = [&](double behind_m) {
-    return from_holder(holder, needle.tip_m - behind_m * needle.axis).distance_m - radius_m(behind_m);
+    return distance_m(holder, needle.tip_m - behind_m * needle.axis) - radius_m(behind_m);
   };
   double from_m = 0;
   double to_m = kShaft_m;
-  double near_m = to_m - kGolden * (to_m - from_m);
-  double far_m = from_m + kGolden * (to_m - from_m);
-  double near_gap_m = gap_m(near_m);
-  double far_gap_m = gap_m(far_m);
-  for (int i = 0; i < kSections; ++i) {
-    if (near_gap_m <= far_gap_m) {
-      to_m = far_m;
-      far_m = near_m;
-      far_gap_m = near_gap_m;
-      near_m = to_m - kGolden * (to_m - from_m);
-      near_gap_m = gap_m(near_m);
-    } else {
-      from_m = near_m;
-      near_m = far_m;
-      near_gap_m = far_gap_m;
-      far_m = from_m + kGolden * (to_m - from_m);
-      far_gap_m = gap_m(far_m);
+  if (gap_m(0) <= gap_m(kFinest_m)) {  // the tip is nearest, as for a needle that points to the holder
+    to_m = kFinest_m;
+  } else {
+    double near_m = to_m - kGolden * (to_m - from_m);
+    double far_m = from_m + kGolden * (to_m - from_m);
+    double near_gap_m = gap_m(near_m);
+    double far_gap_m = gap_m(far_m);
+    for (int i = 0; i < kSections; ++i) {
+      if (near_gap_m <= far_gap_m) {
+        to_m = far_m;
+        far_m = near_m;
+        far_gap_m = near_gap_m;
+        near_m = to_m - kGolden * (to_m - from_m);
+        near_gap_m = gap_m(near_m);
+      } else {
+        from_m = near_m;
+        near_m = far_m;
+        near_gap_m = far_gap_m;
+        far_m = from_m + kGolden * (to_m - from_m);
+        far_gap_m = gap_m(far_m);
+      }
     }
   }
   // Where a straight part of the needle is nearest, its slope and not the search fixes the direction; where
   // its side meets the holder's, both do. Of directions that may be it, the best is it.
-  const auto at = [&](double behind_m) {
-    return from_holder(holder, needle.tip_m - behind_m * needle.axis).away;
-  };
+  const auto at = [&](double behind_m) { return away_from(holder, needle.tip_m - behind_m * needle.axis); };
   hal::Vec3 best = at(0);
   double best_m = apart_m(Region::holder, best, needle);
   const auto consider = [&](const hal::Vec3& direction) {

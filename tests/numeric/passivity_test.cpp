@@ -76,6 +76,17 @@ TEST(Passivity, no_wall_that_moves_gives_the_hand_more_than_the_bound_and_it_com
   }
 }
 
+// The core's own limit of the force's rate under walls for which it is too slow.
+TEST(Passivity, a_force_that_comes_down_slowly_gives_no_more_than_the_bound_while_it_does) {
+  for (const std::uint64_t n : {3737, 5999, 13967, 15582}) {
+    const LoopCell cell = report::moving_cell(n, true);
+    ASSERT_EQ(cell.slew_N_s, 300);
+    const LoopResult r = run_loop(cell);
+    EXPECT_FALSE(r.unstable()) << "cell " << n << ": " << r.peak_to_peak_m << " m, " << r.net_J << " J";
+    EXPECT_TRUE(faithful(cell, r)) << "cell " << n << ": " << r.rendered_N_m << " of " << r.commanded_N_m;
+  }
+}
+
 // A Falcon: 1 kHz under ticks of 4 kHz.
 TEST(Passivity, a_hand_that_is_sampled_more_slowly_than_the_ticks_comes_to_rest_at_a_stiff_wall) {
   for (const int ticks : {2, 4, 8}) {

@@ -142,6 +142,7 @@ inline constexpr std::array<Draw, kLies> kDraws{{
     {Lie::stage_runs_away, 3, 1e-5, 1e-3, true, 1, 500},
     {Lie::stage_ignores_stop, 3, 1, 1, false, 10, 2000},
     {Lie::stage_ignores_power_off, 3, 1, 1, false, 10, 2000},
+    {Lie::stage_sinks, 3, 1e-5, 1e-3, true, 10, 2000},
     {Lie::stage_never_enables, 3, 1, 1, false, 10, 2000},
     {Lie::stage_drops_power, 3, 1, 1, false, 1, 300},
     {Lie::stage_never_stands, 3, 1, 1, false, 10, 2000},

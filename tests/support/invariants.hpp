@@ -199,6 +199,7 @@ struct Bounds {
   double shortest_opening_s = 0.02;
   double brake_s = 0.03;      // v/a, and two periods of the slowest check
   double relay_s = 0.02;      // beyond the stop's own time
+  double settles_m = 13e-6;   // a stage without power: its bearings, and two ticks at 1 mm/s
   double region_m = 0.05e-6;  // the checker's balls are up to 10 um apart
   double nearer_m = 3e-6;     // a needle comes to a region per tick, by its way and its tilt
   int punctured_frames = 2;
@@ -208,7 +209,9 @@ struct Bounds {
 struct Seen {
   double elapsed_s = 0;  // really, since the last tick
   std::int64_t now_ns = 0;
-  bool clock_true = true;  // the servo was told that time
+  // The servo was told that time: by its period, by the clock at the beginning of this tick and of the one
+  // before, by its number. One of them may have been wrong.
+  bool clock_true = true;
 
   // The hand. true: of the handle; false: what a lie adds to its position.
   hal::Status hand_status = hal::Status::ok;
@@ -323,7 +326,8 @@ class Invariants {
   // ---- what was told ----
   void watch_inputs(const Seen& s) {
     const double dt = s.elapsed_s;
-    // A servo that is told too short a period counts no more than that; it takes a tenth of its own at least.
+    // A servo whose clocks agree on too short a time counts no more than that; it takes a tenth of its own at
+    // least.
     told_s_ = s.clock_true ? dt : std::min(dt, 0.1 * b_.nominal_s);
     hand_silent_s_ += told_s_;
     stage_silent_s_ += told_s_;
@@ -748,14 +752,22 @@ class Invariants {
       const double stop_takes_s = b_.c.estop.power_off_after_s + b_.relay_s;
       at_most(I::relay_inputs_fresh, stage_known_ ? stage_silent_s_ - b_.c.stage_timeout_s : 0, stop_takes_s);
       at_most(I::relay_inputs_fresh, estop_silent_s_ - 0.05, stop_takes_s);
-      at_most(I::relay_stage_obeys, disobeys_s_, b_.relay_s + 0.1);
+      if (t.stop == StopStage::stopped) {  // a reset makes a new beginning
+        at_most(I::relay_stage_obeys, powered_s_, 0.1 + b_.relay_s);
+        at_most(I::relay_stage_obeys, moves_s_, 0.25 + b_.relay_s);
+        at_most(I::relay_stage_obeys, away_s_, b_.relay_s);
+      }
       must(I::relay_off_when_distrusted, !(t.stop == StopStage::stopped && stop_ == StopStage::stopped &&
                                            asks_for(t.fault, SafetyAction::heartbeat_off)));
     }
-    // The needle moves, or has power, although it was stopped and its power was taken.
-    const bool disobeys = t.stop == StopStage::stopped && stop_ == StopStage::stopped &&
-                          (s.stage_moves || (stage_new_ && stage_told_.enabled));
-    disobeys_s_ = disobeys ? disobeys_s_ + s.elapsed_s : 0;
+    // It was stopped and its power was taken: it has power, or the needle moves, or has gone away. A needle
+    // that moves where it is told to stand still can be known only by its power.
+    const bool stopped = t.stop == StopStage::stopped && stop_ == StopStage::stopped;
+    left_m_ = stopped ? left_m_ : stage_told_.tip_m;
+    const bool told_true = (stage_told_.tip_m - s.tip_true_m).norm() < 1e-6;
+    powered_s_ = stopped && stage_new_ && stage_told_.powered ? powered_s_ + s.elapsed_s : 0;
+    moves_s_ = stopped && s.stage_moves && told_true ? moves_s_ + s.elapsed_s : 0;
+    away_s_ = stopped && (stage_told_.tip_m - left_m_).norm() > b_.settles_m ? away_s_ + s.elapsed_s : 0;
     still_ticks_ = toggled || !running ? 0 : still_ticks_ + 1;
     at_most(I::relay_alive, still_ticks_, 10);
   }
@@ -859,7 +871,8 @@ class Invariants {
   bool own_press_ = false;
   int openings_ = 0;
   double open_s_ = 0, open_in_cell_s_ = 0;
-  double disobeys_s_ = 0;
+  double powered_s_ = 0, moves_s_ = 0, away_s_ = 0;
+  Vec3 left_m_ = Vec3::Zero();  // where the needle was told to be when its power went
   int still_ticks_ = 0;
   int punctured_frames_ = 0;
 };

@@ -68,6 +68,7 @@ enum class Lie : std::uint8_t {
   stage_runs_away,  // m/s along an axis
   stage_ignores_stop,
   stage_ignores_power_off,
+  stage_sinks,  // m/s along an axis, while it has no power
   stage_never_enables,
   stage_drops_power,
   stage_never_stands,
@@ -151,6 +152,7 @@ inline constexpr std::array<const char*, kLies> kLieNames{"moves",
                                                           "stage_runs_away",
                                                           "stage_ignores_stop",
                                                           "stage_ignores_power_off",
+                                                          "stage_sinks",
                                                           "stage_never_enables",
                                                           "stage_drops_power",
                                                           "stage_never_stands",
@@ -271,6 +273,7 @@ class LyingStation {
     double work_J = 0;
     std::uint32_t buttons = 0;
     hal::HandState told_hand;
+    double told_false_m = 0;  // of its position, what a lie has added
     std::array<hal::HandState, kPast> hand_past{};
     // The stage, in the frame of the picture.
     Vec3 tip{60e-6, 2e-6, 0}, target{60e-6, 2e-6, 0}, speed = Vec3::Zero();
@@ -293,6 +296,7 @@ class LyingStation {
     bool gate = false;
     int gauge = 0;
     bool ending = false;
+    bool start_lied = false;  // on the tick before
   };
   Truth truth;
 
@@ -447,6 +451,7 @@ class LyingStation {
   }
   void step_stage() {
     Truth& w = truth;
+    const Vec3 from = w.tip;
     if (on(Lie::stage_drops_power)) {
       w.on = false;
     }
@@ -456,8 +461,11 @@ class LyingStation {
     if (on(Lie::stage_runs_away) && w.on && !w.stopped) {
       w.target += dt_s_ * along(Lie::stage_runs_away);
     }
+    if (on(Lie::stage_sinks) && !w.on) {
+      w.target = w.tip += dt_s_ * along(Lie::stage_sinks);
+    }
     const Vec3 next = w.target + (w.tip - w.target) * lag_;
-    w.speed = (next - w.tip) / dt_s_;
+    w.speed = (next - from) / dt_s_;
     w.tip = next;
     hal::StageState& now = w.stage_past[w.tick % kPast];
     now = {};
@@ -468,8 +476,8 @@ class LyingStation {
     now.sample_ns = w.now;
     for (const Lie lie :
          {Lie::stage_stuck, Lie::stage_late, Lie::stage_absurd, Lie::stage_offset, Lie::stage_deaf,
-          Lie::stage_runs_away, Lie::stage_ignores_stop, Lie::stage_ignores_power_off, Lie::stage_repeats,
-          Lie::stage_every, Lie::stage_no_data, Lie::stage_never_enables}) {
+          Lie::stage_runs_away, Lie::stage_ignores_stop, Lie::stage_ignores_power_off, Lie::stage_sinks,
+          Lie::stage_repeats, Lie::stage_every, Lie::stage_no_data, Lie::stage_never_enables}) {
       w.stage_true = w.stage_true && !on(lie);
     }
     const double gap = gap_m();
@@ -587,24 +595,23 @@ class LyingStation {
   }
 
   void begin_seen(int periods) {
-    const Truth& w = truth;
+    Truth& w = truth;
     seen_ = {};
     seen_.elapsed_s = periods * dt_s_;
     seen_.now_ns = w.now;
     seen_.asked_N = w.force;
-    seen_.clock_true = !on(Lie::start_late) && !on(Lie::clock_back) && !on(Lie::period_told);
+    const bool start_lied = on(Lie::start_late) || on(Lie::clock_back);
+    seen_.clock_true = !on(Lie::period_told) || !(start_lied || w.start_lied);
+    w.start_lied = start_lied;
     seen_.hand_true_m = w.x;
     seen_.hand_work_J = w.work_J;
     seen_.tip_true_m = w.tip + registration;
     seen_.stage_true = w.stage_true;
-    seen_.stage_moves = w.speed.norm() > 5e-6;
+    seen_.stage_moves = w.speed.norm() > 15e-6;
     seen_.seen_ns = w.seen_ns;
     seen_.punctured_frames = std::exchange(punctured_frames_, 0);
     seen_.hand_hidden = on(Lie::hand_stuck);
-    seen_.hand_false_m = on(Lie::hand_glitch) ? std::abs(value(Lie::hand_glitch)) : 0;
-    if (on(Lie::hand_absurd)) {
-      seen_.hand_false_m = 1;
-    }
+    seen_.hand_false_m = on(Lie::hand_absurd) ? 1 : w.told_false_m;
     seen_.hand_status = seen_.stage_status = seen_.estop_status = hal::Status::no_data;
   }
 
@@ -634,16 +641,22 @@ class LyingStation {
       return status;
     }
     hal::HandState told = w.hand_past[place(Lie::hand_late)];
+    double false_m = 0;
     if (on(Lie::hand_glitch)) {
       told.position_m += along(Lie::hand_glitch);
+      false_m = std::abs(value(Lie::hand_glitch));
     }
     if (on(Lie::hand_repeats) || skips(Lie::hand_every)) {
       told = w.told_hand;
+      false_m = w.told_false_m;
     }
     if (on(Lie::hand_stuck)) {
       told.position_m = w.told_hand.position_m;
+      false_m = w.told_false_m;
     }
     w.told_hand = told;
+    w.told_false_m = false_m;
+    seen_.hand_false_m = on(Lie::hand_absurd) ? 1 : false_m;
     if (on(Lie::hand_nan)) {
       told.position_m.y() = std::numeric_limits<double>::quiet_NaN();
     }

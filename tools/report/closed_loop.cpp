@@ -170,6 +170,12 @@ Wall::At effect_at(const Wall& still, const Motion::At& moved, double x_m) {
   return a;
 }
 
+// The part of the effect that acts, where the written force is limited in its rate: it is still there when
+// the gain has fallen already, and what the handle has put into it comes back until it has come down.
+double acting_part(const Wall::At& effect, double gain, double written_N) {
+  return effect.force_N < 0 ? std::max(gain, std::min(1.0, written_N / effect.force_N)) : gain;
+}
+
 // What an effect can give back through an amplifier that saturates: the work of its force over the way out.
 double returnable_J(const Wall& wall, const Motion::At& moved, double x_m, double gain, double force_max_N) {
   const Wall::At effect = wall.at(x_m - moved.shift_m);
@@ -300,6 +306,7 @@ class Amplifier {
     written_N_ = force_N;
     return force_N;
   }
+  [[nodiscard]] double written_N() const { return written_N_; }
   // Of the force that was written in tick n, and those before it: what acts.
   double acting_N(std::int64_t n) {
     commands_[static_cast<std::size_t>(n % kRing)] = written_N_;
@@ -318,7 +325,8 @@ class Guarded {
  public:
   Guarded(const LoopCell& cell, const Setting& setting) : B_(setting.damping_Ns_m) {
     if (cell.guarded) {
-      guard_.emplace(rt::GuardParams{}, cell.device, setting.estimate, cell.rate_Hz);
+      const double slew_N_s = cell.slew_N_s > 0 ? cell.slew_N_s : std::numeric_limits<double>::infinity();
+      guard_.emplace(rt::GuardParams{}, cell.device, setting.estimate, cell.rate_Hz, slew_N_s);
     }
   }
   double force_N(const Wall::At& effect, const Sensed& sensed, bool fresh, double t_s, double dt_s,
@@ -446,7 +454,8 @@ void judge(const LoopCell& cell, const Setting& setting, const PortEnergy& energ
   const double count_J =
       4 * cell.device.encoder_step_m * std::min(cell.device.force_max_N, setting.push_N + 0.1);
   const double allowed_J = kEnergyPart * r.stored_max_J + count_J;
-  if (!setting.moves) {
+  // A limit of the force's rate is a delay of its own, which no such part of the energy holds for.
+  if (!setting.moves && cell.slew_N_s == 0) {
     r.active = !(r.surplus_J <= allowed_J);
     r.active_at_rest = !(energy.port_J + energy.stored_J - energy.raised_J <= allowed_J);
   }
@@ -488,8 +497,10 @@ LoopResult run_loop(const LoopCell& cell) {
     t_s += dt_s;
     ++r.ticks;
     const double x_m = handle.x_m();
-    energy.tick(applied_N * (x_m - before_m), returnable_J(still, moved, x_m, gain, cell.device.force_max_N),
-                effect_at(still, moved, x_m).energy_J, gain, t_s);
+    const Wall::At there = effect_at(still, moved, x_m);
+    const double part = cell.slew_N_s > 0 ? acting_part(there, gain, amplifier.written_N()) : gain;
+    energy.tick(applied_N * (x_m - before_m), returnable_J(still, moved, x_m, part, cell.device.force_max_N),
+                there.energy_J, gain, t_s);
 
     if (swings.tick(t_s, x_m, energy.port_J)) {
       r.rest_N = guarded.take_rest_N();

@@ -45,7 +45,10 @@ struct LoopCell {
 // active: over the seconds in which it moved so far, the port (force and true position) delivered more energy
 // than it absorbed and still stores. The surplus must exceed 5 % of the largest stored energy plus the work
 // of 4 encoder counts. active_at_rest: the same over all seconds, including those in which the encoder hardly
-// sees a motion; the energy that a returning stiffness stores is subtracted.
+// sees a motion; the energy that a returning stiffness stores is subtracted. Both where wall and rate of the
+// force have no say in it: the wall stands still, the force follows at once.
+// given: more net work than the guard allows, over any time. Stored is then what the force as written can
+// give back: one that comes down slowly is still there when its gain has fallen.
 struct LoopResult {
   bool owes = true;  // stiffness: the net account has not held it down within the last seconds
   bool moving = false, active = false, active_at_rest = false, given = false;

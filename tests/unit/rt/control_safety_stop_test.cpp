@@ -121,5 +121,23 @@ TEST(SafetyStop, finds_a_drive_that_creeps_away_without_power) {
   }
 }
 
+// A holding brake closes within 50 ms, and the motor has power until then.
+TEST(SafetyStop, distrusts_a_drive_that_keeps_its_power_for_longer_than_its_brake_needs) {
+  for (const int keeps_ms : {60, 130}) {
+    SafetyStop stop{EstopParams{}};
+    Readings readings = chain();
+    readings.has_stage = readings.stage_fresh = readings.stage.at_standstill = true;
+    SafetyOutput out;
+    int without = 0;
+    for (int k = 0; k < 1000; ++k) {
+      without +=
+          stop.step(k == 0 ? Fault::estop : Fault::none, kForce, readings, 1e-3).latch.drive_power ? 0 : 1;
+      readings.stage.powered = without < keeps_ms;
+      out = stop.step(Fault::none, kForce, readings, 0);
+    }
+    EXPECT_EQ(out.latch.heartbeat, keeps_ms == 60) << keeps_ms;
+  }
+}
+
 }  // namespace
 }  // namespace punctum::rt

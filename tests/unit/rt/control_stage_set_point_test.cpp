@@ -56,8 +56,6 @@ TEST(StageSetPoint, waits_until_hand_and_needle_were_both_seen) {
   for (const bool hand : {true, false}) {
     Path p;
     (hand ? p.readings.hand_seen : p.readings.stage_seen) = false;
-    p.path.anchor(p.readings);
-    EXPECT_FALSE(p.path.anchored());
     (void)p.path.follow_hand(p.readings, p.in);
     EXPECT_FALSE(p.path.anchored());
     EXPECT_EQ(p.path.step(p.in.constraint, 1e-3), 0U);

@@ -79,6 +79,9 @@ std::string run_sentence(const Json& facts) {
   if (asked && given && *asked > 0) {
     s += fmt::format(" The injector was open in the cell for {:.2f} s of {:.2f} s asked.", *given, *asked);
   }
+  if (dose.is_object() && !given) {
+    s += " How much the cell was given is not known.";
+  }
   return s;
 }
 

@@ -69,8 +69,8 @@ TEST_F(Programs, a_result_that_cannot_be_written_is_no_success) {
 }
 
 TEST_F(Programs, a_pipe_that_nobody_reads_any_more_ends_no_run) {
-  const std::string run = program("punctum") +
-                          " run free --clock virtual --seconds 1 --no-figure --report " + report() + " 2>&1";
+  const std::string run =
+      program("punctum") + " run free --clock virtual --seconds 1 --no-figure --report " + report() + " 2>&1";
   EXPECT_EQ(shell("(sleep 0.5; " + run + ") | true; exit ${PIPESTATUS[0]}"), 0);
   EXPECT_EQ(json()["outcome"], "done");
 }

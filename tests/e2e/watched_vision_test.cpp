@@ -136,7 +136,8 @@ TEST_F(Programs, recorded_frames_that_end_while_a_fault_is_latched_end_the_run_w
   fs::create_directory(frames);
   for (int i = 0; i < 20; ++i) {
     std::ofstream(frames / (std::to_string(1000 + i) + ".pgm"), std::ios::binary)
-        << "P5 320 240 255\n" << std::string(std::size_t{320} * 240, static_cast<char>(120 + i));
+        << "P5 320 240 255\n"
+        << std::string(std::size_t{320} * 240, static_cast<char>(120 + i));
   }
   constexpr double kLimit_s = 30;  // a reset would be waited for until then
   EXPECT_EQ(punctum({"run", "recorded", "--seconds", std::to_string(kLimit_s), "--set",

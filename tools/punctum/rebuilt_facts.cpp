@@ -209,28 +209,12 @@ Json rebuilt_facts(const std::string& folder) {
     }
   }
   // Nobody is left to ask.
-  for (const char* unknown : {"wall_s",
-                              "missed",
-                              "ticks",
-                              "worst_lateness_us",
-                              "wake_us",
-                              "tick_us",
-                              "slots_us",
-                              "page_faults",
-                              "switches",
-                              "allocations",
-                              "degraded",
-                              "rights",
-                              "cells",
-                              "observations",
-                              "stale_s",
-                              "without_vision_s",
-                              "commands_refused",
-                              "wake_histogram",
-                              "tick_histogram",
-                              "tremor_ratio",
-                              "tremor_hand_um",
-                              "tremor_tip_um"}) {
+  for (const char* unknown :
+       {"wall_s",           "missed",           "ticks",          "worst_lateness_us", "wake_us",
+        "tick_us",          "slots_us",         "page_faults",    "switches",          "allocations",
+        "degraded",         "rights",           "cells",          "observations",      "stale_s",
+        "without_vision_s", "commands_refused", "wake_histogram", "tick_histogram",    "tremor_ratio",
+        "tremor_hand_um",   "tremor_tip_um"}) {
     j[unknown] = nullptr;
   }
   j["cell_list"] = Json::array();

@@ -282,18 +282,17 @@ std::string measures_html(const Json& facts) {
                  : " (known from: " + text_in(needle, "known_from") + ")"));
   const Json& dose = fact(facts, "dose");
   const bool told = text_in(dose, "known_from") == "injector";
-  f.row("dose", dose.is_object() ? fmt::format("{} given of {} asked{}", known(number_in(dose, "given_s"), "s"),
-                                               known(number_in(dose, "asked_s"), "s"),
-                                               told ? " (known from: injector)" : "")
-                                 : std::string());
+  f.row("dose",
+        dose.is_object()
+            ? fmt::format("{} given of {} asked{}", known(number_in(dose, "given_s"), "s"),
+                          known(number_in(dose, "asked_s"), "s"), told ? " (known from: injector)" : "")
+            : std::string());
   const Json& cells = fact(facts, "cells");
   if (number_in(cells, "tried").value_or(0) > 0) {
     f.row("cells", fmt::format("{} done, {} lost, {} tried", whole(number_in(cells, "done")),
                                whole(number_in(cells, "lost")), whole(number_in(cells, "tried"))));
     const auto delay = [&](const char* name, const char* what) {
-      return n(name)   ? after_or_before(n(name), what)
-             : rebuilt ? "unknown"
-                       : std::string();
+      return n(name) ? after_or_before(n(name), what) : rebuilt ? "unknown" : std::string();
     };
     f.row("contact told", delay("contact_delay_ms", "the needle touched"));
     f.row("puncture told", delay("puncture_delay_ms", "the membrane gave way"));

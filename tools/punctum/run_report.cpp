@@ -116,9 +116,10 @@ std::optional<ContourError> read_contour_error(const std::string& obs_csv) {
 
 std::string fault_text(rt::Fault fault, double t_s, bool coloured) {
   const FaultAdvice& advice = kFaultAdvice[static_cast<std::size_t>(fault)];
-  return fmt::format("{}\n  cause:       {}\n  what to do:  {}\n  cleared:     {}",
-                     painted(Colour::bad, fmt::format("FAULT {} at {:.3f} s", rt::name(fault), t_s), coloured),
-                     advice.cause, advice.next, clearing_condition(fault));
+  return fmt::format(
+      "{}\n  cause:       {}\n  what to do:  {}\n  cleared:     {}",
+      painted(Colour::bad, fmt::format("FAULT {} at {:.3f} s", rt::name(fault), t_s), coloured), advice.cause,
+      advice.next, clearing_condition(fault));
 }
 
 std::string missing_rights(const rt::CoreStatus& core) {

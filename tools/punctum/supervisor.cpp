@@ -384,7 +384,8 @@ void Run::watch_vision() {
       stop_signal::request();
       break;
   }
-  // A core that has stopped waits for a reset, and for no end. Without pictures there is nothing to go on for.
+  // A core that has stopped waits for a reset, and for no end. Without pictures there is nothing to go on
+  // for.
   if (frames_are_over_ && !stop_for_good_ && status().fault.load() != 0) {
     stop_for_good_ = true;
     core_.ask(rt::Command::stop);

@@ -106,7 +106,7 @@ std::size_t hanging_indent(std::string_view line) {
   constexpr std::size_t kWidestTitle = 24;
   const std::size_t first = std::min(line.find_first_not_of(' '), line.size());
   const std::size_t gap = line.find("  ", first);
-  if (gap == std::string_view::npos || gap > kWidestTitle) {
+  if (gap > kWidestTitle) {  // or there is none
     return first + 2;
   }
   return std::min(line.find_first_not_of(' ', gap), line.size());

@@ -312,10 +312,10 @@ class RecordedInjection {
                                                        : "clear";
       const bool pressed = tick >= kAsked && tick < kLetGo, open = tick >= kOpen && tick < kShut;
       if (tick % every == 0 || phase != last_phase) {
-        all += fmt::format("{:.6f},{},0,0,0.1,none,0,0,{},{:d},0,1e-06,{},{:d},{:d},0\n", tick * 1e-3, phase,
-                           pressed ? static_cast<unsigned>(hal::kButtonInject) : 0U, open,
-                           tick < kContact ? 1e-6 : -1e-6, tick >= kContact && tick < kOut,
-                           tick >= kPuncture);
+        all +=
+            fmt::format("{:.6f},{},0,0,0.1,none,0,0,{},{:d},0,1e-06,{},{:d},{:d},0\n", tick * 1e-3, phase,
+                        pressed ? static_cast<unsigned>(hal::kButtonInject) : 0U, open,
+                        tick < kContact ? 1e-6 : -1e-6, tick >= kContact && tick < kOut, tick >= kPuncture);
       }
       last_phase = phase;
     }
@@ -359,7 +359,8 @@ TEST(Rebuilt, a_dose_that_no_row_tells_is_unknown_and_not_zero) {
   folder.put("samples.csv", "t_s,phase,fz_N,fault\n0.000,injection,0,none\n0.001,injection,0,none\n");
   const Json facts = rebuilt_facts(folder.path());
   EXPECT_TRUE(facts["dose"]["given_s"].is_null());
-  EXPECT_TRUE(contains(run_sentence(facts), "How much the cell was given is not known")) << run_sentence(facts);
+  EXPECT_TRUE(contains(run_sentence(facts), "How much the cell was given is not known"))
+      << run_sentence(facts);
   EXPECT_TRUE(contains(run_page(folder.path(), facts, ""), "unknown given of unknown asked"));
 }
 

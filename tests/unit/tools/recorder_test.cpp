@@ -97,9 +97,11 @@ TEST_F(RecorderTest, samples_that_were_overwritten_before_they_were_read_are_cou
 TEST_F(RecorderTest, every_column_holds_what_it_is_called_after) {
   Recorder r = recorder();
   double n = 0;
-  const auto fill = [&n](auto&... numbers) { ((numbers = static_cast<std::decay_t<decltype(numbers)>>(++n)), ...); };
+  const auto fill = [&n](auto&... numbers) {
+    ((numbers = static_cast<std::decay_t<decltype(numbers)>>(++n)), ...);
+  };
   rt::TelemetrySample& s = sample_;
-  for (double(*three)[3] : {&s.x_m, &s.v_m_s, &s.tip_m, &s.cmd_m, &s.force_N}) {
+  for (double (*three)[3] : {&s.x_m, &s.v_m_s, &s.tip_m, &s.cmd_m, &s.force_N}) {
     fill((*three)[0], (*three)[1], (*three)[2]);
   }
   for (double& effect : s.effect_N) {
@@ -119,28 +121,27 @@ TEST_F(RecorderTest, every_column_holds_what_it_is_called_after) {
   r.finish();
   CsvReader row(folder_ / "samples.csv");
   ASSERT_TRUE(row.next());
-  std::vector<std::pair<std::string, double>> wanted{
-      {"t_s", s.t_s},
-      {"guard_N", s.guard_N},
-      {"wd_m", s.wd_m},
-      {"a_m", s.a_m},
-      {"R_m", s.R_m},
-      {"obs_age_s", s.obs_age_s},
-      {"estop", s.estop},
-      {"cell", s.cell},
-      {"alarms", s.alarms},
-      {"buttons", s.buttons},
-      {"stop", 1},
-      {"tip_force_N", s.tip_force_N},
-      {"sigma_d_Pa", s.sigma_d_Pa},
-      {"pressure_Pa", s.pressure_Pa},
-      {"obs_gap_m", s.obs_gap_m},
-      {"stored_energy_J", s.stored_energy_J},
-      {"injected_energy_J", s.injected_energy_J},
-      {"injector_open", 1},
-      {"sensor_N", s.sensor_N},
-      {"vacuum_Pa", s.vacuum_Pa}};
-  const auto vector = [&wanted](const std::string& name, const std::string& unit, const double(&v)[3]) {
+  std::vector<std::pair<std::string, double>> wanted{{"t_s", s.t_s},
+                                                     {"guard_N", s.guard_N},
+                                                     {"wd_m", s.wd_m},
+                                                     {"a_m", s.a_m},
+                                                     {"R_m", s.R_m},
+                                                     {"obs_age_s", s.obs_age_s},
+                                                     {"estop", s.estop},
+                                                     {"cell", s.cell},
+                                                     {"alarms", s.alarms},
+                                                     {"buttons", s.buttons},
+                                                     {"stop", 1},
+                                                     {"tip_force_N", s.tip_force_N},
+                                                     {"sigma_d_Pa", s.sigma_d_Pa},
+                                                     {"pressure_Pa", s.pressure_Pa},
+                                                     {"obs_gap_m", s.obs_gap_m},
+                                                     {"stored_energy_J", s.stored_energy_J},
+                                                     {"injected_energy_J", s.injected_energy_J},
+                                                     {"injector_open", 1},
+                                                     {"sensor_N", s.sensor_N},
+                                                     {"vacuum_Pa", s.vacuum_Pa}};
+  const auto vector = [&wanted](const std::string& name, const std::string& unit, const double (&v)[3]) {
     for (int i = 0; i < 3; ++i) {
       wanted.emplace_back(name + "xyz"[i] + unit, v[i]);
     }
@@ -320,7 +321,7 @@ TEST_F(RecorderTest, a_report_that_is_replaced_takes_no_file_of_anybody_else_wit
   put(old / "fault.csv", "of the old run");
   put(old / "samples.csv", "of the old run");
   put(old / "frames" / "000012.jpg", "of the old run");
-  put(old / "frames" / "mine.jpg", "somebody's");
+  put(old / "frames" / "of_mine.jpg", "somebody's");
   put(old / "notes.txt", "somebody's");
   const auto fresh = prepare_report_folder(scene, old.string(), true);
   ASSERT_TRUE(fresh) << fresh.error();
@@ -335,7 +336,7 @@ TEST_F(RecorderTest, a_report_that_is_replaced_takes_no_file_of_anybody_else_wit
   EXPECT_TRUE(fs::exists(old / "frames" / "000007.jpg"));
   EXPECT_FALSE(fs::exists(old / "fault.csv"));
   EXPECT_FALSE(fs::exists(old / "frames" / "000012.jpg"));
-  EXPECT_TRUE(fs::exists(old / "frames" / "mine.jpg"));
+  EXPECT_TRUE(fs::exists(old / "frames" / "of_mine.jpg"));
   EXPECT_TRUE(fs::exists(old / "notes.txt"));
   EXPECT_FALSE(fs::exists(fresh->folder));
 }

@@ -144,13 +144,14 @@ TEST_F(FilesTest, rows_are_written_in_order_and_continued) {
 
 TEST_F(FilesTest, rows_that_find_no_room_are_cut_off_at_a_line_end_and_the_failure_is_told) {
   const std::string file = folder_ / "samples.csv";
-  full_beyond(100);
+  constexpr std::size_t kRoom = 105;  // in the middle of a row
+  full_beyond(kRoom);
   auto rows = RowFile::open(file, RowFile::Begin::empty);
   ASSERT_TRUE(rows);
   std::string whole;
   for (int i = 0; i < 20; ++i) {
     const std::string row = "row " + std::to_string(i) + ",abc\n";
-    if (whole.size() + row.size() <= 100) {
+    if (whole.size() + row.size() <= kRoom) {
       whole += row;
     }
     rows->append(row);

@@ -179,6 +179,14 @@ TEST(Sentence, every_end_has_its_own) {
   EXPECT_TRUE(contains(run_sentence({{"outcome", "unknown"}}), "not known"));
 }
 
+TEST(Sentence, counts_no_cells_where_nobody_counted_them) {
+  const auto sentence = [](const Json& cells) {
+    return run_sentence({{"outcome", "done"}, {"seconds", 5}, {"cells", cells}});
+  };
+  EXPECT_TRUE(contains(sentence({{"tried", 1}, {"done", 1}}), "1 of 1 cells"));
+  EXPECT_FALSE(contains(sentence({{"tried", 1}, {"done", nullptr}}), "0 of 1"));
+}
+
 TEST(Sentence, says_where_the_needle_is_and_what_was_given) {
   const std::string s =
       run_sentence({{"outcome", "stopped"},

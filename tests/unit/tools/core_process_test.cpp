@@ -28,7 +28,7 @@ class CoreProcessTest : public testing::Test {
     folder_ = name;
     // Programs are looked for beside this one, then in PATH.
     std::ofstream(folder_ / "punctum-core")
-        << "#!/bin/sh\ntrap 'echo asked' TERM\necho up\nwhile :; do sleep 0.02; done\n";
+        << "#!/bin/sh\ntrap 'echo asked' TERM\necho up\nfor i in $(seq 6000); do sleep 0.02; done\n";
     fs::permissions(folder_ / "punctum-core", fs::perms::owner_all);
     setenv("PATH", (folder_.string() + ":" + getenv("PATH")).c_str(), 1);
     ASSERT_TRUE(core_.start({}, (folder_ / "log").string(), {}));

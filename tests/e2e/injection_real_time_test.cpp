@@ -186,6 +186,26 @@ TEST_F(Programs, frames_that_show_nothing_most_of_the_time_are_no_run_that_is_do
   EXPECT_EQ(r["vision_restarts"].size(), 0U) << "frames that cannot be read are no vision that hangs";
 }
 
+TEST_F(Programs, recorded_frames_that_end_while_a_fault_is_latched_end_the_run_with_the_fault) {
+  const fs::path frames = folder_ / "frames";
+  fs::create_directory(frames);
+  for (int i = 0; i < 20; ++i) {
+    std::ofstream(frames / (std::to_string(1000 + i) + ".pgm"), std::ios::binary)
+        << "P5 320 240 255\n"
+        << std::string(std::size_t{320} * 240, static_cast<char>(120 + i));
+  }
+  constexpr double kLimit_s = 30;  // a reset would be waited for until then
+  EXPECT_EQ(punctum({"run", "recorded", "--seconds", std::to_string(kLimit_s), "--set",
+                     "camera.frames=" + frames.string(), "--set", "camera.fps=20", "--set", kPatientRelay,
+                     "--set", "sim.failure=[{device=\"haptic\", kind=\"disconnect\", at_s=0.3}]"}),
+            3)
+      << said_;
+  const auto r = json();
+  EXPECT_EQ(r["outcome"], "fault") << said_;
+  EXPECT_EQ(r["outcome_detail"], "hand_lost") << said_;
+  EXPECT_LT(r["seconds"].get<double>(), kLimit_s) << said_;
+}
+
 TEST_F(Programs, ctrl_c_tells_that_the_needle_is_still_inside_the_cell) {
   Running run({"run", "icsi", "--set", "vision.method=truth", "--set", kPatientRelay, "--report", report(),
                "--no-figure", "--no-frames"},

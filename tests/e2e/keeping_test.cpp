@@ -67,6 +67,13 @@ TEST_F(Programs, a_result_that_cannot_be_written_is_no_success) {
   }
 }
 
+TEST_F(Programs, a_pipe_that_nobody_reads_any_more_ends_no_run) {
+  const std::string run =
+      program("punctum") + " run free --clock virtual --seconds 1 --no-figure --report " + report() + " 2>&1";
+  EXPECT_EQ(shell("(sleep 0.5; " + run + ") | true; exit ${PIPESTATUS[0]}"), 0);
+  EXPECT_EQ(json()["outcome"], "done");
+}
+
 TEST_F(Programs, a_title_gives_the_terminal_no_orders) {
   ASSERT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "0.1", "--set",
                      R"(scene.title="a\u001b]0;owned\u0007 \u001b[31mred\u009b2J")"}),

@@ -61,7 +61,7 @@ TEST_F(LabReport, a_run_leaves_one_page_with_all_that_a_lab_asks) {
   EXPECT_EQ(ticks, r["ticks"].get<double>());
   EXPECT_TRUE(contains(left("figure.svg"), "fault: estop"));
   // What a terminal is told of the fault.
-  EXPECT_TRUE(contains(said_, "what to do: turn the pressed button")) << said_;
+  EXPECT_TRUE(contains(said_, "what to do:  turn the pressed button")) << said_;
   EXPECT_TRUE(contains(said_, "cleared:")) << said_;
   EXPECT_FALSE(contains(said_, "\033")) << "colour into a pipe";
 }

@@ -394,6 +394,39 @@ TEST_F(Survive, garbage_in_every_segment_ends_no_reader_in_disorder) {
   std::printf("exit codes 0: %d, 1: %d, 3: %d\n", codes[0], codes[1], codes[3]);
 }
 
+// ---- a recording that goes silent ----
+
+TEST_F(Survive, samples_that_stop_coming_while_the_core_ticks_are_told_at_once_and_in_the_report) {
+  Program run(kPunctum, free_run({"--seconds", "60"}), words());
+  Look look("free", run.pid());
+  ASSERT_TRUE(look.until_started()) << said();
+  const int fd = taken_from(run.pid(), segments_of(run.pid(), "free")["core"]);
+  void* data = mmap(nullptr, sizeof(rt::CoreSegment), PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
+  close(fd);
+  if (data == MAP_FAILED) {
+    run.send(SIGKILL);
+    GTEST_SKIP() << "this machine lets no process take a descriptor from its child";
+  }
+  // The ring's counter, its first word, leaps by a thousand rounds and one: what the recorder waits for comes
+  // no more, until the core has gone round the whole ring, 8 s.
+  auto& counter = *reinterpret_cast<hal::Word*>(&static_cast<rt::CoreSegment*>(data)->telemetry);
+  constexpr std::uint64_t kLeap = 1000 * rt::TelemetryRing::kSize + 1;
+  while (counter.load() < kLeap && alive(run.pid())) {  // again where the core wrote it at the same time
+    counter.store(counter.load() + kLeap);
+    std::this_thread::sleep_for(10ms);
+  }
+  munmap(data, sizeof(rt::CoreSegment));
+  for (int i = 0; i < 2000 && said().find("the recording has a gap from") == std::string::npos; ++i) {
+    std::this_thread::sleep_for(10ms);
+  }
+  EXPECT_NE(said().find("the recording has a gap from"), std::string::npos) << said();
+  run.send(SIGINT);
+  EXPECT_EQ(run.wait(), 1) << said();
+  EXPECT_EQ(json()["outcome"], "done");
+  EXPECT_TRUE(json()["samples"].contains("silent_from_s"));
+  EXPECT_NE(said().find("no samples came from"), std::string::npos) << said();
+}
+
 // ---- kills and stops ----
 
 struct Attack {

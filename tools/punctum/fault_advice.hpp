@@ -28,8 +28,11 @@ inline constexpr auto kFaultAdvice = [] {
       {hand_invalid, "the handle reports positions that no hand can reach in the time",
        "check the handle's cable and calibrate it again"},
       {stage_lost, "the micromanipulator is silent or disconnected", "check its cable and power"},
-      {stage_fault, "the micromanipulator's drive reports a fault of its own",
-       "read the drive's error code and remove its cause"},
+      {stage_fault,
+       "the micromanipulator's drive reports a fault of its own, or it has lost its power: the relay that "
+       "watches the core's heartbeat has opened, for example since the control loop stalled",
+       "read the drive's error code and remove its cause; where it has none, press the reset button, which "
+       "closes the relay, and look into the report for late ticks"},
       {stage_following, "the needle does not follow the set-point: it is blocked, or the drive is weak",
        "look at the needle under the microscope before anything moves; remove what blocks it"},
       {tip_force, "the force at the needle's tip is above its hard limit",

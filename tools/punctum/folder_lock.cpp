@@ -47,8 +47,8 @@ tl::expected<FolderLock, std::string> FolderLock::take(const std::string& folder
     failed = flock(lock.folder_.number(), LOCK_EX | LOCK_NB);
   } while (failed != 0 && errno == EINTR);
   if (failed != 0 && errno == EWOULDBLOCK) {
-    return tl::unexpected(fmt::format(
-        "{}: another run writes its report there ({}), allowed: another --report", folder, holder_of(file)));
+    return tl::unexpected(
+        fmt::format("{}: another run writes its report there ({})", folder, holder_of(file)));
   }
   if (failed != 0) {
     lock.not_held_ = fmt::format("{}: its file system cannot lock a folder ({}); start no other run into it",

@@ -13,11 +13,13 @@
 #include <utility>
 
 #include "tools/punctum/facts.hpp"
+#include "tools/punctum/folder_lock.hpp"
 #include "tools/punctum/provenance.hpp"
 #include "tools/punctum/rebuilt_facts.hpp"
 #include "tools/punctum/run_figure.hpp"
 #include "tools/punctum/run_page.hpp"
 #include "tools/punctum/run_sentence.hpp"
+#include "tools/punctum/terminal.hpp"
 #include "tools/shared/exit_codes.hpp"
 #include "tools/shared/say.hpp"
 #include "tools/shared/whole_file.hpp"
@@ -94,6 +96,12 @@ int report_folders(const std::vector<std::string>& folders, const std::string& o
           fmt::format("{}: no report of a run, allowed: a folder with samples.csv or report.json", folder));
       return exit_bad_input;
     }
+    // Nor does a run take this folder's place while its page is made.
+    const auto lock = FolderLock::take(path.string());
+    if (!lock) {
+      complain(lock.error() + "; its report comes with its end, and samples.csv can be read meanwhile");
+      return exit_bad_input;
+    }
     Json facts = read_json(path / "report.json");
     if (facts.is_null()) {
       facts = whole_facts(read_json(path / kBegun), rebuilt_facts(path.string()));
@@ -108,8 +116,8 @@ int report_folders(const std::vector<std::string>& folders, const std::string& o
       complain(written.error());
       return exit_not_done;
     }
-    say(fmt::format("{}: {}\n{}\n", (path / "report.html").string(), text_in(facts, "outcome"),
-                    run_sentence(facts)));
+    Terminal().say("{}: {}\n{}", (path / "report.html").string(), text_in(facts, "outcome"),
+                   run_sentence(facts));
     const fs::path named = path.has_filename() ? path : path.parent_path();
     runs.push_back({named.filename().string(), std::move(facts), std::move(chart)});
   }

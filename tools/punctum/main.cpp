@@ -11,6 +11,7 @@
 #include "tools/punctum/explain.hpp"
 #include "tools/punctum/lab_report.hpp"
 #include "tools/punctum/supervisor.hpp"
+#include "tools/punctum/terminal.hpp"
 #include "tools/scene/scene.hpp"
 #include "tools/shared/command_line.hpp"
 #include "tools/shared/exit_codes.hpp"
@@ -151,13 +152,13 @@ int main_or_throw(int argc, char** argv) {
   }
 
   if (*explaining) {
-    say(keys ? explain_keys(*scene) : explain(*scene));
+    Terminal().print(keys ? explain_keys(*scene) : explain(*scene));
     return all_was_said() ? exit_done : exit_not_done;
   }
   if (*checking) {
     std::string text;
     const int code = check(*scene, text);
-    say(text);
+    Terminal().print(text);
     return code == exit_done && !all_was_said() ? exit_not_done : code;
   }
   if (const auto files = files_of(*scene); !files) {

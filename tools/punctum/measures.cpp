@@ -159,6 +159,9 @@ void Measures::change_phase(const rt::TelemetrySample& s) {
 }
 
 void Measures::tick(const rt::TelemetrySample& s, const sim::Snapshot* world) {
+  // Ticks without a sample, missed or recorded thinly, count as the one that follows them.
+  const double since_last_s =
+      any_ && s.tick > last.tick ? static_cast<double>(s.tick - last.tick) * period_s_ : period_s_;
   if (any_) {
     see_changes(s);
   } else {
@@ -172,8 +175,8 @@ void Measures::tick(const rt::TelemetrySample& s, const sim::Snapshot* world) {
   }
   if (has_injector_ && has_phases_ && !sim_.cell) {  // nobody knows better than the core
     const bool inside = s.phase == rt::Phase::puncture || s.phase == rt::Phase::injection;
-    now_.asked_s += inside && (s.buttons & hal::kButtonInject) != 0 ? period_s_ : 0;
-    now_.injected_s = now_.injected_s.value_or(0) + (inside && s.injector_open != 0 ? period_s_ : 0);
+    now_.asked_s += inside && (s.buttons & hal::kButtonInject) != 0 ? since_last_s : 0;
+    now_.injected_s = now_.injected_s.value_or(0) + (inside && s.injector_open != 0 ? since_last_s : 0);
   }
   count_vision(s);
   const double hand_N = norm(s.force_N);

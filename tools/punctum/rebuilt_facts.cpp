@@ -108,6 +108,58 @@ struct Truth {
   }
 };
 
+// How late the core's phases told of contact and puncture, as Measures has it. Rows may be some ticks apart:
+// what came about between two of them came at a time that is not known.
+struct Delays {
+  Spread contact_s, inner_s;
+  struct OfCell {
+    std::optional<double> contact_s, puncture_s, told_contact_s, told_puncture_s;
+    bool in_contact = false, punctured = false, counted = false;
+  } now;
+  rt::TelemetrySample last;
+  bool any = false;
+
+  void take(const rt::TelemetrySample& s, bool contact, bool punctured) {
+    const bool none_missing = any && s.tick == last.tick + 1;
+    if (any && s.cell != last.cell) {
+      now = {};
+    }
+    if (any && s.phase == rt::Phase::contact && last.phase == rt::Phase::free) {
+      now.told_contact_s = s.t_s;
+    }
+    if (s.phase == rt::Phase::puncture && !now.told_puncture_s) {
+      now.told_puncture_s = s.t_s;
+    }
+    if (contact && !now.in_contact) {
+      now.contact_s = none_missing ? std::optional(s.t_s) : std::nullopt;
+    }
+    now.in_contact = contact;
+    if (punctured && !now.punctured) {
+      now.punctured = true;
+      now.puncture_s = none_missing ? std::optional(s.t_s) : std::nullopt;
+      if (now.contact_s && now.told_contact_s) {
+        contact_s.add(*now.told_contact_s - *now.contact_s);
+      }
+    }
+    if (now.puncture_s && now.told_puncture_s && !now.counted) {
+      now.counted = true;
+      inner_s.add(*now.told_puncture_s - *now.puncture_s);
+    }
+    last = s;
+    any = true;
+  }
+};
+
+// As the core and the injector told it: what came out of it is in no row.
+Json told_dose(const Measures& measures, bool is_known) {
+  const auto known = [is_known](double s) { return is_known ? Json(s) : Json(nullptr); };
+  return {{"asked_s", known(measures.asked_s)},
+          {"given_s", known(measures.injected_s)},
+          {"known_from", is_known ? "injector" : "nobody"}};
+}
+
+Json mean_ms(const Spread& s) { return s.n > 0 ? Json(s.mean * 1e3) : Json(nullptr); }
+
 }  // namespace
 
 Json rebuilt_facts(const std::string& folder) {
@@ -116,14 +168,22 @@ Json rebuilt_facts(const std::string& folder) {
   if (!loaded) {
     scene.name = std::filesystem::path(folder).filename().string();
   }
-  Measures measures(scene);
+  Scene without_truth = scene;  // a dose that the simulated world knows is in no row
+  if (without_truth.sim) {
+    without_truth.sim->cell.reset();
+  }
+  Measures measures(without_truth);
   Truth truth;
+  Delays delays;
   CsvReader row(folder + "/samples.csv");
   std::uint64_t rows = 0, cut_off = 0;
   while (row.next()) {
     if (const auto sample = sample_of(row, scene.servo.rate_Hz)) {
       measures.tick(*sample, nullptr);
       truth.take(row, *sample);
+      if (truth.any) {
+        delays.take(*sample, truth.contact, truth.punctured);
+      }
       ++rows;
     } else {
       ++cut_off;
@@ -149,32 +209,23 @@ Json rebuilt_facts(const std::string& folder) {
     }
   }
   // Nobody is left to ask.
-  for (const char* unknown : {"wall_s",
-                              "missed",
-                              "ticks",
-                              "worst_lateness_us",
-                              "wake_us",
-                              "tick_us",
-                              "slots_us",
-                              "page_faults",
-                              "switches",
-                              "allocations",
-                              "degraded",
-                              "rights",
-                              "dose",
-                              "cells",
-                              "observations",
-                              "stale_s",
-                              "without_vision_s",
-                              "commands_refused",
-                              "wake_histogram",
-                              "tick_histogram",
-                              "tremor_ratio",
-                              "tremor_hand_um",
-                              "tremor_tip_um"}) {
+  for (const char* unknown :
+       {"wall_s",           "missed",           "ticks",          "worst_lateness_us", "wake_us",
+        "tick_us",          "slots_us",         "page_faults",    "switches",          "allocations",
+        "degraded",         "rights",           "cells",          "observations",      "stale_s",
+        "without_vision_s", "commands_refused", "wake_histogram", "tick_histogram",    "tremor_ratio",
+        "tremor_hand_um",   "tremor_tip_um"}) {
     j[unknown] = nullptr;
   }
   j["cell_list"] = Json::array();
+  if (scene.servo.injector) {
+    j["dose"] = told_dose(measures, rows > 0 && row.has("injector_open") && row.has("buttons"));
+  }
+  // Of two membranes the rows tell when the inner one gave way.
+  const bool inner = scene.sim && scene.sim->cell && scene.sim->cell->inner;
+  j["contact_delay_ms"] = mean_ms(delays.contact_s);
+  j["puncture_delay_ms"] = inner ? Json(nullptr) : mean_ms(delays.inner_s);
+  j["puncture_inner_delay_ms"] = mean_ms(delays.inner_s);
   j["samples"] = {
       {"rows", rows}, {"cut_off", cut_off}, {"every", nullptr}, {"lost", nullptr}, {"gaps", nullptr}};
   if (truth.any) {

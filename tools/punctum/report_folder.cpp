@@ -27,6 +27,7 @@ constexpr const char* kReportFiles[] = {
     "contours.csv", "report.json", "scene.toml", "figure.png",  "figure.svg", "figure.gp",
     "figure.log",   "core.log",    "vision.log", "gnuplot.log", "reserve"};
 constexpr const char* kFrames = "frames";
+constexpr const char* kElsewhere = ", allowed: another --report";
 
 // A run that has written anything has written its resolved scene first.
 bool is_report(const fs::path& folder) {
@@ -144,7 +145,7 @@ tl::expected<ReportFolder, std::string> prepare_report_folder(const Scene& scene
     const bool taken = there && !wanted.empty();
     if (taken) {
       if (const auto free = FolderLock::take(folder.string()); !free) {
-        return tl::unexpected(free.error());
+        return tl::unexpected(free.error() + kElsewhere);
       }
     }
     const auto made = new_folder(folder, taken ? 2 : 1);
@@ -165,7 +166,7 @@ tl::expected<ReportFolder, std::string> prepare_report_folder(const Scene& scene
   }
   auto lock = FolderLock::take(folder.string());
   if (!lock) {
-    return tl::unexpected(lock.error());
+    return tl::unexpected(lock.error() + kElsewhere);
   }
   report.lock = std::move(*lock);
   report.folder = fs::absolute(folder).string();
@@ -176,7 +177,7 @@ tl::expected<std::string, std::string> take_place(const ReportFolder& report) {
   const fs::path from = report.folder, to = report.replaces;
   const auto lock = FolderLock::take(to.string());
   if (!lock) {
-    return tl::unexpected(lock.error());
+    return tl::unexpected(fmt::format("{}; the new report stays in {}", lock.error(), from.string()));
   }
   std::error_code ec;
   clear(to);

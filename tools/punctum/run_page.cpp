@@ -116,8 +116,8 @@ std::string outcome_html(const Json& facts) {
   }
   if (flag_in(facts, "rebuilt")) {
     s += "<div class=\"outcome fair\"><b>rebuilt</b>The run left no report of its own. This one was made "
-         "from its "
-         "samples and events; what only the running programs knew is missing.</div>\n";
+         "from its samples and events; what they do not tell is unknown: the times on the machine, lost "
+         "samples, missed ticks, what each cell got.</div>\n";
   }
   for (const Json& n : list_in(facts, "not_kept")) {
     s +=
@@ -269,6 +269,10 @@ std::string phases_text(const Json& facts) {
 std::string measures_html(const Json& facts) {
   Facts f;
   const auto n = [&facts](const char* name) { return number_in(facts, name); };
+  const bool rebuilt = flag_in(facts, "rebuilt");
+  const auto known = [rebuilt](const std::optional<double>& v, const char* unit, double scale = 1) {
+    return rebuilt && !v ? "unknown" : shown(v, unit, scale);
+  };
   const Json& needle = fact(facts, "needle_at_end");
   f.row("phases begin at", phases_text(facts));
   f.row("needle at the end",
@@ -277,27 +281,29 @@ std::string measures_html(const Json& facts) {
                  ? ""
                  : " (known from: " + text_in(needle, "known_from") + ")"));
   const Json& dose = fact(facts, "dose");
-  f.row("dose", dose.is_object() ? fmt::format("{} given of {} asked", shown(number_in(dose, "given_s"), "s"),
-                                               shown(number_in(dose, "asked_s"), "s"))
-                                 : std::string());
+  const bool told = text_in(dose, "known_from") == "injector";
+  f.row("dose",
+        dose.is_object()
+            ? fmt::format("{} given of {} asked{}", known(number_in(dose, "given_s"), "s"),
+                          known(number_in(dose, "asked_s"), "s"), told ? " (known from: injector)" : "")
+            : std::string());
   const Json& cells = fact(facts, "cells");
   if (number_in(cells, "tried").value_or(0) > 0) {
     f.row("cells", fmt::format("{} done, {} lost, {} tried", whole(number_in(cells, "done")),
                                whole(number_in(cells, "lost")), whole(number_in(cells, "tried"))));
-    if (n("contact_delay_ms")) {
-      f.row("contact told", after_or_before(n("contact_delay_ms"), "the needle touched"));
-    }
-    if (n("puncture_delay_ms")) {
-      f.row("puncture told", after_or_before(n("puncture_delay_ms"), "the membrane gave way"));
-    }
-    f.row("beside the axis", shown(n("lateral_error_um"), "um where the membrane gave way"));
+    const auto delay = [&](const char* name, const char* what) {
+      return n(name) ? after_or_before(n(name), what) : rebuilt ? "unknown" : std::string();
+    };
+    f.row("contact told", delay("contact_delay_ms", "the needle touched"));
+    f.row("puncture told", delay("puncture_delay_ms", "the membrane gave way"));
+    f.row("beside the axis", known(n("lateral_error_um"), "um where the membrane gave way"));
     f.row("peak needle force", shown(n("peak_force_N"), "uN", 1e6));
     f.row("force estimate", n("force_error_rms_N") ? fmt::format("{} rms error of {} rms true force",
                                                                  shown(n("force_error_rms_N"), "uN", 1e6),
                                                                  shown(n("true_force_rms_N"), "uN", 1e6))
                                                    : std::string());
     f.row("deepest", shown(n("max_depth_um"), "um") + ", beyond the puncture " +
-                         shown(n("depth_beyond_puncture_um"), "um"));
+                         known(n("depth_beyond_puncture_um"), "um"));
     f.row("withdrawal", shown(n("withdrawal_s"), "s"));
   }
   f.row("peak force at the hand", shown(n("peak_hand_force_N"), "N"));

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <tuple>
 #include <utility>
 
 #include "tools/punctum/event_log.hpp"
@@ -113,10 +114,12 @@ std::optional<ContourError> read_contour_error(const std::string& obs_csv) {
   return e;
 }
 
-std::string fault_text(rt::Fault fault, double t_s) {
+std::string fault_text(rt::Fault fault, double t_s, bool coloured) {
   const FaultAdvice& advice = kFaultAdvice[static_cast<std::size_t>(fault)];
-  return fmt::format("FAULT {} at {:.3f} s: {}\n  what to do: {}\n  cleared:    {}", rt::name(fault), t_s,
-                     advice.cause, advice.next, clearing_condition(fault));
+  return fmt::format(
+      "{}\n  cause:       {}\n  what to do:  {}\n  cleared:     {}",
+      painted(Colour::bad, fmt::format("FAULT {} at {:.3f} s", rt::name(fault), t_s), coloured), advice.cause,
+      advice.next, clearing_condition(fault));
 }
 
 std::string missing_rights(const rt::CoreStatus& core) {
@@ -348,23 +351,29 @@ std::string summary(const Scene& scene, const RunResult& result, const Measures&
       line("dose", fmt::format("{:.2f} s of {:.2f} s asked", m.injected_s, m.asked_s));
     }
     const auto value = [](const Spread& v, double scale, const char* unit) {
-      if (v.n == 0) {
-        return std::string("-");
-      }
       return v.n == 1 ? fmt::format("{:.3g} {}", v.mean * scale, unit)
                       : fmt::format("{:.3g} +- {:.2g} {}", v.mean * scale, v.deviation() * scale, unit);
     };
-    const auto told = [](const Spread& v, const char* what) {
-      return v.n > 0 ? after_or_before(v.mean * 1e3, what) +
-                           (v.n > 1 ? fmt::format(" (+- {:.2g} ms)", v.deviation() * 1e3) : "")
-                     : std::string("-");
+    // What no cell came to is not told of.
+    const auto told = [&line](const char* of, const Spread& v, const char* what) {
+      if (v.n > 0) {
+        line(of, "told " + after_or_before(v.mean * 1e3, what) +
+                     (v.n > 1 ? fmt::format(" (+- {:.2g} ms)", v.deviation() * 1e3) : ""));
+      }
     };
-    line("entry", fmt::format("lateral error {}", value(m.lateral_error_m, 1e6, "um")));
-    line("contact", "told " + told(m.contact_delay_s, "the needle touched"));
-    line("puncture", "told " + told(m.puncture_delay_s, "the membrane gave way"));
-    line("needle", fmt::format("peak force {:.1f} uN, depth {:.1f} um, beyond the puncture {}, withdrawal {}",
-                               m.peak_force_N * 1e6, m.max_depth_m * 1e6,
-                               value(m.beyond_puncture_m, 1e6, "um"), value(m.withdrawal_s, 1, "s")));
+    if (m.lateral_error_m.n > 0) {
+      line("entry", fmt::format("lateral error {}", value(m.lateral_error_m, 1e6, "um")));
+    }
+    told("contact", m.contact_delay_s, "the needle touched");
+    told("puncture", m.puncture_delay_s, "the membrane gave way");
+    std::string needle =
+        fmt::format("peak force {:.1f} uN, depth {:.1f} um", m.peak_force_N * 1e6, m.max_depth_m * 1e6);
+    for (const auto& [what, v, scale, unit] :
+         {std::tuple{"beyond the puncture", &m.beyond_puncture_m, 1e6, "um"},
+          std::tuple{"withdrawal", &m.withdrawal_s, 1.0, "s"}}) {
+      needle += v->n > 0 ? fmt::format(", {} {}", what, value(*v, scale, unit)) : "";
+    }
+    line("needle", needle);
     if (const auto e = m.force_error_rms_N()) {
       line("force estimate",
            fmt::format("error {:.2f} uN rms of {:.2f} uN rms true force", *e * 1e6,
@@ -415,6 +424,9 @@ std::string summary(const Scene& scene, const RunResult& result, const Measures&
     line("fault",
          painted(Colour::bad, fmt::format("{} at {:.3f} s", rt::name(m.faults[i].fault), m.faults[i].t_s),
                  coloured));
+  }
+  if (result.end == rt::RunEnd::fault && !m.faults.empty()) {
+    line("what to do", kFaultAdvice[static_cast<std::size_t>(m.faults.back().fault)].next);
   }
   for (const NotKept& n : result.not_kept) {
     line("not kept", fmt::format("{} from {:.3f} s on: {}", n.file, n.t_s, n.why));

@@ -50,7 +50,7 @@ struct RunResult {
                                   const rt::CoreStatus& core, const std::optional<ContourError>& contour,
                                   bool coloured);
 // A fault as it is latched: its cause, what to do, and what clears it.
-[[nodiscard]] std::string fault_text(rt::Fault fault, double t_s);
+[[nodiscard]] std::string fault_text(rt::Fault fault, double t_s, bool coloured);
 // The rights the core did not get, and how to get them; empty when it has all it needs.
 [[nodiscard]] std::string missing_rights(const rt::CoreStatus& core);
 

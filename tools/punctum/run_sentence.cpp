@@ -20,12 +20,13 @@ constexpr double kSameTime_ms = 0.5;
 std::string ending(const Json& facts) {
   const std::string word = text_in(facts, "outcome"), detail = text_in(facts, "outcome_detail");
   const Json& cells = fact(facts, "cells");
-  const double tried = number_in(cells, "tried").value_or(0), done = number_in(cells, "done").value_or(0);
+  const double tried = number_in(cells, "tried").value_or(0);
+  const auto done = number_in(cells, "done");
   const std::string after = fmt::format("after {:.1f} s", number_in(facts, "seconds").value_or(0));
   const auto is = [&word](RunEnd end) { return word == rt::name(end); };
   if (is(RunEnd::done)) {
-    return tried > 0
-               ? fmt::format("The task ended well {}: {:.0f} of {:.0f} cells injected.", after, done, tried)
+    return tried > 0 && done
+               ? fmt::format("The task ended well {}: {:.0f} of {:.0f} cells injected.", after, *done, tried)
                : fmt::format("The run ended well {}.", after);
   }
   if (is(RunEnd::fault)) {
@@ -78,6 +79,9 @@ std::string run_sentence(const Json& facts) {
   const auto asked = number_in(dose, "asked_s"), given = number_in(dose, "given_s");
   if (asked && given && *asked > 0) {
     s += fmt::format(" The injector was open in the cell for {:.2f} s of {:.2f} s asked.", *given, *asked);
+  }
+  if (dose.is_object() && !given) {
+    s += " How much the cell was given is not known.";
   }
   return s;
 }

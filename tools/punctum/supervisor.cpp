@@ -270,6 +270,7 @@ class Run {
   VisionProcess vision_;
   std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
   bool vision_was_refused_ = false;
+  bool frames_are_over_ = false, stop_for_good_ = false;
   bool rights_told_ = false;
   std::size_t faults_told_ = 0;
   double next_progress_s_ = 0;
@@ -370,6 +371,7 @@ void Run::watch_vision() {
       if (scene_.recorded) {
         terminal_.say("{:8.3f} s  the recorded frames have ended", run_s);
         core_.ask(rt::Command::end);
+        frames_are_over_ = true;
       }
       break;
     case VisionProcess::News::given_up:
@@ -381,6 +383,12 @@ void Run::watch_vision() {
       vision_was_refused_ = true;
       stop_signal::request();
       break;
+  }
+  // A core that has stopped waits for a reset, and for no end. Without pictures there is nothing to go on
+  // for.
+  if (frames_are_over_ && !stop_for_good_ && status().fault.load() != 0) {
+    stop_for_good_ = true;
+    core_.ask(rt::Command::stop);
   }
 }
 
@@ -412,7 +420,7 @@ void Run::tell_what_is_not_kept() {
 void Run::tell_faults() {
   for (const auto& faults = recorder_.measures().faults; faults_told_ < faults.size(); ++faults_told_) {
     const Measures::Fault& f = faults[faults_told_];
-    terminal_.say("{}", painted(Colour::bad, fault_text(f.fault, f.t_s), terminal_.coloured()));
+    terminal_.say("{}", fault_text(f.fault, f.t_s, terminal_.coloured()));
   }
 }
 

@@ -14,7 +14,7 @@
 namespace punctum::tools {
 namespace {
 
-constexpr std::size_t kBar = 10;           // letters
+constexpr std::size_t kBar = 8;            // letters: phase, force, depth and vision fit into 80 columns
 constexpr std::size_t kUsualColumns = 80;  // of a terminal that does not tell
 
 // https://no-color.org: set and not empty, whatever the value.
@@ -23,6 +23,15 @@ bool shows_colour(int file) {
   const char* const term = std::getenv("TERM");
   const bool dumb = term == nullptr || std::string_view(term) == "dumb" || *term == '\0';
   return isatty(file) != 0 && !dumb && (no_color == nullptr || *no_color == '\0');
+}
+
+// 0: it is no terminal.
+std::size_t columns_of(int file) {
+  winsize size{};
+  if (isatty(file) == 0) {
+    return 0;
+  }
+  return ioctl(file, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : kUsualColumns;
 }
 
 // Of the locale, as the environment says it.
@@ -76,7 +85,72 @@ Part vision_part(const Scene& scene, const rt::TelemetrySample& newest) {
   return part(scene.vision ? "vision ok" : "", 3, Colour::good);
 }
 
+// Columns on a terminal: colours take none, a letter of UTF-8 takes one.
+std::size_t width_of(std::string_view text) {
+  std::size_t width = 0;
+  bool in_escape = false;
+  for (const char c : text) {
+    if (in_escape) {
+      in_escape = c != 'm';
+    } else if (c == '\033') {
+      in_escape = true;
+    } else {
+      width += (static_cast<unsigned char>(c) & 0xC0U) != 0x80U ? 1U : 0U;
+    }
+  }
+  return width;
+}
+
+// Where a line goes on that is too long: under its text, where a title and two blanks stand before that.
+std::size_t hanging_indent(std::string_view line) {
+  constexpr std::size_t kWidestTitle = 24;
+  const std::size_t first = std::min(line.find_first_not_of(' '), line.size());
+  const std::size_t gap = line.find("  ", first);
+  if (gap > kWidestTitle) {  // or there is none
+    return first + 2;
+  }
+  return std::min(line.find_first_not_of(' ', gap), line.size());
+}
+
+std::string wrapped_line(std::string_view line, std::size_t columns) {
+  if (width_of(line) < columns) {
+    return std::string(line);
+  }
+  const std::size_t indent = hanging_indent(line);
+  std::string text;
+  std::size_t at = 0;
+  while (!line.empty()) {
+    const std::size_t blanks = std::min(line.find_first_not_of(' '), line.size());
+    const std::size_t end = std::min(line.find(' ', blanks), line.size());
+    const std::string_view word = line.substr(blanks, end - blanks);
+    const std::size_t width = width_of(word);
+    // The last column stays free. A word that is too long anywhere stays where it is.
+    if (at + blanks > indent && at + blanks + width >= columns) {
+      text += "\n" + std::string(indent, ' ');
+      at = indent;
+    } else {
+      text.append(blanks, ' ');
+      at += blanks;
+    }
+    text += word;
+    at += width;
+    line.remove_prefix(end);
+  }
+  return text;
+}
+
 }  // namespace
+
+std::string wrapped(std::string_view text, std::size_t columns) {
+  std::string all;
+  while (columns > 0 && !text.empty()) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    all += wrapped_line(text.substr(0, end), columns);
+    all += end < text.size() ? "\n" : "";
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return all + std::string(text);
+}
 
 std::string painted(Colour colour, const std::string& text, bool coloured) {
   if (!coloured || colour == Colour::plain || text.empty()) {
@@ -93,12 +167,13 @@ Terminal::Terminal()
 
 void Terminal::complain(const std::string& text) {
   clear_progress();
-  tools::complain(painted(Colour::bad, "punctum: " + text, errors_coloured_));
+  tools::complain(
+      painted(Colour::bad, wrapped("punctum: " + text, columns_of(STDERR_FILENO)), errors_coloured_));
 }
 
 void Terminal::print(const std::string& text) {
   clear_progress();
-  tools::say(text);
+  tools::say(wrapped(text, columns_of(STDOUT_FILENO)));
 }
 
 void Terminal::progress(const std::string& line) {
@@ -121,9 +196,7 @@ LineStyle Terminal::line_style() const {
   if (!is_terminal_) {
     return {};
   }
-  winsize size{};
-  const bool told = ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
-  return {.coloured = coloured_, .blocks = writes_utf8(), .columns = told ? size.ws_col : kUsualColumns};
+  return {.coloured = coloured_, .blocks = writes_utf8(), .columns = columns_of(STDOUT_FILENO)};
 }
 
 std::string progress_line(const Scene& scene, const rt::TelemetrySample& newest, const rt::CoreStatus& core,

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "rt/station/core_status.hpp"
@@ -20,6 +21,10 @@ enum class Colour : std::uint8_t { plain, good, warning, bad, faint };
 
 // The text in that colour; as it is where there is none.
 [[nodiscard]] std::string painted(Colour colour, const std::string& text, bool coloured);
+
+// Lines that are too long for a terminal, broken between words; where one goes on it is indented, under its
+// text where that has a title. 0 columns: as it is.
+[[nodiscard]] std::string wrapped(std::string_view text, std::size_t columns);
 
 struct LineStyle {
   bool coloured = false;
@@ -36,7 +41,7 @@ class Terminal {
     print(fmt::format(text, std::forward<Args>(args)...) + "\n");
   }
   void complain(const std::string& text);  // on the standard error output
-  void print(const std::string& text);     // as it is
+  void print(const std::string& text);     // as it is, but for lines that a terminal would break
   void progress(const std::string& line);
   void clear_progress();
   // How often progress is worth telling.

@@ -103,7 +103,9 @@ TEST_F(SegmentTest, memory_that_can_be_resized_is_not_trusted) {
   ASSERT_FALSE(refused);
   EXPECT_NE(refused.error().find("not trusted"), std::string::npos) << refused.error();
   ASSERT_EQ(::fcntl(plain.number(), F_ADD_SEALS, F_SEAL_SHRINK), 0);  // it may still grow
-  EXPECT_FALSE(Shared<const Board>::attach(name, plain.number()));
+  refused = Shared<const Board>::attach(name, plain.number());
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().find("not trusted"), std::string::npos) << refused.error();
 }
 
 TEST_F(SegmentTest, a_readers_descriptor_and_mapping_cannot_be_made_writable) {

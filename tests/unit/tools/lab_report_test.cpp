@@ -2,8 +2,11 @@
 // can make a page do more than show it.
 #include "tools/punctum/lab_report.hpp"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -12,12 +15,18 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 #include <set>
+#include <sstream>
 #include <string>
+#include <vector>
 
+#include "hal/devices.hpp"
+#include "rt/forces/list.hpp"
 #include "tools/punctum/event_log.hpp"
 #include "tools/punctum/fault_advice.hpp"
+#include "tools/punctum/folder_lock.hpp"
 #include "tools/punctum/rebuilt_facts.hpp"
 #include "tools/punctum/run_page.hpp"
+#include "tools/punctum/run_report.hpp"
 #include "tools/punctum/run_sentence.hpp"
 #include "tools/punctum/terminal.hpp"
 #include "tools/punctum/time_chart.hpp"
@@ -170,6 +179,14 @@ TEST(Sentence, every_end_has_its_own) {
   EXPECT_TRUE(contains(run_sentence({{"outcome", "unknown"}}), "not known"));
 }
 
+TEST(Sentence, counts_no_cells_where_nobody_counted_them) {
+  const auto sentence = [](const Json& cells) {
+    return run_sentence({{"outcome", "done"}, {"seconds", 5}, {"cells", cells}});
+  };
+  EXPECT_TRUE(contains(sentence({{"tried", 1}, {"done", 1}}), "1 of 1 cells"));
+  EXPECT_FALSE(contains(sentence({{"tried", 1}, {"done", nullptr}}), "0 of 1"));
+}
+
 TEST(Sentence, says_where_the_needle_is_and_what_was_given) {
   const std::string s =
       run_sentence({{"outcome", "stopped"},
@@ -191,6 +208,15 @@ TEST(Advice, every_fault_has_a_cause_something_to_do_and_what_clears_it) {
     EXPECT_EQ(fault_named(rt::name(a.fault)), a.fault);
   }
   EXPECT_FALSE(fault_named("nonsense"));
+}
+
+TEST(Advice, a_drive_without_an_error_code_has_lost_its_power_and_the_reset_button_gives_it_back) {
+  const FaultAdvice& a = kFaultAdvice[static_cast<std::size_t>(rt::Fault::stage_fault)];
+  for (const char* cause : {"lost its power", "relay", "heartbeat", "stalled"}) {
+    EXPECT_TRUE(contains(a.cause, cause)) << a.cause;
+  }
+  EXPECT_TRUE(contains(a.next, "error code")) << a.next;
+  EXPECT_TRUE(contains(a.next, "reset button")) << a.next;
 }
 
 TEST(Suggestion, takes_neighbours_that_changed_places_for_one_mistake) {
@@ -273,6 +299,132 @@ TEST(Rebuilt, from_a_table_that_is_cut_off_in_the_middle_of_a_row) {
   EXPECT_TRUE(fs::exists(fs::path(folder.path()) / "report.json"));
 }
 
+// One injection at 1 kHz: what happens on which tick. Of these rows every n-th is kept, and each change of
+// phase, as a recorder does.
+class RecordedInjection {
+ public:
+  static constexpr int kContact = 100, kContactTold = 110, kPuncture = 200, kPunctureTold = 220;
+  static constexpr int kAsked = 240, kOpen = 250, kShut = 1050, kLetGo = 1240, kOut = 1300, kEnd = 1400;
+
+  static std::string rows(int every) {
+    std::string all =
+        "t_s,phase,fx_N,fy_N,fz_N,fault,cell,alarms,buttons,injector_open,tip_force_N,true_force_N,"
+        "true_gap_m,true_contact,true_punctured,true_lost\n";
+    std::string last_phase;
+    for (int tick = 0; tick < kEnd; ++tick) {
+      const std::string phase = tick < kContactTold    ? "free"
+                                : tick < kPunctureTold ? "contact"
+                                : tick < kAsked        ? "puncture"
+                                : tick < kLetGo        ? "injection"
+                                : tick < kOut          ? "withdrawal"
+                                                       : "clear";
+      const bool pressed = tick >= kAsked && tick < kLetGo, open = tick >= kOpen && tick < kShut;
+      if (tick % every == 0 || phase != last_phase) {
+        all +=
+            fmt::format("{:.6f},{},0,0,0.1,none,0,0,{},{:d},0,1e-06,{},{:d},{:d},0\n", tick * 1e-3, phase,
+                        pressed ? static_cast<unsigned>(hal::kButtonInject) : 0U, open,
+                        tick < kContact ? 1e-6 : -1e-6, tick >= kContact && tick < kOut, tick >= kPuncture);
+      }
+      last_phase = phase;
+    }
+    return all;
+  }
+};
+
+TEST(Rebuilt, dose_and_delays_are_what_the_rows_tell) {
+  using R = RecordedInjection;
+  for (const bool inner : {false, true}) {
+    const Folder folder;
+    folder.put("scene.toml", to_toml(*load_scene(inner ? "icsi" : "outer-only")));
+    folder.put("samples.csv", R::rows(1));
+    const Json facts = rebuilt_facts(folder.path());
+    ASSERT_EQ(facts["rate_hz"], 1000);
+    EXPECT_NEAR(facts["dose"]["asked_s"].get<double>(), (R::kLetGo - R::kAsked) * 1e-3, 1e-9);
+    EXPECT_NEAR(facts["dose"]["given_s"].get<double>(), (R::kShut - R::kOpen) * 1e-3, 1e-9);
+    EXPECT_EQ(facts["dose"]["known_from"], "injector");
+    EXPECT_NEAR(facts["contact_delay_ms"].get<double>(), R::kContactTold - R::kContact, 1e-6);
+    EXPECT_NEAR(facts["puncture_inner_delay_ms"].get<double>(), R::kPunctureTold - R::kPuncture, 1e-6);
+    EXPECT_EQ(facts["puncture_delay_ms"].is_null(), inner) << "the rows tell of the inner membrane only";
+  }
+}
+
+TEST(Rebuilt, what_came_about_between_two_rows_came_at_a_time_that_is_not_known) {
+  using R = RecordedInjection;
+  const Folder folder;
+  folder.put("scene.toml", to_toml(*load_scene("icsi")));
+  folder.put("samples.csv", R::rows(7));
+  const Json facts = rebuilt_facts(folder.path());
+  EXPECT_TRUE(facts["contact_delay_ms"].is_null());
+  EXPECT_TRUE(facts["puncture_inner_delay_ms"].is_null());
+  EXPECT_NEAR(facts["dose"]["asked_s"].get<double>(), (R::kLetGo - R::kAsked) * 1e-3, 7.1e-3);
+  EXPECT_NEAR(facts["dose"]["given_s"].get<double>(), (R::kShut - R::kOpen) * 1e-3, 7.1e-3);
+  EXPECT_TRUE(contains(run_page(folder.path(), facts, ""), "<dt>contact told</dt><dd>unknown</dd>"));
+}
+
+TEST(Rebuilt, a_dose_that_no_row_tells_is_unknown_and_not_zero) {
+  const Folder folder;
+  folder.put("scene.toml", to_toml(*load_scene("icsi")));
+  folder.put("samples.csv", "t_s,phase,fz_N,fault\n0.000,injection,0,none\n0.001,injection,0,none\n");
+  const Json facts = rebuilt_facts(folder.path());
+  EXPECT_TRUE(facts["dose"]["given_s"].is_null());
+  EXPECT_TRUE(contains(run_sentence(facts), "How much the cell was given is not known"))
+      << run_sentence(facts);
+  EXPECT_TRUE(contains(run_page(folder.path(), facts, ""), "unknown given of unknown asked"));
+}
+
+TEST(Rebuilt, the_folder_of_a_run_that_goes_on_is_left_alone_and_the_run_is_named) {
+  const Folder folder;
+  folder.put("samples.csv", "t_s,phase,fz_N,fault\n0.000,free,0,none\n");
+  {
+    const auto run = FolderLock::take(folder.path());
+    ASSERT_TRUE(run);
+    testing::internal::CaptureStderr();
+    EXPECT_EQ(report_folders({folder.path()}, ""), 2);
+    const std::string said = testing::internal::GetCapturedStderr();
+    EXPECT_TRUE(contains(said, "(process " + std::to_string(getpid()) + ")")) << said;
+    EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1) << said;
+    EXPECT_FALSE(fs::exists(fs::path(folder.path()) / "report.json"));
+    EXPECT_FALSE(fs::exists(fs::path(folder.path()) / "report.html"));
+  }
+  EXPECT_EQ(report_folders({folder.path()}, ""), 0);
+}
+
+TEST(Rebuilt, the_cores_last_word_is_the_outcome_and_a_fault_its_detail) {
+  const Folder folder;
+  folder.put("samples.csv",
+             "t_s,phase,fz_N,fault\n0.000,free,0,none\n0.001,free,0,estop\n0.002,free,0,estop\n");
+  rt::Event last;
+  last.kind = rt::Event::ended;
+  last.what = static_cast<std::uint64_t>(rt::RunEnd::fault);
+  folder.put("events.csv", kEventColumns + event_line(last));
+  const Json facts = rebuilt_facts(folder.path());
+  EXPECT_EQ(facts["outcome"], "fault");
+  EXPECT_EQ(facts["outcome_detail"], "estop");
+}
+
+TEST(Rebuilt, an_event_comes_back_from_its_table_as_it_was_written) {
+  const Folder folder;
+  rt::Event phase;
+  phase.tick = 1234;
+  phase.t_s = 1.234;
+  phase.kind = rt::Event::phase;
+  phase.what = static_cast<std::uint64_t>(rt::Phase::contact);
+  phase.value = 2;
+  rt::Event command;
+  command.tick = 5678;
+  command.t_s = 5.678;
+  command.kind = rt::Event::command;
+  command.what = rt::Command::effect_gain;
+  command.value = 0.25;
+  command.target = rt::effect_damping;
+  command.writer = 1;
+  folder.put("events.csv", kEventColumns + event_line(phase) + event_line(command));
+  const auto events = read_events(folder.path() + "/events.csv");
+  ASSERT_EQ(events.size(), 2U);
+  EXPECT_EQ(events[0], event_row(phase));
+  EXPECT_EQ(events[1], event_row(command));
+}
+
 TEST(Rebuilt, a_folder_that_holds_no_run_is_refused) {
   const Folder folder;
   EXPECT_EQ(report_folders({folder.path()}, ""), 2);
@@ -280,6 +432,37 @@ TEST(Rebuilt, a_folder_that_holds_no_run_is_refused) {
 }
 
 // ---- the terminal ----
+
+TEST(Lines, are_broken_between_words_and_go_on_under_their_text) {
+  const std::string text =
+      "outcome         done after 1.0 s\n"
+      "phases          free 0.0 > contact 4.9 > indentation 5.3 > puncture 8.2\n"
+      "  a line without a title that is too long for it\n"
+      "\n"
+      "/a/path/that/is/longer/than/the/whole/terminal/is/wide\n";
+  EXPECT_EQ(wrapped(text, 40),
+            "outcome         done after 1.0 s\n"
+            "phases          free 0.0 > contact 4.9\n"
+            "                > indentation 5.3 >\n"
+            "                puncture 8.2\n"
+            "  a line without a title that is too\n"
+            "    long for it\n"
+            "\n"
+            "/a/path/that/is/longer/than/the/whole/terminal/is/wide\n");
+  EXPECT_EQ(wrapped(text, 0), text);
+  EXPECT_EQ(wrapped("\033[1;31mred and\033[0m \xC2\xB5m", 12), "\033[1;31mred and\033[0m \xC2\xB5m");
+}
+
+TEST(Lines, lose_no_word_at_any_width) {
+  const std::string text = fault_text(rt::Fault::stage_fault, 1.5, true);
+  const auto words_of = [](const std::string& lines) {
+    std::istringstream in(lines);
+    return std::vector<std::string>(std::istream_iterator<std::string>(in), {});
+  };
+  for (std::size_t columns = 1; columns < 200; ++columns) {
+    EXPECT_EQ(words_of(wrapped(text, columns)), words_of(text)) << columns;
+  }
+}
 
 class LiveLine : public testing::Test {
  protected:

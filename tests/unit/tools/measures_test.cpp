@@ -161,6 +161,35 @@ TEST(Measures, the_dose_is_what_the_injector_gave_of_what_the_button_asked_insid
   EXPECT_EQ(m.cells_done, 0U);
 }
 
+TEST(Measures, ticks_without_a_sample_count_for_the_dose_too) {
+  Measures m(scene_without_a_simulated_cell());
+  rt::TelemetrySample s;
+  s.phase = rt::Phase::injection;
+  s.buttons = hal::kButtonInject;
+  s.injector_open = 1;
+  for (int i = 0; i < 100; ++i) {  // every tenth tick was recorded
+    s.tick += 10;
+    s.t_s += 10e-3;
+    m.tick(s, nullptr);
+  }
+  m.finish();
+  EXPECT_NEAR(m.asked_s, 1, 0.01);
+  EXPECT_NEAR(m.injected_s, 1, 0.01);
+}
+
+TEST(Measures, a_fault_that_is_there_from_the_first_tick_is_counted) {
+  Measures m(scene_of("icsi"));
+  rt::TelemetrySample s;
+  s.fault = rt::Fault::estop;
+  for (int i = 0; i < 10; ++i, ++s.tick) {
+    m.tick(s, nullptr);
+  }
+  m.finish();
+  EXPECT_EQ(m.fault_count, 1U);
+  ASSERT_EQ(m.faults.size(), 1U);
+  EXPECT_EQ(m.faults[0].fault, rt::Fault::estop);
+}
+
 TEST(Measures, a_dose_that_lacks_no_more_than_the_valve_may_take_is_whole) {
   CellMeasures cell;
   cell.asked_s = 1.5;

@@ -9,11 +9,17 @@
 #include <fstream>
 #include <memory>
 #include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
 
+#include "rt/forces/list.hpp"
 #include "tests/support/full_disk.hpp"
 #include "tools/punctum/disk_space.hpp"
 #include "tools/punctum/report_folder.hpp"
 #include "tools/punctum/vision_watchdog.hpp"
+#include "tools/shared/csv.hpp"
+#include "tools/shared/program_start.hpp"
 
 namespace punctum::tools {
 namespace {
@@ -67,6 +73,123 @@ TEST_F(RecorderTest, samples_that_were_overwritten_before_they_were_read_are_cou
   r.finish();
   EXPECT_GE(r.lost(), 500U);
   EXPECT_EQ(r.lost() + r.rows(), 10 + more) << "each sample is a row or lost";
+}
+
+// Each number of a sample is another: where two change places, both are wrong.
+TEST_F(RecorderTest, every_column_holds_what_it_is_called_after) {
+  Recorder r = recorder();
+  double n = 0;
+  const auto fill = [&n](auto&... numbers) {
+    ((numbers = static_cast<std::decay_t<decltype(numbers)>>(++n)), ...);
+  };
+  rt::TelemetrySample& s = sample_;
+  for (double (*three)[3] : {&s.x_m, &s.v_m_s, &s.tip_m, &s.cmd_m, &s.force_N}) {
+    fill((*three)[0], (*three)[1], (*three)[2]);
+  }
+  for (double& effect : s.effect_N) {
+    fill(effect);
+  }
+  fill(s.guard_N, s.wd_m, s.a_m, s.R_m, s.tip_force_N, s.sigma_d_Pa, s.pressure_Pa, s.obs_age_s, s.sensor_N,
+       s.vacuum_Pa, s.stored_energy_J, s.injected_energy_J, s.obs_gap_m);
+  s.phase = rt::Phase::injection;
+  s.fault = rt::Fault::tip_force;
+  s.stop = rt::StopStage::stopping;
+  s.estop = 5;
+  fill(s.cell, s.alarms, s.buttons);
+  s.injector_open = 1;
+  s.tick = 7;
+  s.t_s = 0.007;
+  core_->telemetry.push(s);
+  r.finish();
+  CsvReader row(folder_ / "samples.csv");
+  ASSERT_TRUE(row.next());
+  std::vector<std::pair<std::string, double>> wanted{{"t_s", s.t_s},
+                                                     {"guard_N", s.guard_N},
+                                                     {"wd_m", s.wd_m},
+                                                     {"a_m", s.a_m},
+                                                     {"R_m", s.R_m},
+                                                     {"obs_age_s", s.obs_age_s},
+                                                     {"estop", s.estop},
+                                                     {"cell", s.cell},
+                                                     {"alarms", s.alarms},
+                                                     {"buttons", s.buttons},
+                                                     {"stop", 1},
+                                                     {"tip_force_N", s.tip_force_N},
+                                                     {"sigma_d_Pa", s.sigma_d_Pa},
+                                                     {"pressure_Pa", s.pressure_Pa},
+                                                     {"obs_gap_m", s.obs_gap_m},
+                                                     {"stored_energy_J", s.stored_energy_J},
+                                                     {"injected_energy_J", s.injected_energy_J},
+                                                     {"injector_open", 1},
+                                                     {"sensor_N", s.sensor_N},
+                                                     {"vacuum_Pa", s.vacuum_Pa}};
+  const auto vector = [&wanted](const std::string& name, const std::string& unit, const double (&v)[3]) {
+    for (int i = 0; i < 3; ++i) {
+      wanted.emplace_back(name + "xyz"[i] + unit, v[i]);
+    }
+  };
+  vector("", "_m", s.x_m), vector("v", "_m_s", s.v_m_s), vector("tip_", "_m", s.tip_m);
+  vector("cmd_", "_m", s.cmd_m), vector("f", "_N", s.force_N);
+  for (std::size_t i = 0; i < rt::effect_count; ++i) {
+    wanted.emplace_back(std::string(rt::effect_name(i)) + "_N", s.effect_N[i]);
+  }
+  for (const auto& [column, value] : wanted) {
+    EXPECT_EQ(row.number(column), value) << column;
+  }
+  EXPECT_EQ(row.text("phase"), "injection");
+  EXPECT_EQ(row.text("fault"), "tip_force");
+  EXPECT_EQ(row.text("true_gap_m"), "") << "nothing is simulated: unknown is no zero";
+}
+
+TEST_F(RecorderTest, every_row_has_as_many_cells_as_there_are_columns) {
+  const auto bench = std::make_unique<sim::Bench>();
+  for (const char* scene : {"free", "icsi"}) {
+    for (const bool simulated : {false, true}) {
+      auto r = Recorder::create(folder_.string(), *load_scene(scene), *core_,
+                                simulated ? bench.get() : nullptr, 1);
+      ASSERT_TRUE(r);
+      sim::Snapshot world;
+      world.has_cell = std::string(scene) == "icsi" ? 1 : 0;
+      world.t_ns = static_cast<std::int64_t>(next_) * 1'000'000;
+      bench->snapshots.push(world);
+      tick(1);
+      r->finish();
+      std::ifstream in(folder_ / "samples.csv");
+      std::string columns, row;
+      std::getline(in, columns);
+      while (std::getline(in, row)) {
+        EXPECT_EQ(split_csv(row).size(), split_csv(columns).size()) << scene << simulated;
+      }
+    }
+  }
+}
+
+TEST_F(RecorderTest, events_are_rows_and_those_that_were_overwritten_are_counted) {
+  Recorder r = recorder();
+  rt::Event event;
+  event.kind = rt::Event::phase;
+  core_->events.push(event);
+  r.drain();
+  r.finish();
+  EXPECT_EQ(lines("events.csv"), 2U);
+  EXPECT_EQ(r.events().lost, 0U);
+  const std::uint64_t more = rt::EventRing::kSize + 100;
+  for (std::uint64_t i = 0; i < more; ++i) {
+    core_->events.push(event);
+  }
+  r.finish();
+  EXPECT_GE(r.events().lost, 100U);
+  EXPECT_EQ(r.events().lost + r.events().list.size() + r.events().not_listed, 1 + more);
+  EXPECT_EQ(lines("events.csv"), 2 + more - r.events().lost);
+}
+
+TEST_F(RecorderTest, the_last_two_seconds_before_a_fault_are_kept_however_thin_the_samples) {
+  Recorder r = std::move(*Recorder::create(folder_.string(), *load_scene("free"), *core_, nullptr, 100));
+  tick(3000);
+  tick(1000, rt::Fault::estop);
+  r.finish();
+  EXPECT_EQ(lines("fault.csv"), 1U + 2000 + 500);
+  EXPECT_LT(lines("samples.csv"), 60U);
 }
 
 TEST_F(RecorderTest, samples_that_cannot_be_written_are_noticed_while_the_run_goes_on) {
@@ -164,8 +287,40 @@ TEST_F(RecorderTest, two_runs_never_get_the_same_new_folder) {
   EXPECT_NE(second->note, "");
   EXPECT_EQ(third->folder, wanted + "-3");
   EXPECT_EQ(third->replaces, wanted);
+  EXPECT_TRUE(fs::exists(fs::path(wanted) / "scene.toml")) << "it stays until the new one is whole";
   discard(*second);
   EXPECT_FALSE(fs::exists(second->folder));
+}
+
+TEST_F(RecorderTest, a_report_that_is_replaced_takes_no_file_of_anybody_else_with_it) {
+  const Scene scene = *load_scene("free");
+  const auto put = [](const fs::path& file, const char* text) {
+    fs::create_directories(file.parent_path());
+    std::ofstream(file) << text;
+  };
+  const fs::path old = folder_ / "r";
+  put(old / "scene.toml", ("# free" + std::string(kResolvedScene) + "\n").c_str());
+  put(old / "fault.csv", "of the old run");
+  put(old / "samples.csv", "of the old run");
+  put(old / "frames" / "000012.jpg", "of the old run");
+  put(old / "frames" / "of_mine.jpg", "somebody's");
+  put(old / "notes.txt", "somebody's");
+  const auto fresh = prepare_report_folder(scene, old.string(), true);
+  ASSERT_TRUE(fresh) << fresh.error();
+  put(fs::path(fresh->folder) / "samples.csv", "of the new run");
+  put(fs::path(fresh->folder) / "frames" / "000007.jpg", "of the new run");
+  const auto place = take_place(*fresh);
+  ASSERT_TRUE(place) << place.error();
+  EXPECT_EQ(*place, old.string());
+  std::string samples;
+  std::getline(std::ifstream(old / "samples.csv"), samples);
+  EXPECT_EQ(samples, "of the new run");
+  EXPECT_TRUE(fs::exists(old / "frames" / "000007.jpg"));
+  EXPECT_FALSE(fs::exists(old / "fault.csv"));
+  EXPECT_FALSE(fs::exists(old / "frames" / "000012.jpg"));
+  EXPECT_TRUE(fs::exists(old / "frames" / "of_mine.jpg"));
+  EXPECT_TRUE(fs::exists(old / "notes.txt"));
+  EXPECT_FALSE(fs::exists(fresh->folder));
 }
 
 // ---- whether vision hangs ----

@@ -1,5 +1,6 @@
 // What several programs share: CSV rows, segments handed to a child, signals that ask to stop, the version
 // line.
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
@@ -15,9 +16,11 @@
 #include <iterator>
 #include <regex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/support/full_disk.hpp"
+#include "tools/shared/child.hpp"
 #include "tools/shared/csv.hpp"
 #include "tools/shared/program_start.hpp"
 #include "tools/shared/row_file.hpp"
@@ -124,13 +127,14 @@ TEST_F(FilesTest, rows_are_written_in_order_and_continued) {
 
 TEST_F(FilesTest, rows_that_find_no_room_are_cut_off_at_a_line_end_and_the_failure_is_told) {
   const std::string file = folder_ / "samples.csv";
-  full_beyond(100);
+  constexpr std::size_t kRoom = 105;  // in the middle of a row
+  full_beyond(kRoom);
   auto rows = RowFile::open(file, RowFile::Begin::empty);
   ASSERT_TRUE(rows);
   std::string whole;
   for (int i = 0; i < 20; ++i) {
     const std::string row = "row " + std::to_string(i) + ",abc\n";
-    if (whole.size() + row.size() <= 100) {
+    if (whole.size() + row.size() <= kRoom) {
       whole += row;
     }
     rows->append(row);
@@ -196,6 +200,61 @@ TEST(ProgramStartTest, a_file_that_may_not_grow_is_a_write_error) {
               return ::write(::fileno(file), "x", 1) < 0 && errno == EFBIG ? 0 : 1;
             }),
             0);
+}
+
+// ---- children ----
+
+class ChildTest : public FilesTest {
+ protected:
+  // A shell script in the folder, which is looked for in PATH.
+  [[nodiscard]] Child start(const std::string& script, const std::vector<int>& descriptors = {}) const {
+    std::ofstream(folder_ / "a-child") << "#!/bin/sh\n" << script << "\n";
+    fs::permissions(folder_ / "a-child", fs::perms::owner_all);
+    ::setenv("PATH", (folder_.string() + ":/usr/bin:/bin").c_str(), 1);
+    auto child = Child::start("a-child", {}, folder_ / "log", descriptors);
+    EXPECT_TRUE(child) << child.error();
+    return std::move(*child);
+  }
+  [[nodiscard]] bool says(const std::string& wanted) const {
+    for (int i = 0; i < 3000; ++i, ::usleep(10'000)) {
+      if (read_all(folder_ / "log") == wanted) {
+        return true;
+      }
+    }
+    return false;
+  }
+};
+
+TEST_F(ChildTest, stands_outside_the_group_that_a_terminal_sends_ctrl_c_to) {
+  const Child child = start("echo up; sleep 60");
+  ASSERT_TRUE(says("up\n"));
+  EXPECT_EQ(::getpgid(child.pid()), child.pid());
+  EXPECT_NE(::getpgid(child.pid()), ::getpgrp());
+}
+
+TEST_F(ChildTest, goes_with_its_owner_even_if_it_ignores_what_asks_it_to_end) {
+  pid_t pid = 0;
+  {
+    const Child child = start("trap '' TERM INT HUP; echo up; sleep 3; echo over");
+    ASSERT_TRUE(says("up\n"));
+    pid = child.pid();
+    EXPECT_EQ(::kill(pid, 0), 0);
+  }
+  EXPECT_NE(::kill(pid, 0), 0);
+  EXPECT_EQ(read_all(folder_ / "log"), "up\n") << "it was waited for";
+}
+
+TEST_F(ChildTest, inherits_the_descriptors_it_is_given_and_no_others) {
+  const int given = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+  const int kept = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
+  const auto there = [](int fd) {
+    const std::string n = std::to_string(fd);
+    return "test -e /proc/$$/fd/" + n + " && echo " + n + "; ";
+  };
+  const Child child = start(there(given) + there(kept) + "echo all", {given});
+  EXPECT_TRUE(says(std::to_string(given) + "\nall\n")) << read_all(folder_ / "log");
+  ::close(given);
+  ::close(kept);
 }
 
 std::atomic<int> woken{0};

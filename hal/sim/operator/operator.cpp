@@ -400,7 +400,7 @@ void Operator::strokes(double dt_s) NONBLOCKING {
 }
 
 // Holds the enabling device; while the drives stay without power, lets it go and presses it anew. A relay that
-// has opened needs the reset button first.
+// has opened needs the reset button first, and nothing else is done meanwhile.
 void Operator::hold_to_run(double dt_s, const OperatorView& view) NONBLOCKING {
   OperatorState& s = state_;
   s.enabling_s += dt_s;
@@ -416,19 +416,21 @@ void Operator::hold_to_run(double dt_s, const OperatorView& view) NONBLOCKING {
 void Operator::step(double from_s, double to_s, const OperatorView& view) NONBLOCKING {
   const double dt_s = to_s - from_s;
   OperatorState& s = state_;
-  s.activity_s += dt_s;
   hold_to_run(dt_s, view);
   if (to_s >= s.next_look_s) {
     look(view);
     s.next_look_s = std::max(s.next_look_s + kLook_s, to_s - kLook_s);
   }
-  decide(to_s, view);
-  if (s.activity == Activity::clutch) {
-    clutch(dt_s);
-  } else if (s.activity == Activity::strokes) {
-    strokes(dt_s);
-  } else {
-    follow_path(dt_s, view);
+  if (!view.relay_open) {  // else the hand waits
+    s.activity_s += dt_s;
+    decide(to_s, view);
+    if (s.activity == Activity::clutch) {
+      clutch(dt_s);
+    } else if (s.activity == Activity::strokes) {
+      strokes(dt_s);
+    } else {
+      follow_path(dt_s, view);
+    }
   }
   const Vec3 shake = tremor_.at(to_s) + config_.position_scale * hand_from_world(drift_at(to_s));
   s.arm_target_m = Vec3(s.intention_m.vec() + shake);

@@ -849,8 +849,8 @@ std::vector<Row> rows() {
                               {.phase = injection, .after_s = 0.2, .what = What::start, .value = off}}});
   }
 
-  // A tick late by 50 ms. The relay waits 50 ms for the heartbeat and opens; the operator resets it. One that waits longer: an alarm,
-  // and the task goes on; with real actuators so many lost ticks are a fault.
+  // A tick late by 50 ms. The relay waits 50 ms for the heartbeat and opens; the operator resets it. One that
+  // waits longer: an alarm, and the task goes on; with real actuators so many lost ticks are a fault.
   for (const Phase phase : {free, contact, indentation, puncture, injection, withdrawal}) {
     all.push_back({.name = std::string("50 ms late in ") + rt::name(phase),
                    .events = {late(0.05, phase, 0.1)},

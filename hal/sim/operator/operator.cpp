@@ -399,8 +399,8 @@ void Operator::strokes(double dt_s) NONBLOCKING {
   s.intention_m = Vec3(s.intention_m.vec() + (place(s.activity_s) - place(s.activity_s - dt_s)) * to);
 }
 
-// Holds the enabling device; while the drives stay without power, lets it go and presses it anew. A relay that
-// has opened needs the reset button first, and nothing else is done meanwhile.
+// Holds the enabling device; while the drives stay without power, lets it go and presses it anew. A relay
+// that has opened needs the reset button first, and nothing else is done meanwhile.
 void Operator::hold_to_run(double dt_s, const OperatorView& view) NONBLOCKING {
   OperatorState& s = state_;
   s.enabling_s += dt_s;

@@ -15,8 +15,8 @@ SimEstop::SimEstop(const SimConfig& config)
       noise_(config.seed, Noise::Stream::estop_reading),
       liar_(config.seed, Device::estop) {}
 
-void SimEstop::step(std::int64_t t_ns, double from_s, double to_s, bool reset,
-                    const Failing& failure) NONBLOCKING {
+void SimEstop::step(std::int64_t t_ns, double from_s, double to_s, bool reset, const Failing& failure)
+    NONBLOCKING {
   failure_ = failure;
   bool a = true;
   bool b = true;

@@ -66,11 +66,11 @@ const Readings& DeviceInputs::read(const TickTime& time, const LastOutput& last)
   // Every device is read on every tick; the most urgent cause comes first.
   readings_.alarms = 0;
   readings_.estop_fault = read_estop(time);
-  Fault fault = read_hand(time, last);
-  fault = first_of(fault, judge_enabling(time, last));
-  fault = first_of(fault, read_stage(time, last));
-  fault = first_of(fault, read_vacuum(time, last));
-  readings_.device_fault = first_of(fault, read_injector(time, last));
+  readings_.device_faults = read_hand(time, last);
+  readings_.device_faults.add(judge_enabling(time, last));
+  readings_.device_faults.add(read_stage(time, last));
+  readings_.device_faults.add(read_vacuum(time, last));
+  readings_.device_faults.add(read_injector(time, last));
   read_force_sensor(time);
   return readings_;
 }

@@ -50,7 +50,7 @@ struct Readings {
   bool sensor_fresh = false;  // a good value within its time limit
 
   Fault estop_fault = Fault::none;
-  Fault device_fault = Fault::none;  // of the other devices, the most urgent one
+  Causes device_faults;  // of the other devices
   std::uint32_t alarms = 0;
 
   [[nodiscard]] bool button(std::uint32_t b) const NONBLOCKING { return (hand.buttons & b) != 0; }

@@ -30,6 +30,10 @@ class DriveCheck {
       stood_ = stood_ || stands_;
     }
     if (!stopped) {
+      if (seen) {
+        left_m_ = readings.stage.tip_m;
+        left_ = true;
+      }
       return;
     }
     const bool off = seen && !readings.stage.powered;

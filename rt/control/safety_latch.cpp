@@ -16,7 +16,7 @@ constexpr double kRounding_s = 1e-9;
 LatchOutput SafetyLatch::step(const LatchInput& in, double dt_s) NONBLOCKING {
   State& s = state_;
   const double dt = std::max(dt_s, 0.0);
-  const bool released = in.contacts_closed && in.cause == Fault::none && in.drive_obeys;
+  const bool released = in.contacts_closed && in.causes.first == Fault::none && in.drive_obeys;
   if (in.reset_down || in.reset_pressed) {
     s.reset_spent = s.reset_spent || s.stage != StopStage::stopped || !released;
   } else {
@@ -25,16 +25,16 @@ LatchOutput SafetyLatch::step(const LatchInput& in, double dt_s) NONBLOCKING {
 
   LatchOutput out;
   if (s.stage == StopStage::running) {
-    if (in.cause == Fault::none) {
+    if (in.causes.first == Fault::none) {
       return out;
     }
     s.stage = StopStage::stopping;
-    s.cause = in.cause;  // the first; later ones do not replace it
-    s.reset_needed = asks_for_reset(in.cause);
+    s.cause = in.causes.first;  // the first; later ones do not replace it
+    s.reset_needed = asks_for_reset(in.causes.first);
     s.since_s = 0;
     s.hand = 1;
   } else {
-    s.reset_needed = s.reset_needed || asks_for_reset(in.cause);
+    s.reset_needed = s.reset_needed || asks_for_reset(in.causes.first);
     const bool reset = in.chain_readable && in.reset_pressed && !s.reset_spent;
     const bool asked = s.reset_needed ? reset : in.pressed_anew;
     if (s.stage == StopStage::stopped && released && asked &&
@@ -50,7 +50,7 @@ LatchOutput SafetyLatch::step(const LatchInput& in, double dt_s) NONBLOCKING {
     s.since_s = std::min(s.since_s + dt, params_.power_off_after_s);
   }
 
-  s.distrusted = s.distrusted || asks_for(in.cause, SafetyAction::heartbeat_off) || !in.drive_obeys;
+  s.distrusted = s.distrusted || (in.causes.all & kDistrusted) != 0 || !in.drive_obeys;
 
   // The hand's ramp begins on the tick of the stop and is over within hand_ramp_s of it.
   Ramp hand(s.hand);

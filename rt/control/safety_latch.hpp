@@ -110,8 +110,17 @@ static_assert([] {
   return true;
 }());
 
+// The faults that ask for heartbeat_off; bit: Fault.
+inline constexpr std::uint32_t kDistrusted = [] {
+  std::uint32_t all = 0;
+  for (int i = 0; i < kFaults; ++i) {
+    all |= asks_for(static_cast<Fault>(i), SafetyAction::heartbeat_off) ? 1U << i : 0U;
+  }
+  return all;
+}();
+
 struct LatchInput {
-  Fault cause = Fault::none;    // what is wrong on this tick, the most urgent; none if nothing is
+  Causes causes;                // what is wrong on this tick
   bool chain_readable = true;   // the e-stop chain was read on this tick
   bool contacts_closed = true;  // both
   bool reset_pressed = false;
@@ -141,7 +150,7 @@ class SafetyLatch {
     bool reset_needed = false;  // a cause of this stop asks for the reset button
     double since_s = 0;         // since the stop, up to power_off_after_s
     double hand = 1;            // of the hand's ramp, 1 .. 0
-    bool distrusted = false;    // a cause of this stop asks for heartbeat_off
+    bool distrusted = false;    // something during this stop asked for heartbeat_off
     friend bool operator==(const State&, const State&) = default;
   };
 

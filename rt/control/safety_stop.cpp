@@ -2,12 +2,12 @@
 
 namespace punctum::rt {
 
-SafetyOutput SafetyStop::step(Fault cause, const hal::Vec3& hand_force_N, const Readings& readings,
+SafetyOutput SafetyStop::step(const Causes& causes, const hal::Vec3& hand_force_N, const Readings& readings,
                               double elapsed_s) NONBLOCKING {
   drive_.step(readings, latch_.stage() == StopStage::running, latch_.stage() == StopStage::stopped,
               elapsed_s);
   LatchInput in;
-  in.cause = cause;
+  in.causes = causes;
   in.chain_readable = readings.estop_readable;
   in.contacts_closed = readings.estop.contact_a_closed && readings.estop.contact_b_closed;
   in.reset_pressed = readings.estop.reset_pressed;

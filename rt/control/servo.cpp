@@ -115,12 +115,13 @@ SafetyOutput Servo::latch(const TickTime& time, const Readings& readings, const 
                           const LimitedForces& limited) NONBLOCKING {
   // The most urgent cause first.
   const Fault commanded = requested.stop ? Fault::command_stop : Fault::none;
-  Fault cause = first_of(readings.estop_fault, commanded);
-  cause = first_of(cause, readings.device_fault);
-  cause = first_of(cause, time.fault);
-  cause = first_of(cause, last_.write_fault);
-  cause = first_of(cause, limited.fault);
-  const SafetyOutput safety = safety_.step(cause, limited.hand_force_N, readings, time.elapsed_s);
+  Causes causes = readings.estop_fault;
+  causes.add(commanded);
+  causes.add(readings.device_faults);
+  causes.add(time.fault);
+  causes.add(last_.write_fault);
+  causes.add(limited.fault);
+  const SafetyOutput safety = safety_.step(causes, limited.hand_force_N, readings, time.elapsed_s);
   if (safety.latch.cleared) {
     rendering_.restart();  // the needle's path began anew on this tick already, see follow_hand
   }

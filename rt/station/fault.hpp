@@ -55,4 +55,20 @@ inline constexpr int kFaults = 18;
 // The more urgent of two: the first, unless it is none.
 [[nodiscard]] constexpr Fault first_of(Fault a, Fault b) NONBLOCKING { return a != Fault::none ? a : b; }
 
+// What is wrong on one tick: the most urgent, which is named, and all of it, which decides what is done.
+struct Causes {
+  constexpr Causes(Fault only = Fault::none) NONBLOCKING { add(only); }
+  constexpr void add(const Causes& later) NONBLOCKING {
+    first = first_of(first, later.first);
+    all |= later.all;
+  }
+  constexpr void add(Fault later) NONBLOCKING {
+    first = first_of(first, later);
+    all |= later != Fault::none ? 1U << static_cast<unsigned>(later) : 0U;
+  }
+  Fault first = Fault::none;
+  std::uint32_t all = 0;  // bit: Fault
+};
+static_assert(kFaults <= 32);
+
 }  // namespace punctum::rt

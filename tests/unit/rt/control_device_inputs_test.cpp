@@ -55,7 +55,7 @@ TEST(DeviceInputs, passes_good_values_on_without_fault_or_alarm) {
   in.settle();
   const Readings& r = in.inputs.readings();
   EXPECT_EQ(r.estop_fault, Fault::none);
-  EXPECT_EQ(r.device_fault, Fault::none);
+  EXPECT_EQ(r.device_faults.first, Fault::none);
   EXPECT_EQ(r.alarms, 0U);
   EXPECT_TRUE(r.hand_fresh && r.stage_fresh && r.estop_readable && r.sensor_fresh);
   EXPECT_TRUE(r.button(hal::kButtonInject));
@@ -71,15 +71,15 @@ TEST(DeviceInputs, keeps_the_last_good_value_of_a_silent_device_until_its_time_i
   in.hand.status = in.stage.status = Status::no_data;
   for (int k = 0; k < 19; ++k) {
     const Readings& r = in.read();
-    EXPECT_EQ(r.device_fault, Fault::none) << k;
+    EXPECT_EQ(r.device_faults.first, Fault::none) << k;
     EXPECT_FALSE(r.hand_fresh || r.stage_fresh);
     EXPECT_NEAR(r.hand.position_m.x(), 0.03, 1e-15);
     EXPECT_EQ(r.alarms, alarm_sensor);
   }
   (void)in.read();
-  EXPECT_EQ(in.read().device_fault, Fault::hand_lost);  // the limit of both is 20 ms
+  EXPECT_EQ(in.read().device_faults.first, Fault::hand_lost);  // the limit of both is 20 ms
   in.hand.status = Status::ok;
-  EXPECT_EQ(in.read().device_fault, Fault::stage_lost);
+  EXPECT_EQ(in.read().device_faults.first, Fault::stage_lost);
   EXPECT_NEAR(in.read().between_hand_s, 1e-3, 1e-12);
 }
 
@@ -92,7 +92,7 @@ TEST(DeviceInputs, takes_each_sample_of_a_slow_hand_once_and_measures_time_by_th
     in.hand.x.x() = 1e-5 * k;
     const Readings& r = in.read();
     EXPECT_EQ(r.alarms, 0U);
-    EXPECT_EQ(r.device_fault, Fault::none);
+    EXPECT_EQ(r.device_faults.first, Fault::none);
     EXPECT_EQ(r.hand_fresh, k % 4 == 0) << k;
     EXPECT_NEAR(r.hand_age_s, 1e-3 * (k % 4), 1e-12);
     if (r.hand_fresh) {
@@ -109,16 +109,16 @@ TEST(DeviceInputs, calls_devices_lost_that_repeat_their_newest_sample_for_longer
     in.settle();
     (hand ? in.hand.sample_every_ns = 1'000'000'000 : in.stage.repeats = true);
     for (int k = 0; k < 20; ++k) {
-      EXPECT_EQ(in.read().device_fault, Fault::none) << k;
+      EXPECT_EQ(in.read().device_faults.first, Fault::none) << k;
       EXPECT_EQ(in.inputs.readings().alarms, 0U);
       EXPECT_NE(hand ? in.inputs.readings().hand_fresh : in.inputs.readings().stage_fresh, true);
     }
-    EXPECT_EQ(in.read().device_fault, hand ? Fault::hand_lost : Fault::stage_lost);
+    EXPECT_EQ(in.read().device_faults.first, hand ? Fault::hand_lost : Fault::stage_lost);
     EXPECT_EQ(in.inputs.readings().alarms, alarm_sensor);
     // With the next sample all is well.
     in.hand.sample_every_ns = 0;
     in.stage.repeats = false;
-    EXPECT_EQ(in.read().device_fault, Fault::none);
+    EXPECT_EQ(in.read().device_faults.first, Fault::none);
   }
 }
 
@@ -141,7 +141,7 @@ TEST(DeviceInputs, does_not_believe_sample_times_ahead_of_the_clock_going_back_o
     EXPECT_EQ(r.hand_fresh, c.trusted);
     EXPECT_EQ(r.alarms, c.trusted ? 0U : alarm_sensor);
     EXPECT_EQ(r.hand.position_m.x() > 0, c.trusted);
-    EXPECT_EQ(r.device_fault, Fault::none);
+    EXPECT_EQ(r.device_faults.first, Fault::none);
   }
 }
 
@@ -151,13 +151,13 @@ TEST(DeviceInputs, finds_a_device_whose_sample_times_never_move_and_takes_it_bac
     in.hand.ahead_ns = -1'000'000 * k;  // always the same time
     in.hand.x.x() = 1e-5 * k;
     const Readings& r = in.read();
-    EXPECT_EQ(r.device_fault, k <= 20 ? Fault::none : Fault::hand_lost) << k;
+    EXPECT_EQ(r.device_faults.first, k <= 20 ? Fault::none : Fault::hand_lost) << k;
   }
   in.hand.ahead_ns = 0;
   for (int k = 0; k < 30; ++k) {
     (void)in.read();
   }
-  EXPECT_EQ(in.inputs.readings().device_fault, Fault::none);
+  EXPECT_EQ(in.inputs.readings().device_faults.first, Fault::none);
   EXPECT_TRUE(in.inputs.readings().hand_fresh);
 }
 
@@ -167,14 +167,14 @@ TEST(DeviceInputs, ignores_one_sample_of_the_hand_that_cannot_be_true_and_refuse
     in.settle();
     in.hand.jump_m = jump_m;
     const Readings& r = in.read();
-    EXPECT_EQ(r.device_fault, Fault::none) << jump_m;
+    EXPECT_EQ(r.device_faults.first, Fault::none) << jump_m;
     EXPECT_EQ(r.alarms, alarm_sensor);
     EXPECT_EQ(r.hand.position_m.x(), 0);
     EXPECT_FALSE(r.hand_fresh);
     EXPECT_GT(r.hand_age_s, 0);
     in.hand.jump_m = 0;
     (void)in.read();
-    EXPECT_EQ(r.device_fault, Fault::none) << jump_m;
+    EXPECT_EQ(r.device_faults.first, Fault::none) << jump_m;
     EXPECT_EQ(r.alarms, 0U);
     EXPECT_TRUE(r.hand_fresh);
     EXPECT_NEAR(r.between_hand_s, 2e-3, 1e-12);
@@ -182,7 +182,7 @@ TEST(DeviceInputs, ignores_one_sample_of_the_hand_that_cannot_be_true_and_refuse
     Fault fault = Fault::none;
     for (int k = 0; k < 20 && fault == Fault::none; ++k) {
       in.hand.jump_m = k % 2 == 0 ? jump_m : 0;
-      fault = in.read().device_fault;
+      fault = in.read().device_faults.first;
       EXPECT_EQ(r.hand.position_m.x(), 0);
     }
     EXPECT_EQ(fault, Fault::hand_invalid) << jump_m;
@@ -197,7 +197,7 @@ TEST(DeviceInputs, bears_bad_samples_of_a_slow_hand_no_longer_than_its_time) {
   for (int k = 0; k < 40; ++k) {
     const Readings& r = in.read();
     const bool old = r.hand_age_s > in.config.hand_timeout_s + 1e-9;
-    EXPECT_EQ(r.device_fault, old ? Fault::hand_invalid : Fault::none) << k;
+    EXPECT_EQ(r.device_faults.first, old ? Fault::hand_invalid : Fault::none) << k;
   }
 }
 
@@ -223,7 +223,7 @@ TEST(DeviceInputs, releases_the_buttons_of_an_invalid_hand_until_they_are_presse
   for (int k = 0; k < 5; ++k) {
     (void)in.read();
   }
-  EXPECT_EQ(in.inputs.readings().device_fault, Fault::hand_invalid);
+  EXPECT_EQ(in.inputs.readings().device_faults.first, Fault::hand_invalid);
   EXPECT_EQ(in.inputs.readings().hand.buttons, 0U);
   in.hand.jump_m = 0;
   in.settle();
@@ -281,26 +281,26 @@ TEST(DeviceInputs, refuses_readings_of_the_stage_that_no_stage_gives) {
     in.settle();
     const Vec3 tip = in.inputs.readings().stage.tip_m;
     in.stage.tip.y() = absurd;
-    EXPECT_EQ(in.read().device_fault, Fault::stage_fault) << absurd;
+    EXPECT_EQ(in.read().device_faults.first, Fault::stage_fault) << absurd;
     EXPECT_EQ(in.inputs.readings().stage.tip_m, tip);
     in.stage.tip.y() = 2e-6;
     in.stage.extra_error_m = absurd;
-    const Fault fault = in.read().device_fault;
+    const Fault fault = in.read().device_faults.first;
     EXPECT_TRUE(fault == Fault::stage_fault || fault == Fault::stage_following) << absurd;
     in.stage.extra_error_m = 0;
     in.stage.axis = Vec3(absurd, 0, 0);
-    EXPECT_EQ(in.read().device_fault, Fault::stage_fault) << absurd;
+    EXPECT_EQ(in.read().device_faults.first, Fault::stage_fault) << absurd;
   }
   for (const double length : {0.0, 0.5, 0.998}) {
     Inputs in;
     in.settle();
     in.stage.axis = Vec3(-length, 0, 0);
-    EXPECT_EQ(in.read().device_fault, Fault::stage_fault) << length;
+    EXPECT_EQ(in.read().device_faults.first, Fault::stage_fault) << length;
   }
   Inputs in;
   in.settle();
   in.stage.axis = Vec3(-1.0004, 0, 0);
-  EXPECT_EQ(in.read().device_fault, Fault::none);
+  EXPECT_EQ(in.read().device_faults.first, Fault::none);
   EXPECT_NEAR(in.inputs.readings().stage.axis.norm(), 1, 1e-15);
 }
 
@@ -329,7 +329,7 @@ TEST(DeviceInputs, takes_no_pressure_that_no_pump_makes_for_a_vacuum) {
     in.vacuum.pressure = absurd;
     Fault fault = Fault::none;
     for (int k = 0; k < 110; ++k) {
-      fault = in.read().device_fault;
+      fault = in.read().device_faults.first;
       EXPECT_EQ(in.inputs.readings().alarms, alarm_sensor);
     }
     EXPECT_EQ(fault, Fault::vacuum_lost) << absurd;
@@ -343,13 +343,13 @@ TEST(DeviceInputs, is_not_deceived_about_a_lost_vacuum_by_single_good_samples) {
   Fault fault = Fault::none;
   for (int k = 0; k < 400 && fault == Fault::none; ++k) {
     in.vacuum.pressure = k % 20 == 0 ? 600 : 100;
-    fault = in.read().device_fault;
+    fault = in.read().device_faults.first;
   }
   EXPECT_EQ(fault, Fault::vacuum_lost);
   // And it comes back within the window.
   in.vacuum.pressure = 600;
   for (int k = 0; k < 110; ++k) {
-    fault = in.read().device_fault;
+    fault = in.read().device_faults.first;
   }
   EXPECT_EQ(fault, Fault::none);
 }
@@ -442,11 +442,11 @@ TEST(DeviceInputs, compares_the_stage_with_the_set_points_that_were_sent) {
     if (!same_place) {
       in.last.set_point_m.x() += 11e-6;
     }
-    EXPECT_EQ(in.read().device_fault, same_place ? Fault::none : Fault::stage_following);
+    EXPECT_EQ(in.read().device_faults.first, same_place ? Fault::none : Fault::stage_following);
     // From where the path begins anew nothing was sent yet.
     in.last.stage_commanded = false;
     in.last.uncoupled = true;
-    EXPECT_EQ(in.read().device_fault, Fault::none);
+    EXPECT_EQ(in.read().device_faults.first, Fault::none);
   }
 }
 
@@ -456,7 +456,7 @@ TEST(DeviceInputs, calls_power_that_went_away_unasked_a_fault_unless_a_stop_took
     (void)in.read();
     in.stage.on = false;
     in.last.running = running;
-    EXPECT_EQ(in.read().device_fault, running ? Fault::stage_fault : Fault::none);
+    EXPECT_EQ(in.read().device_faults.first, running ? Fault::stage_fault : Fault::none);
   }
 }
 
@@ -466,13 +466,13 @@ TEST(DeviceInputs, bears_a_low_vacuum_for_its_window_and_between_cells) {
   Fault fault = Fault::none;
   int ticks = 0;
   while (fault == Fault::none && ticks < 200) {
-    fault = in.read().device_fault;
+    fault = in.read().device_faults.first;
     ++ticks;
   }
   EXPECT_EQ(fault, Fault::vacuum_lost);
   EXPECT_NEAR(ticks, 101, 1);
   in.last.between_cells = true;
-  EXPECT_EQ(in.read().device_fault, Fault::none);
+  EXPECT_EQ(in.read().device_faults.first, Fault::none);
 }
 
 TEST(DeviceInputs, counts_an_injection_only_while_gate_and_injector_are_both_open) {
@@ -485,7 +485,7 @@ TEST(DeviceInputs, counts_an_injection_only_while_gate_and_injector_are_both_ope
   EXPECT_FALSE(in.read().injected);
   Fault fault = Fault::none;
   for (int k = 0; k < 260; ++k) {
-    fault = in.read().device_fault;
+    fault = in.read().device_faults.first;
   }
   EXPECT_EQ(fault, Fault::injector_open);
 }

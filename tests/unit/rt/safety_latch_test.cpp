@@ -62,8 +62,8 @@ std::size_t explore(Check&& check) {
 TEST(SafetyLatch, keeps_the_first_cause_until_it_is_cleared) {
   const std::size_t states = explore([](const auto& before, const auto& in, const auto& after, const auto&) {
     if (before.stage == StopStage::running) {
-      EXPECT_EQ(after.cause, in.cause);
-      EXPECT_EQ(after.stage == StopStage::running, in.cause == Fault::none);
+      EXPECT_EQ(after.cause, in.causes.first);
+      EXPECT_EQ(after.stage == StopStage::running, in.causes.first == Fault::none);
     } else if (after.stage != StopStage::running) {
       EXPECT_EQ(after.cause, before.cause);
     }
@@ -79,7 +79,7 @@ TEST(SafetyLatch, clears_only_when_stopped_released_its_cause_gone_and_its_butto
     const bool reset = in.chain_readable && in.reset_pressed && !before.reset_spent;
     const bool button =
         before.cause == Fault::enabling_released && !before.reset_needed ? in.pressed_anew : reset;
-    const bool may = before.stage == StopStage::stopped && in.contacts_closed && in.cause == Fault::none &&
+    const bool may = before.stage == StopStage::stopped && in.contacts_closed && in.causes.first == Fault::none &&
                      in.drive_obeys && button && before.cause != Fault::command_stop;
     EXPECT_EQ(clears, may);
   });
@@ -114,7 +114,7 @@ TEST(SafetyLatch, leaves_the_drive_its_power_to_brake_with_also_where_no_force_h
   params.hand_ramp_s = 0;
   SafetyLatch latch(params);
   LatchInput in;
-  in.cause = Fault::estop;
+  in.causes = Fault::estop;
   EXPECT_TRUE(latch.step(in, kTick_s).drive_power);  // the standstill is from before the stop
   EXPECT_FALSE(latch.step(in, kTick_s).drive_power);
 }
@@ -139,13 +139,28 @@ TEST(SafetyLatch, lets_the_relay_open_only_when_loop_gate_or_drive_are_not_to_be
   };
   explore([&](const auto& before, const auto& in, const auto& after, const auto& out) {
     const bool distrusted =
-        before.distrusted || distrusts(in.cause) || (before.stage != StopStage::running && !in.drive_obeys);
+        before.distrusted || distrusts(in.causes.first) || (before.stage != StopStage::running && !in.drive_obeys);
     if (after.stage == StopStage::stopped) {
-      EXPECT_EQ(out.heartbeat, !distrusted && !(in.cause != Fault::none && !in.drive_obeys));
+      EXPECT_EQ(out.heartbeat, !distrusted && !(in.causes.first != Fault::none && !in.drive_obeys));
     } else {
       EXPECT_TRUE(out.heartbeat);
     }
   });
+}
+
+TEST(SafetyLatch, lets_the_relay_open_also_for_what_a_more_urgent_cause_hides) {
+  SafetyLatch latch(EstopParams{});
+  LatchInput in;
+  in.causes = Fault::command_stop;
+  in.at_standstill = false;
+  latch.step(in, kTick_s);
+  in.causes.add(Fault::stage_lost);
+  LatchOutput out;
+  for (int k = 0; k < 1000; ++k) {
+    out = latch.step(in, kTick_s);
+  }
+  EXPECT_EQ(latch.cause(), Fault::command_stop);
+  EXPECT_FALSE(out.heartbeat);
 }
 
 TEST(SafetyLatch, gives_no_heartbeat_again_before_the_reset) {
@@ -163,7 +178,7 @@ TEST(SafetyLatch, is_over_in_time_at_every_rate) {
     SafetyLatch latch(params);
     const double dt = 1 / rate;
     LatchInput in;
-    in.cause = Fault::estop;
+    in.causes = Fault::estop;
     in.contacts_closed = false;
     in.at_standstill = false;
     double before = 1;
@@ -190,9 +205,9 @@ TEST(SafetyLatch, ignores_a_reset_button_that_is_stuck) {
   SafetyLatch latch(EstopParams{});
   LatchInput in;
   in.reset_pressed = true;
-  in.cause = Fault::estop;
+  in.causes = Fault::estop;
   latch.step(in, kTick_s);
-  in.cause = Fault::none;
+  in.causes = Fault::none;
   for (int k = 0; k < 5000; ++k) {
     latch.step(in, kTick_s);
   }
@@ -203,9 +218,9 @@ TEST(SafetyLatch, ignores_a_reset_button_that_is_stuck) {
   in.reset_pressed = true;
   EXPECT_TRUE(latch.step(in, kTick_s).cleared);
   // Held down through a second stop it does not clear that one.
-  in.cause = Fault::hand_lost;
+  in.causes = Fault::hand_lost;
   latch.step(in, kTick_s);
-  in.cause = Fault::none;
+  in.causes = Fault::none;
   for (int k = 0; k < 5000; ++k) {
     latch.step(in, kTick_s);
   }
@@ -217,7 +232,7 @@ TEST(SafetyLatch, takes_no_press_of_the_reset_button_that_began_before_all_was_r
   for (const bool before : {true, false}) {
     SafetyLatch latch(EstopParams{});
     LatchInput in;
-    in.cause = Fault::estop;
+    in.causes = Fault::estop;
     in.contacts_closed = false;
     for (int k = 0; k < 1000; ++k) {
       latch.step(in, kTick_s);
@@ -225,7 +240,7 @@ TEST(SafetyLatch, takes_no_press_of_the_reset_button_that_began_before_all_was_r
     // A press counts once it has lasted for a while: the contacts close meanwhile, or were closed before.
     in.reset_down = before;
     latch.step(in, kTick_s);
-    in.cause = Fault::none;
+    in.causes = Fault::none;
     in.contacts_closed = true;
     latch.step(in, kTick_s);
     in.reset_down = true;
@@ -238,9 +253,9 @@ TEST(SafetyLatch, takes_no_press_of_the_reset_button_that_began_before_all_was_r
       latch.step(in, kTick_s);
       in.reset_down = true;
       latch.step(in, kTick_s);
-      in.cause = Fault::estop;
+      in.causes = Fault::estop;
       latch.step(in, kTick_s);
-      in.cause = Fault::none;
+      in.causes = Fault::none;
       in.reset_pressed = true;
       EXPECT_FALSE(latch.step(in, kTick_s).cleared);
     }
@@ -251,11 +266,11 @@ TEST(SafetyLatch, asks_for_the_reset_button_when_more_than_the_enabling_device_w
   for (const Fault later : {Fault::none, Fault::estop}) {
     SafetyLatch latch(EstopParams{});
     LatchInput in;
-    in.cause = Fault::enabling_released;
+    in.causes = Fault::enabling_released;
     latch.step(in, kTick_s);
-    in.cause = later;
+    in.causes = later;
     latch.step(in, kTick_s);
-    in.cause = Fault::none;
+    in.causes = Fault::none;
     for (int k = 0; k < 1000; ++k) {
       latch.step(in, kTick_s);
     }

@@ -25,8 +25,8 @@ class SafetyStop {
   explicit SafetyStop(const EstopParams& params) NONBLOCKING : latch_(params) {}
 
   // cause: the most urgent one of this tick, Fault::none if nothing is wrong.
-  [[nodiscard]] SafetyOutput step(const Causes& causes, const hal::Vec3& hand_force_N, const Readings& readings,
-                                  double elapsed_s) NONBLOCKING;
+  [[nodiscard]] SafetyOutput step(const Causes& causes, const hal::Vec3& hand_force_N,
+                                  const Readings& readings, double elapsed_s) NONBLOCKING;
 
   [[nodiscard]] Fault cause() const NONBLOCKING { return latch_.cause(); }
   [[nodiscard]] StopStage stage() const NONBLOCKING { return latch_.stage(); }

@@ -79,8 +79,9 @@ TEST(SafetyLatch, clears_only_when_stopped_released_its_cause_gone_and_its_butto
     const bool reset = in.chain_readable && in.reset_pressed && !before.reset_spent;
     const bool button =
         before.cause == Fault::enabling_released && !before.reset_needed ? in.pressed_anew : reset;
-    const bool may = before.stage == StopStage::stopped && in.contacts_closed && in.causes.first == Fault::none &&
-                     in.drive_obeys && button && before.cause != Fault::command_stop;
+    const bool may = before.stage == StopStage::stopped && in.contacts_closed &&
+                     in.causes.first == Fault::none && in.drive_obeys && button &&
+                     before.cause != Fault::command_stop;
     EXPECT_EQ(clears, may);
   });
 }
@@ -138,8 +139,8 @@ TEST(SafetyLatch, lets_the_relay_open_only_when_loop_gate_or_drive_are_not_to_be
            cause == Fault::stage_following || cause == Fault::stage_not_stopping;
   };
   explore([&](const auto& before, const auto& in, const auto& after, const auto& out) {
-    const bool distrusted =
-        before.distrusted || distrusts(in.causes.first) || (before.stage != StopStage::running && !in.drive_obeys);
+    const bool distrusted = before.distrusted || distrusts(in.causes.first) ||
+                            (before.stage != StopStage::running && !in.drive_obeys);
     if (after.stage == StopStage::stopped) {
       EXPECT_EQ(out.heartbeat, !distrusted && !(in.causes.first != Fault::none && !in.drive_obeys));
     } else {

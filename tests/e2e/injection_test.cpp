@@ -15,6 +15,17 @@ namespace {
 using Strings = std::vector<std::string>;
 const Strings kOrder = {"free", "contact", "indentation", "puncture", "injection", "withdrawal", "clear"};
 
+TEST_F(Programs, an_injection_that_the_relay_breaks_off_is_begun_anew) {
+  EXPECT_EQ(punctum({"run", "icsi", "--clock", "virtual", "--set", "vision.method=truth", "--no-figure",
+                     "--no-frames", "--set",
+                     "sim.failure=[{device=\"estop\", kind=\"drop\", at_s=11.3, for_s=0.06}]"}),
+            3)
+      << said_;
+  const auto r = json();
+  EXPECT_EQ(r["outcome"], "done after a fault") << said_;
+  EXPECT_EQ(r["faults"].size(), 1U);
+}
+
 TEST_F(Programs, an_injection_goes_through_its_phases_in_order) {
   for (const char* method : {"truth", "paper"}) {
     ASSERT_EQ(punctum({"run", "icsi", "--clock", "virtual", "--set", std::string("vision.method=") + method}),

@@ -400,17 +400,19 @@ void Operator::strokes(double dt_s) NONBLOCKING {
 }
 
 // Holds the enabling device; while the drives stay without power, lets it go and presses it anew. A relay
-// that has opened needs the reset button first, and nothing else is done meanwhile.
+// that has opened needs the reset button first; until the drives have power again nothing else is done, and
+// an injection that was broken off begins anew.
 void Operator::hold_to_run(double dt_s, const OperatorView& view) NONBLOCKING {
   OperatorState& s = state_;
-  s.enabling_s += dt_s;
   const bool held = s.enabling != 0;
+  s.enabling_s = held && view.powered ? 0 : s.enabling_s + dt_s;  // how long in vain, or let go
   if (held ? !view.powered && s.enabling_s > kEnablingHeld_s : s.enabling_s > kEnablingLetGo_s) {
     s.enabling = held ? 0U : hal::kButtonEnable;
     s.enabling_s = 0;
   }
   s.relay_open_s = view.relay_open ? s.relay_open_s + dt_s : 0;
   s.reset = std::fmod(s.relay_open_s, kResetEvery_s) > kResetEvery_s - kResetFor_s ? 1U : 0U;
+  s.waits = view.relay_open || (s.waits != 0 && !view.powered) ? 1U : 0U;
 }
 
 void Operator::step(double from_s, double to_s, const OperatorView& view) NONBLOCKING {
@@ -421,7 +423,10 @@ void Operator::step(double from_s, double to_s, const OperatorView& view) NONBLO
     look(view);
     s.next_look_s = std::max(s.next_look_s + kLook_s, to_s - kLook_s);
   }
-  if (!view.relay_open) {  // else the hand waits
+  if (s.waits != 0) {
+    s.buttons = 0;
+    s.activity_s = s.activity == Activity::inject ? 0 : s.activity_s;
+  } else {
     s.activity_s += dt_s;
     decide(to_s, view);
     if (s.activity == Activity::clutch) {

@@ -101,7 +101,7 @@ struct OperatorState {
   double enabling_s = 0;       // since it was let go, or held without power for the drives
   std::uint32_t reset = 0;     // the reset button of the e-stop chain
   double relay_open_s = 0;
-  std::uint32_t waits = 0;  // since the relay opened, until the drives have power again
+  std::uint32_t waits = 0;     // since the relay opened, until the drives have power again
   std::uint32_t attempts = 0;  // at this cell
   std::uint32_t cells_done = 0;
   std::uint32_t given_up = 0;    // cells of cells_done that were never punctured

@@ -24,7 +24,7 @@ class SafetyStop {
  public:
   explicit SafetyStop(const EstopParams& params) NONBLOCKING : latch_(params) {}
 
-  // cause: the most urgent one of this tick, Fault::none if nothing is wrong.
+  // causes: all that is wrong on this tick.
   [[nodiscard]] SafetyOutput step(const Causes& causes, const hal::Vec3& hand_force_N,
                                   const Readings& readings, double elapsed_s) NONBLOCKING;
 

@@ -540,7 +540,10 @@ class Invariants {
       must(I::waits_for_enabling, !s.power && s.commands == 0 && s.asked_N.norm() == 0);
     }
     // A sample that is not believed may be the one that tells it: the hand is silent then.
-    const bool on = running && was_running_ && pressed_ && s.power;  // without power L8 holds
+    // A press in the stop before is one that the core may believe or not: without it the station does
+    // nothing.
+    const bool acts = s.power || s.commands != 0 || s.asked_N.norm() != 0;
+    const bool on = running && was_running_ && pressed_ && acts;
     let_go_s_ = on && !held ? let_go_s_ + s.elapsed_s : 0;
     squeezed_s_ = on && squeezed(buttons_) ? squeezed_s_ + s.elapsed_s : 0;
     const double unseen_s = b_.c.hand_timeout_s + two_ticks_s;

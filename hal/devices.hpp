@@ -58,6 +58,7 @@ struct HandState {
 class HapticDevice {
  public:
   [[nodiscard]] virtual Status read(HandState& out) NONBLOCKING = 0;
+  // no_data: it takes none now, and the force before goes on.
   [[nodiscard]] virtual Status write_force(const Vec3& force_N) NONBLOCKING = 0;
 
  protected:

@@ -5,7 +5,8 @@
 namespace punctum::rt {
 
 Written DeviceOutputs::write(const SafetyOutput& safety, const Readings& readings,
-                             const hal::StageCommand* set_point, bool gate_open) NONBLOCKING {
+                             const hal::StageCommand* set_point, bool gate_open, double elapsed_s)
+    NONBLOCKING {
   Written written;
   if (safety.latch.cleared) {
     hand_force_unknown_ = false;
@@ -17,7 +18,10 @@ Written DeviceOutputs::write(const SafetyOutput& safety, const Readings& reading
     devices_.injector->gate(gate_open);
   }
   const hal::Status status = devices_.hand.write_force(safety.hand_force_N);
-  if (status == hal::Status::disconnected || status == hal::Status::fault) {
+  force_refused_s_ = status == hal::Status::ok ? 0 : force_refused_s_ + elapsed_s;
+  if (status == hal::Status::disconnected || status == hal::Status::fault ||
+      force_refused_s_ > hand_timeout_s_) {
+    force_refused_s_ = 0;
     written.fault = first_of(written.fault, Fault::hand_lost);
     hand_force_unknown_ = true;
   }

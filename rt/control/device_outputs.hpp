@@ -18,11 +18,13 @@ class DeviceOutputs {
  public:
   DeviceOutputs(const ServoConfig& config, const Devices& devices) NONBLOCKING
       : devices_(devices),
-        stage_divisor_(config.stage_divisor > 1 ? config.stage_divisor : 1) {}
+        stage_divisor_(config.stage_divisor > 1 ? config.stage_divisor : 1),
+        hand_timeout_s_(config.hand_timeout_s) {}
 
   // set_point: a null pointer as long as hand and needle are not coupled.
   [[nodiscard]] Written write(const SafetyOutput& safety, const Readings& readings,
-                              const hal::StageCommand* set_point, bool gate_open) NONBLOCKING;
+                              const hal::StageCommand* set_point, bool gate_open, double elapsed_s)
+      NONBLOCKING;
 
  private:
   void write_stage(const LatchOutput& latch, const Readings& readings, const hal::StageCommand* set_point,
@@ -30,6 +32,8 @@ class DeviceOutputs {
 
   const Devices devices_;
   int stage_divisor_;
+  double hand_timeout_s_;
+  double force_refused_s_ = 0;       // for so long the hand has taken no force
   int until_command_ = 0;            // ticks until the next stage set-point
   bool hand_force_unknown_ = false;  // it could not be written: no heartbeat until the reset
   bool heartbeat_level_ = false;

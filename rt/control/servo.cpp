@@ -36,7 +36,8 @@ void Servo::tick(const TickInfo& now) NONBLOCKING {
   const std::uint32_t stage_alarms =
       choose_stage_set_point(time, readings, requested, cell, task, limited, safety);
   const bool gate_open = choose_gate(time, readings, requested, cell, task, safety);
-  const Written written = outputs_.write(safety, readings, stage_set_point_.command(), gate_open);
+  const Written written =
+      outputs_.write(safety, readings, stage_set_point_.command(), gate_open, time.elapsed_s);
   rendering_.wrote(safety.hand_force_N);
   const std::uint32_t alarms = time.alarms | readings.alarms | hand_alarms | cell.alarms | task.alarms |
                                rendering_.alarms() | limited.alarms | stage_alarms;

@@ -9,7 +9,7 @@ namespace {
 
 // Nobody has seen where the hand went in a longer gap: the needle does not catch it up. Twice the period of
 // the slowest device that hand_watch.hpp allows for.
-constexpr double kLongestGap_s = 0.01;
+constexpr double kHandGap_s = 0.01;
 // Of the hand, between pushing in vain and drawing back: more than it trembles by (0.7 mm from peak to peak),
 // or every tremble would draw the needle back a little more.
 constexpr double kSlack_m = 1e-3;
@@ -39,10 +39,10 @@ std::uint32_t StageSetPoint::follow_hand(const Readings& readings, const FollowI
     return 0;
   }
   const bool hand_moves_again = last_hand_stuck_ && !readings.hand_stuck;
-  const bool hand_had_a_gap = readings.hand_fresh && readings.between_hand_s > kLongestGap_s;
+  const bool hand_had_a_gap = readings.hand_fresh && readings.between_hand_s > kHandGap_s;
   const bool way_closes_or_opens = in.constraint.withdrawal_only != last_withdrawal_only_;
   // What the hand did meanwhile is forgotten: the needle does not catch up by itself.
-  if (in.elapsed_s > kLongestGap_s) {
+  if (in.elapsed_s > kHandGap_s) {
     anchor(readings.hand, limits_.set_point().tip_m, limits_.set_point().axis);
   } else if (hand_moves_again || hand_had_a_gap || way_closes_or_opens) {
     mapping_.anchor(readings.hand, limits_.stops_at_m(), limits_.set_point().axis);

@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kReweightings = 4;
 constexpr int kNewtonSteps = 3;
-constexpr double kTukey = 4.7;        // times the scale: 95 % efficiency for normally distributed errors
+constexpr double kTukeyScales = 4.7;  // times the scale: 95 % efficiency for normally distributed errors
 constexpr double kLeastScale = 0.05;  // px
 
 // Kasa's algebraic fit, from its normal equations about `mean`. The centre is relative to `mean`.
@@ -127,7 +127,7 @@ std::optional<Circle> fit_circle(std::span<const Point> points, std::span<const 
     out.rms = std::sqrt(se / std::max(sw, 1e-12));
     const double scale = std::max(kSdOfMedian * median_of(std::move(distances)), kLeastScale);
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const double t = (cv::norm(points[i] - out.centre) - out.r) / (kTukey * scale);
+      const double t = (cv::norm(points[i] - out.centre) - out.r) / (kTukeyScales * scale);
       w[i] = std::abs(t) < 1 ? given[i] * std::pow(1 - t * t, 2) : 0;
     }
   }

@@ -27,7 +27,7 @@ struct Outputs {
     return config;
   }
   Written write(const hal::StageCommand* to, bool gate_open = false) {
-    return outputs.write(safety, readings, to, gate_open);
+    return outputs.write(safety, readings, to, gate_open, 1e-3);
   }
   FakeHand hand;
   FakeStage stage{Vec3(60e-6, 0, 0)};
@@ -99,7 +99,7 @@ TEST(DeviceOutputs, gives_no_heartbeat_when_the_latch_takes_it_away_or_a_device_
     FakeEstop estop;
     DeviceOutputs outputs(ServoConfig{}, {.hand = hand, .estop = &estop});
     const bool good = status == Status::ok || status == Status::no_data;
-    EXPECT_EQ(outputs.write(SafetyOutput{}, Readings{}, nullptr, false).fault,
+    EXPECT_EQ(outputs.write(SafetyOutput{}, Readings{}, nullptr, false, 1e-3).fault,
               good ? Fault::none : Fault::hand_lost);
     EXPECT_EQ(estop.toggles, good ? 1 : 0);
   }
@@ -111,13 +111,36 @@ TEST(DeviceOutputs, gives_no_heartbeat_after_a_force_that_could_not_be_written_u
   DeviceOutputs outputs(ServoConfig{}, {.hand = hand, .estop = &estop});
   SafetyOutput safety;
   hand.status = Status::fault;
-  EXPECT_EQ(outputs.write(safety, Readings{}, nullptr, false).fault, Fault::hand_lost);
+  EXPECT_EQ(outputs.write(safety, Readings{}, nullptr, false, 1e-3).fault, Fault::hand_lost);
   hand.status = Status::ok;
-  EXPECT_EQ(outputs.write(safety, Readings{}, nullptr, false).fault, Fault::none);
+  EXPECT_EQ(outputs.write(safety, Readings{}, nullptr, false, 1e-3).fault, Fault::none);
   EXPECT_EQ(estop.toggles, 0);
   safety.latch.cleared = true;
-  (void)outputs.write(safety, Readings{}, nullptr, false);
+  (void)outputs.write(safety, Readings{}, nullptr, false, 1e-3);
   EXPECT_EQ(estop.toggles, 1);
+}
+
+TEST(DeviceOutputs, gives_no_heartbeat_after_a_hand_has_taken_no_force_for_as_long_as_it_may_be_silent) {
+  FailingHand hand;
+  FakeEstop estop;
+  ServoConfig config;
+  config.hand_timeout_s = 0.02;
+  DeviceOutputs outputs(config, {.hand = hand, .estop = &estop});
+  for (int k = 0; k < 100; ++k) {  // every tenth is taken
+    hand.status = k % 10 == 9 ? Status::ok : Status::no_data;
+    ASSERT_EQ(outputs.write(SafetyOutput{}, Readings{}, nullptr, false, 1e-3).fault, Fault::none) << k;
+  }
+  EXPECT_EQ(estop.toggles, 100);
+  hand.status = Status::no_data;
+  int ticks = 1;
+  while (ticks < 100 &&
+         outputs.write(SafetyOutput{}, Readings{}, nullptr, false, 1e-3).fault != Fault::hand_lost) {
+    ++ticks;
+  }
+  EXPECT_NEAR(ticks, 21, 1);
+  const int toggles = estop.toggles;
+  (void)outputs.write(SafetyOutput{}, Readings{}, nullptr, false, 1e-3);
+  EXPECT_EQ(estop.toggles, toggles);
 }
 
 }  // namespace

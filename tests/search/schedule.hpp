@@ -126,6 +126,7 @@ inline constexpr std::array<Draw, kLies> kDraws{{
     {Lie::hand_absurd, 2, 0.1, 1e300, true, 1, 10},
     {Lie::hand_time, 2, 1e-4, 10, true, 1, 100},
     {Lie::hand_refuses_force, 2, 1, 1, false, 1, 100},
+    {Lie::hand_takes_no_force, 2, 1, 1, false, 1, 900},
     {Lie::stage_no_data, 3, 1, 1, false, 1, 900},
     {Lie::stage_gone, 3, 1, 1, false, 1, 900},
     {Lie::stage_fault, 3, 1, 1, false, 1, 100},

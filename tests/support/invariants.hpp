@@ -59,6 +59,7 @@ enum class Invariant : std::uint8_t {
   relay_stage_obeys,
   relay_off_when_distrusted,
   relay_alive,
+  relay_hand_obeys,
   leaves_stop_by_reset,
   first_cause_kept,
   stops_on_estop,
@@ -114,6 +115,7 @@ inline constexpr std::array<InvariantName, kInvariants> kInvariantNames{{
     {"H2", "relay_stage_obeys"},
     {"H3", "relay_off_when_distrusted"},
     {"H4", "relay_alive"},
+    {"H5", "relay_hand_obeys"},
     {"L1", "leaves_stop_by_reset"},
     {"L2", "first_cause_kept"},
     {"L3", "stops_on_estop"},
@@ -751,7 +753,9 @@ class Invariants {
   // ---- H ----
   void relay(const Seen& s, const TelemetrySample& t, bool running) {
     const bool toggled = known_ && s.level != level_;
+    force_lost_s_ = s.force_N == s.asked_N ? 0 : force_lost_s_ + (s.clock_true ? s.elapsed_s : 0);
     if (toggled) {
+      at_most(I::relay_hand_obeys, force_lost_s_ - b_.c.hand_timeout_s, b_.relay_s);
       const double stop_takes_s = b_.c.estop.power_off_after_s + b_.relay_s;
       at_most(I::relay_inputs_fresh, stage_known_ ? stage_silent_s_ - b_.c.stage_timeout_s : 0, stop_takes_s);
       at_most(I::relay_inputs_fresh, estop_silent_s_ - 0.05, stop_takes_s);
@@ -844,7 +848,8 @@ class Invariants {
   double stop_s_ = 0, work_J_ = 0, credit_J_ = 0, stored_J_ = 0;
   bool stop_clock_true_ = true;
   double unknown_s_ = 0;
-  bool refused_ = false;  // the force that acts is not the one that was written
+  double force_lost_s_ = 0;  // for so long another force has acted than was written
+  bool refused_ = false;     // the force that acts is not the one that was written
   double outside_s_ = 0, faded_s_ = 0;
   int commanded_ticks_ = 0, since_stop_ = 0;
   bool quick_stopped_ = false;

@@ -51,6 +51,7 @@ enum class Lie : std::uint8_t {
   hand_absurd,  // m, instead of the position
   hand_time,    // s, added to the sample's time
   hand_refuses_force,
+  hand_takes_no_force,  // it keeps the last one, and says no more than that
   // The stage.
   stage_no_data,
   stage_gone,
@@ -136,6 +137,7 @@ inline constexpr std::array<const char*, kLies> kLieNames{"moves",
                                                           "hand_absurd",
                                                           "hand_time",
                                                           "hand_refuses_force",
+                                                          "hand_takes_no_force",
                                                           "stage_no_data",
                                                           "stage_gone",
                                                           "stage_fault",
@@ -625,6 +627,9 @@ class LyingStation {
       at.seen_.asked_N = f;
       if (at.on(Lie::hand_refuses_force)) {
         return hal::Status::fault;
+      }
+      if (at.on(Lie::hand_takes_no_force)) {
+        return hal::Status::no_data;
       }
       at.truth.force = f.allFinite() ? f : Vec3::Zero();
       return hal::Status::ok;

@@ -308,6 +308,35 @@ TEST(Passivity, a_late_needle_is_seen_where_the_handle_alone_would_not_show_it) 
   EXPECT_GT(surplus(true), 0.5);  // K tau = 1 Ns/m is what it takes
 }
 
+// An active force of 0.5 N that always goes with a hand at up to 20 mm/s: 6 mW, of which it may give
+// kActive_W.
+TEST(Passivity, an_effect_that_may_give_energy_gives_no_more_than_it_is_allowed) {
+  HandDevice device;
+  device.encoder_step_m = 0;
+  PassivityGuard guard({}, device, {}, 1000);
+  GuardInput in;
+  in.elapsed_s = 1e-3;
+  double x = 0, work_J = 0, acts_N = 0;
+  for (int k = 0; k < 10000; ++k) {
+    const double v = 20e-3 * std::sin(2 * std::numbers::pi * k * 1e-3);
+    work_J += acts_N * v * in.elapsed_s;
+    x += v * in.elapsed_s;
+    in.position_m = {x, 0, 0};
+    in.active_N = {v > 0 ? 0.5 : -0.5, 0, 0};
+    const hal::Vec3 force_N = guard.step(in);
+    if (k < 50) {
+      ASSERT_EQ(force_N, in.active_N) << "the first ticks give next to nothing: " << k;
+    }
+    guard.wrote(force_N);
+    acts_N = force_N.x();
+    const double one_tick_J = 0.5 * 20e-3 * in.elapsed_s;
+    ASSERT_LE(work_J,
+              PassivityGuard::kActive_J + PassivityGuard::kActive_W * k * in.elapsed_s + 2 * one_tick_J)
+        << k;
+  }
+  EXPECT_GT(work_J, 0.5 * PassivityGuard::kActive_W * 10);
+}
+
 TEST(Passivity, eight_hours_at_rest_and_in_gentle_motion_wind_nothing_up) {
   HandDevice device;
   PassivityGuard guard({}, device, {}, 1000);

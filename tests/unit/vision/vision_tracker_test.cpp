@@ -212,6 +212,54 @@ TEST(Tracker, does_not_report_a_puncture_when_the_needle_only_withdraws) {
   }
 }
 
+// Two frames do not show the needle that dents the cell. Without the needle, nothing says that the dimple is
+// one: whoever takes it for the cell at rest has lost the place where the needle enters.
+TEST(Tracker, keeps_the_cell_at_rest_and_the_contact_over_frames_that_do_not_show_the_needle) {
+  Tracker tracker({}, kW, kH);
+  const double surface = kCentre.x + kR;
+  std::uint64_t n = 0;
+  const auto step = [&](double d, bool needle) -> const Result& {
+    const Drawing drawn{surface - d, std::max(0.0, d), 2, static_cast<unsigned>(n) + 1, needle};
+    return tracker.process(frame_of(draw(drawn), n++));
+  };
+  for (double d = -26; d <= 14; d += d < 0 ? 4 : 2) {
+    ASSERT_TRUE(step(d, true).needle.ok) << d;
+  }
+  for (int hidden = 0; hidden < 3; ++hidden) {
+    const Result& r = step(14, false);
+    ASSERT_TRUE(r.outer.ok && !r.needle.ok) << r.verdict;
+    EXPECT_FALSE(r.contact);  // this frame does not show it
+    EXPECT_EQ(r.phase, rt::Phase::indentation);
+    EXPECT_LT(cv::norm(r.undeformed->centre - kCentre), 0.5);
+  }
+  const Result& again = step(14.5, true);
+  ASSERT_TRUE(again.needle.ok && again.wd_px) << again.verdict;
+  EXPECT_TRUE(again.contact);
+  EXPECT_FALSE(again.punctured);
+  EXPECT_NEAR(*again.wd_px, 14.5, 1.4);
+  EXPECT_LT(cv::norm(again.undeformed->centre - kCentre), 0.5);
+}
+
+TEST(Tracker, does_not_say_that_the_needle_has_left_the_cell_when_it_is_not_seen) {
+  Tracker tracker({}, kW, kH);
+  const double surface = kCentre.x + kR;
+  std::uint64_t n = 0;
+  const auto step = [&](double d, double dent, bool needle) -> const Result& {
+    const Drawing drawn{surface - d, dent, 2, static_cast<unsigned>(n) + 1, needle};
+    return tracker.process(frame_of(draw(drawn), n++));
+  };
+  for (double d = -26; d <= 14; d += d < 0 ? 4 : 2) {
+    ASSERT_TRUE(step(d, std::max(0.0, d), true).needle.ok) << d;
+  }
+  for (const double left : {5.0, 2.0, 0.5, 0.0}) {
+    (void)step(14, left, true);
+  }
+  const Result& hidden = step(14, 0, false);
+  ASSERT_FALSE(hidden.needle.ok);
+  EXPECT_TRUE(hidden.punctured);
+  EXPECT_EQ(hidden.phase, rt::Phase::puncture);
+}
+
 TEST(Tracker, follows_the_snake_alone_as_the_paper_does) {
   VisionConfig config;
   config.refine = false;

@@ -71,6 +71,8 @@ struct Tracker::Impl {
 
   const Result& process(const hal::Frame& frame);
 
+  // A needle that was seen before and is not seen now may be anywhere: it tells neither contact nor its end.
+  [[nodiscard]] bool needle_hidden() const { return needle.started() && !result.needle.ok; }
   [[nodiscard]] bool must_start() const;
   [[nodiscard]] cv::Rect area_to_search(bool starting) const;
   void locate_needle();
@@ -320,7 +322,7 @@ int Tracker::Impl::fit_undeformed_membrane() {
   if (!now) {
     return 0;
   }
-  const bool touched = entry || was_contact || puncture.punctured();
+  const bool touched = entry || was_contact || puncture.punctured() || needle_hidden();
   const Point shift = undeformed.update(*now, touched, mouth);
   for (FollowedMembrane* m : {&outer, &inner}) {
     m->rest.centre += shift;
@@ -386,7 +388,7 @@ std::optional<InnerOnNeedle> Tracker::Impl::inner_on_needle() const {
 void Tracker::Impl::classify_contact(const std::optional<double>& membrane_behind_tip) {
   PunctureInput in;
   in.t_ns = result.exposure_ns;
-  in.contact = result.contact;
+  in.contact = needle_hidden() ? was_contact : result.contact;
   in.gap_px = result.gap_px.value_or(0);
   in.radius_px = result.needle.half_width;
   in.points = membrane_behind_tip && result.entry;
@@ -399,7 +401,7 @@ void Tracker::Impl::classify_contact(const std::optional<double>& membrane_behin
   result.inner_punctured =
       inner_puncture.update(result.punctured, inner_on_needle(), result.needle.half_width);
   result.membrane_velocity_px_s = puncture.membrane_velocity_px_s();
-  was_contact = result.contact;
+  was_contact = in.contact;
   if (!result.gap_px) {
     return;
   }
@@ -414,6 +416,9 @@ void Tracker::Impl::classify_contact(const std::optional<double>& membrane_behin
 
 void Tracker::Impl::decide_phase() {
   tip.update(result.needle);
+  if (needle_hidden()) {
+    return;
+  }
   result.phase = next_phase(result.phase, {.um_px = config.px(1e-6),
                                            .gap_px = result.gap_px,
                                            .wd_px = result.wd_px.value_or(0),

@@ -25,6 +25,7 @@ struct Drawing {
   double tip = 330;     // x of the end face; the needle comes from the right
   double blur = 1.2;    // px, of the needle
   double granules = 0;  // deviation of the yolk's grey level, left of kYolk_x
+  double noise = kNoise;
   unsigned frame = 0;
 };
 
@@ -72,7 +73,7 @@ GradientField draw(const Drawing& d) {
   cv::GaussianBlur(take, take, cv::Size(0, 0), d.blur);
   m = m.mul(1 - take);
   std::mt19937 random(1000 + d.frame);
-  std::normal_distribution<float> noise(0, static_cast<float>(kNoise));
+  std::normal_distribution<float> noise(0, static_cast<float>(d.noise));
   cv::Mat grey(kH, kW, CV_8U);
   for (int y = 0; y < kH; ++y) {
     for (int x = 0; x < kW; ++x) {
@@ -153,31 +154,69 @@ TEST_F(Needle, is_not_led_aside_by_granules_that_look_like_its_tip) {
   EXPECT_GT(seen, frames * 9 / 10);
 }
 
-TEST(Backdrop, is_the_picture_where_the_needle_was_never_near) {
-  Backdrop backdrop;
-  EXPECT_FALSE(backdrop.grey({10, 10}));
-  NeedlePose needle;
-  needle.ok = true;
-  needle.half_width = kTipRadius;
-  needle.tip = {330, kAxis_y};
-  Drawing d;
-  d.granules = 12;
-  for (; d.frame < 30; ++d.frame) {
-    backdrop.learn(draw(d), needle);
+// The needle stands at one place, so what lies far enough from it is known, and nothing else.
+class BackdropOfYolk : public testing::Test {
+ protected:
+  BackdropOfYolk() {
+    NeedlePose needle;
+    needle.ok = true;
+    needle.half_width = kTipRadius;
+    needle.taper = kTaper;
+    needle.tip = {drawn_.tip, kAxis_y};
+    drawn_.granules = 12;
+    for (; drawn_.frame < 60; ++drawn_.frame) {
+      last_ = draw(drawn_);
+      backdrop_.learn(last_, needle);
+    }
+    Drawing without = drawn_;
+    without.tip = 1000;
+    without.noise = 0;
+    empty_ = draw(without);
   }
-  Drawing without = d;
-  without.tip = 1000;
-  const GradientField empty = draw(without);
+  Drawing drawn_;
+  Backdrop backdrop_;
+  GradientField last_, empty_;
+};
+
+TEST_F(BackdropOfYolk, is_the_picture_without_the_needle_and_quieter_than_a_frame) {
+  double squares = 0, squares_of_frame = 0;
   for (double x = 30; x < 280; x += 7.3) {
-    const auto grey = backdrop.grey({x, kAxis_y});
+    const Point p(x, kAxis_y);
+    const auto grey = backdrop_.grey(p);
     ASSERT_TRUE(grey) << x;
-    EXPECT_NEAR(*grey, empty.grey({x, kAxis_y}), 2.5) << x;  // one frame's noise
+    EXPECT_NEAR(*grey, empty_.grey(p), 1) << x;
+    squares += std::pow(*grey - empty_.grey(p), 2);
+    squares_of_frame += std::pow(last_.grey(p) - empty_.grey(p), 2);
   }
-  EXPECT_FALSE(backdrop.grey({310, kAxis_y}));  // ahead of the tip
-  EXPECT_FALSE(backdrop.grey({360, kAxis_y}));
-  EXPECT_TRUE(backdrop.grey({360, 20}));
-  EXPECT_FALSE(backdrop.grey({-1, 20}));
-  EXPECT_FALSE(backdrop.grey({20, kH - 0.5}));
+  EXPECT_LT(squares, squares_of_frame / 8);
+}
+
+TEST_F(BackdropOfYolk, is_not_known_at_the_needle_nor_where_it_blurs_nor_close_ahead_of_it) {
+  EXPECT_FALSE(Backdrop{}.grey({10, 10}));
+  const double x = drawn_.tip + 30, wall = kTipRadius + kTaper * 30;
+  for (const double side : {-1.0, 1.0}) {
+    EXPECT_FALSE(backdrop_.grey({x, kAxis_y}));
+    EXPECT_FALSE(backdrop_.grey({x, kAxis_y + side * (wall + 6)}));
+    EXPECT_TRUE(backdrop_.grey({x, kAxis_y + side * (wall + 14)}));
+  }
+  EXPECT_FALSE(backdrop_.grey({drawn_.tip - 20, kAxis_y}));
+  // Between a pixel that is known and one that is not, nothing is made up.
+  int known = 0, unknown = 0;
+  for (double y = 20; y < 100; y += 0.25) {
+    const auto grey = backdrop_.grey({x, y});
+    (grey ? known : unknown) += 1;
+    EXPECT_NEAR(grey.value_or(empty_.grey({x, y})), empty_.grey({x, y}), 1) << y;
+  }
+  EXPECT_GT(known, 100);
+  EXPECT_GT(unknown, 50);
+}
+
+TEST_F(BackdropOfYolk, is_not_known_outside_the_picture) {
+  EXPECT_TRUE(backdrop_.grey({0, 20}));
+  EXPECT_FALSE(backdrop_.grey({-1, 20}));
+  EXPECT_FALSE(backdrop_.grey({20, -1}));
+  EXPECT_FALSE(backdrop_.grey({kW - 0.5, 20}));
+  EXPECT_FALSE(backdrop_.grey({20, kH - 0.5}));
 }
 
 }  // namespace

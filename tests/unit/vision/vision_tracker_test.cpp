@@ -43,7 +43,7 @@ cv::Mat draw(const Drawing& d) {
       for (int k = 0; k < 9; ++k) {
         const Point p(x + (k % 3 - 1) / 3.0, y + (k / 3 - 1) / 3.0);
         const Point q = p - kCentre;
-        const double r = cv::norm(q), t = std::atan2(q.y, q.x), in = dent(t, d.dent);
+        const double r = cv::norm(q), in = d.dent > 0 ? dent(std::atan2(q.y, q.x), d.dent) : 0;
         double g = 150;
         if (r < kR - in) {
           g -= 32;  // zona
@@ -210,6 +210,70 @@ TEST(Tracker, does_not_report_a_puncture_when_the_needle_only_withdraws) {
   for (double d = 12; d > -20; d -= 1.5) {
     step(d);
   }
+}
+
+// A needle comes to the cell and dents it; some frames do not show it.
+class HiddenNeedle : public testing::Test {
+ protected:
+  // depth: of the tip past the undented membrane, px.
+  const Result& step(double depth, double dent, bool shown) {
+    const Drawing drawn{kCentre.x + kR - depth, dent, 2, static_cast<unsigned>(frame_) + 1, shown};
+    const Result& r = tracker_.process(frame_of(draw(drawn), frame_++));
+    EXPECT_EQ(r.needle.ok, shown) << depth << r.verdict;
+    EXPECT_TRUE(r.outer.ok) << depth << r.verdict;
+    return r;
+  }
+  void approach(double last_depth) {
+    for (double depth = -26; depth <= last_depth; depth += depth < 0 ? 4 : 2) {
+      EXPECT_FALSE(step(depth, std::max(0.0, depth), true).punctured) << depth;
+    }
+  }
+  Tracker tracker_{VisionConfig{}, kW, kH};
+  std::uint64_t frame_ = 0;
+};
+
+// Without the needle, nothing says that the dimple is one: whoever takes it for the cell at rest has lost the
+// place where the needle enters.
+TEST_F(HiddenNeedle, leaves_the_cell_at_rest_and_the_contact_as_they_were) {
+  approach(14);
+  for (int i = 0; i < 3; ++i) {
+    const Result& hidden = step(14, 14, false);
+    EXPECT_FALSE(hidden.contact);  // this frame does not show it
+    EXPECT_EQ(hidden.phase, rt::Phase::indentation);
+    EXPECT_LT(cv::norm(hidden.undeformed->centre - kCentre), 0.5);
+  }
+  const Result& again = step(14.5, 14.5, true);
+  ASSERT_TRUE(again.wd_px);
+  EXPECT_TRUE(again.contact);
+  EXPECT_FALSE(again.punctured);
+  EXPECT_NEAR(*again.wd_px, 14.5, 1.4);
+  EXPECT_LT(cv::norm(again.undeformed->centre - kCentre), 0.5);
+}
+
+TEST_F(HiddenNeedle, may_have_touched_the_cell_since_it_was_seen) {
+  approach(-6);
+  for (const double depth : {4.0, 8.0, 12.0, 14.0}) {
+    EXPECT_LT(cv::norm(step(depth, depth, false).undeformed->centre - kCentre), 0.5) << depth;
+  }
+}
+
+TEST_F(HiddenNeedle, has_not_left_the_cell) {
+  approach(14);
+  for (const double left : {5.0, 2.0, 0.5, 0.0}) {
+    (void)step(14, left, true);
+  }
+  const Result& hidden = step(14, 0, false);
+  EXPECT_TRUE(hidden.punctured);
+  EXPECT_EQ(hidden.phase, rt::Phase::puncture);
+}
+
+// How deep the membrane was pushed is remembered, so the first frame that shows the needle again tells.
+TEST_F(HiddenNeedle, went_through_the_membrane_meanwhile) {
+  approach(14);
+  for (const double left : {14.0, 2.0}) {
+    EXPECT_FALSE(step(14, left, false).punctured);
+  }
+  EXPECT_TRUE(step(14, 1, true).punctured);
 }
 
 TEST(Tracker, follows_the_snake_alone_as_the_paper_does) {

@@ -43,7 +43,9 @@ cv::Mat draw(const Drawing& d) {
       for (int k = 0; k < 9; ++k) {
         const Point p(x + (k % 3 - 1) / 3.0, y + (k / 3 - 1) / 3.0);
         const Point q = p - kCentre;
-        const double r = cv::norm(q), in = d.dent > 0 ? dent(std::atan2(q.y, q.x), d.dent) : 0;
+        const double r = cv::norm(q);
+        const bool dented = d.dent > 0 && r < kR && r >= std::min(kR - kZona, kInner) - d.dent;
+        const double in = dented ? dent(std::atan2(q.y, q.x), d.dent) : 0;
         double g = 150;
         if (r < kR - in) {
           g -= 32;  // zona

@@ -212,12 +212,13 @@ TEST_F(Survive, a_core_that_hangs_before_its_first_tick_is_noticed) {
 
 TEST_F(Survive, every_signal_that_asks_the_run_to_end_ends_it_in_order_with_a_report) {
   for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) {
-    Program run(kPunctum, free_run({"--seconds", "60"}), words());
+    Program run(kPunctum, free_run({"--seconds", "60", "--overwrite"}), words());
     Look look("free", run.pid());
     ASSERT_TRUE(look.until_started());
     run.send(signal);
     EXPECT_EQ(run.wait(), 0) << signal << said();
     EXPECT_EQ(json()["outcome"], "done") << signal;
+    EXPECT_LT(json()["seconds"].get<double>(), 59) << signal;  // not at its limit
   }
 }
 

@@ -1,6 +1,10 @@
 // What is written to the devices.
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cstddef>
+#include <cstring>
+
 #include "rt/control/device_outputs.hpp"
 #include "tests/support/fake_devices.hpp"
 
@@ -86,6 +90,22 @@ TEST(DeviceOutputs, brakes_during_a_stop_and_takes_the_power_when_the_latch_does
   (void)o.write(&o.set_point);
   EXPECT_FALSE(o.stage.on);
   EXPECT_EQ(o.stage.commands, 0);
+}
+
+// A counter that goes on in a stop would overflow after days: nothing in it may have changed.
+TEST(DeviceOutputs, counts_nothing_while_a_stop_lasts) {
+  Outputs o(4);
+  (void)o.write(&o.set_point);
+  o.safety.latch.quick_stop = true;
+  const auto bytes_after = [&](int ticks) {
+    for (int k = 0; k < ticks; ++k) {
+      (void)o.write(&o.set_point);
+    }
+    std::array<std::byte, sizeof(DeviceOutputs)> bytes;
+    std::memcpy(bytes.data(), static_cast<const void*>(&o.outputs), bytes.size());
+    return bytes;
+  };
+  EXPECT_EQ(bytes_after(100), bytes_after(1000));
 }
 
 TEST(DeviceOutputs, gives_no_heartbeat_when_the_latch_takes_it_away_or_a_device_cannot_be_written) {

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "tools/report/output.hpp"
+#include "tools/report/watched_programs.hpp"
 #include "tools/shared/child.hpp"
 
 namespace punctum::report {
@@ -193,6 +194,14 @@ TEST(ReportTiming, numbers_the_calls_so_that_inputs_may_vary) {
     ASSERT_EQ(*it, wanted++);
   }
   EXPECT_GE(wanted, 11U);
+}
+
+// What is opened while a process lives and read when it has ended fails with ESRCH; memory at address 0 fails
+// alike.
+TEST(WatchedPrograms, a_file_of_proc_that_can_be_opened_and_not_read_is_empty) {
+  EXPECT_EQ(read_text("/proc/self/mem"), "");
+  EXPECT_EQ(read_text("/proc/0/maps"), "");
+  EXPECT_NE(read_text("/proc/self/maps"), "");
 }
 
 TEST(ReportProgress, counts_steps_of_several_threads) {

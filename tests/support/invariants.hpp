@@ -193,10 +193,6 @@ struct Bounds {
   // What one false reading of up to 20 ms may move the needle by, there and again back: less than a pixel.
   double false_motion_m = 0.5e-6;
   double brief_s = 0.02;
-  // After so long without a sample, a brief false one that a hand could have reached, at 300 m/s^2, cannot be
-  // told from a motion, there and back.
-  double seldom_s = 2.5e-3;
-  double thrown_m_s2 = 300;
   double filter_s = 0.3;                                // the tremor filter has settled
   double vision_sum_m = 8.5e-6;                         // from first contact on
   double truth_m = 3e-6;                                // the core knows the membrane's place to this
@@ -340,11 +336,6 @@ class Invariants {
     estop_silent_s_ += told_s_;
     if (s.hand_status == hal::Status::ok && s.hand.sample_ns != hand_sample_ns_) {
       hand_sample_ns_ = s.hand.sample_ns;
-      const double between_s = 1e-9 * static_cast<double>(s.now_ns - hand_told_ns_);
-      const double longer_s = std::min(std::max(between_s, hand_between_s_), b_.brief_s);
-      reached_m_ = longer_s > b_.seldom_s ? b_.thrown_m_s2 * longer_s * longer_s : 0;
-      hand_between_s_ = between_s;
-      hand_told_ns_ = s.now_ns;
       hand_silent_s_ =
           std::min(hand_silent_s_, std::max(0.0, 1e-9 * static_cast<double>(s.now_ns - s.hand.sample_ns)));
       buttons_were_ = buttons_;
@@ -468,10 +459,7 @@ class Invariants {
     // A handle that is told to rest may rest under a steady force, and a device that refuses a force keeps
     // the last one: what is given there, and until a ramp that follows has ended, no servo can know or
     // prevent.
-    const bool mistaken = s.hand_false_m != 0 && reached_m_ > 0;
-    const bool stalled = s.elapsed_s > 2.5 * b_.nominal_s;
-    unknown_s_ =
-        s.hand_hidden || refused_ || mistaken || stalled ? b_.c.estop.hand_ramp_s : unknown_s_ - s.elapsed_s;
+    unknown_s_ = s.hand_hidden || refused_ ? b_.c.estop.hand_ramp_s : unknown_s_ - s.elapsed_s;
     const bool beyond = unknown_s_ > 0;
     work_J_ += (beyond ? std::min(s.hand_work_J, 0.0) : s.hand_work_J) - b_.work_W * s.elapsed_s;
     refused_ = s.force_N != s.asked_N;
@@ -589,9 +577,8 @@ class Invariants {
     false_for_s_ += s.elapsed_s;
     if (false_m != false_m_ || false_for_s_ > b_.brief_s) {
       const double change_m = std::abs(false_m - (false_m != false_m_ ? false_m_ : 0.0));
-      const double brief_m = std::max(b_.false_motion_m, reached_m_ / least_scale_);
-      const double due_m =
-          false_for_s_ > b_.brief_s && false_m != 0 ? 2 * std::abs(false_m) : std::min(change_m, brief_m);
+      const double due_m = false_for_s_ > b_.brief_s && false_m != 0 ? 2 * std::abs(false_m)
+                                                                     : std::min(change_m, b_.false_motion_m);
       if (due_m > false_paid_m_) {
         false_path_m_ += due_m - false_paid_m_;
         false_paid_m_ = due_m;
@@ -851,8 +838,6 @@ class Invariants {
   std::int64_t hand_sample_ns_ = -1, stage_sample_ns_ = -1;
   double told_s_ = 0;  // of this tick, as the servo may count it
   double hand_silent_s_ = 0, stage_silent_s_ = 0, estop_silent_s_ = 0;
-  std::int64_t hand_told_ns_ = 0;
-  double hand_between_s_ = 0, reached_m_ = 0;  // of the hand's samples; and what a hand can do meanwhile
   std::uint32_t buttons_ = 0, buttons_were_ = 0;
   hal::StageState stage_told_;
   Vec3 stage_told_before_m_ = Vec3::Zero();

@@ -318,9 +318,6 @@ hal::Vec3 PassivityGuard::step(const GuardInput& in) NONBLOCKING {
     velocity_.restart();
     forget_interval();
   }
-  if (in.leaps) {
-    velocity_.restart();
-  }
   tick_.follow(in.elapsed_s, params_.recover_s);
   since_s_ += in.elapsed_s;
   if (in.fresh) {

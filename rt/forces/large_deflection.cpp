@@ -59,39 +59,39 @@ std::array<DeflectionTerm, kDeflectionTerms> deflection_terms(const DeflectionIn
   return terms;
 }
 
-Deflection large_deflection(const DeflectionInput& at) NONBLOCKING {
+DeflectionCurve::DeflectionCurve(const DeflectionInput& of) NONBLOCKING
+    : by_nu_(1 / std::clamp(1 - of.nu, 0.1, 2.0)) {
   const DeflectionInput& low = kDeflectionMin;
   const DeflectionInput& high = kDeflectionMax;
-  constexpr std::size_t kPowers = kDeflectionDegrees[0] + 1;
-  std::array<double, kPowers> G{};
-  std::array<double, kPowers> p{};
-  std::array<double, kPowers> T{};
-  const auto terms = deflection_terms(at);
+  const auto terms = deflection_terms(of);
   for (std::size_t i = 0; i < kDeflectionTerms; ++i) {
     const auto power = static_cast<std::size_t>(terms[i].w_power);
-    G[power] += kCoefficients[i].stiffness * terms[i].value;
-    p[power] += kCoefficients[i].pressure * terms[i].value;
-    T[power] += kCoefficients[i].tension * terms[i].value;
+    G_[power] += kCoefficients[i].stiffness * terms[i].value;
+    p_[power] += kCoefficients[i].pressure * terms[i].value;
+    T_[power] += kCoefficients[i].tension * terms[i].value;
   }
+  calibrated_ = between(of.c, low.c, high.c) && between(of.seat, low.seat, high.seat) &&
+                between(of.nu, low.nu, high.nu) && between(of.prestrain, low.prestrain, high.prestrain);
+}
 
-  const double w = std::min(at.w, high.w);
-  const double t = std::sqrt(w / high.w);
-  const double by_nu = 1 / std::clamp(1 - at.nu, 0.1, 2.0);
+Deflection DeflectionCurve::at(double depth) const NONBLOCKING {
+  const double w_max = kDeflectionMax.w;
+  const double w = std::min(depth, w_max);
+  const double t = std::sqrt(w / w_max);
   Deflection out;
-  double t_a = by_nu;
+  double t_a = by_nu_;
   for (std::size_t a = 0; a < kPowers; ++a, t_a *= t) {
     const double half = 0.5 * static_cast<double>(a);
-    out.force += G[a] * t_a * w;
-    out.stiffness += G[a] * t_a * (1 + half);
-    out.energy += G[a] * t_a * w * w / (2 + half);
-    out.pressure += p[a] * t_a;
-    out.tension += T[a] * t_a;
+    out.force += G_[a] * t_a * w;
+    out.stiffness += G_[a] * t_a * (1 + half);
+    out.energy += G_[a] * t_a * w * w / (2 + half);
+    out.pressure += p_[a] * t_a;
+    out.tension += T_[a] * t_a;
   }
-  const double beyond = std::min(at.w, kDeepest) - w;
+  const double beyond = std::min(depth, kDeepest) - w;
   out.energy += beyond * (out.force + 0.5 * beyond * out.stiffness);
   out.force += beyond * out.stiffness;
-  out.calibrated = at.w <= high.w && between(at.c, low.c, high.c) && between(at.seat, low.seat, high.seat) &&
-                   between(at.nu, low.nu, high.nu) && between(at.prestrain, low.prestrain, high.prestrain);
+  out.calibrated = depth <= w_max && calibrated_;
   return out;
 }
 

@@ -36,10 +36,6 @@ struct Deflection {
   bool calibrated = false;
 };
 
-// w > 0. Force, stiffness and energy are each other's exact integrals, force rises, is C1 in w > 0 and goes
-// to zero in proportion to w, as that of the full equations does.
-[[nodiscard]] Deflection large_deflection(const DeflectionInput& at) NONBLOCKING;
-
 // The terms of the polynomials: powers of sqrt(w/w_max), and of ln c, sqrt(prestrain), seat and nu, each
 // mapped from the box to -1 .. 1; up to the fourth degree together.
 inline constexpr std::array<int, 5> kDeflectionDegrees{4, 3, 3, 2, 1};
@@ -54,5 +50,27 @@ struct DeflectionTerm {
 };
 [[nodiscard]] std::array<DeflectionTerm, kDeflectionTerms> deflection_terms(const DeflectionInput& at)
     NONBLOCKING;
+
+// The law of one cell, seat and pipette, as a function of the depth alone: what it is made with is worked out
+// once. w > 0. Force, stiffness and energy are each other's exact integrals, force rises, is C1 in w > 0 and
+// goes to zero in proportion to w, as that of the full equations does.
+class DeflectionCurve {
+ public:
+  DeflectionCurve() = default;                                      // no force
+  explicit DeflectionCurve(const DeflectionInput& of) NONBLOCKING;  // whatever of.w
+  [[nodiscard]] Deflection at(double w) const NONBLOCKING;
+
+ private:
+  static constexpr std::size_t kPowers = kDeflectionDegrees[0] + 1;
+  std::array<double, kPowers> G_{};
+  std::array<double, kPowers> p_{};
+  std::array<double, kPowers> T_{};
+  double by_nu_ = 0;
+  bool calibrated_ = false;
+};
+
+[[nodiscard]] inline Deflection large_deflection(const DeflectionInput& at) NONBLOCKING {
+  return DeflectionCurve(at).at(at.w);
+}
 
 }  // namespace punctum::rt

@@ -2,8 +2,6 @@
 
 #include <numbers>
 
-#include "rt/forces/large_deflection.hpp"
-
 namespace punctum::rt {
 namespace {
 
@@ -86,11 +84,24 @@ struct PaperPoint {
   return s;
 }
 
-[[nodiscard]] MembraneState large_deflection_law(const MembraneParams& params, double wd_m, double R_m)
-    NONBLOCKING {
+// The cell's radius, and the pipette's over it, as far as numbers go.
+struct Sizes {
+  double R_m, c;
+};
+[[nodiscard]] Sizes sizes(const MembraneParams& params, double R_m) NONBLOCKING {
   const double R = std::clamp(R_m, kSmallest, kLargest);
-  const double c = std::clamp(params.c_m / R, kSmallest, kLargest);
-  const Deflection at = large_deflection({wd_m / R, c, params.seat_m / R, params.nu, params.prestrain});
+  return {R, std::clamp(params.c_m / R, kSmallest, kLargest)};
+}
+
+[[nodiscard]] DeflectionCurve deflection_curve(const MembraneParams& params, double R_m) NONBLOCKING {
+  const auto [R, c] = sizes(params, R_m);
+  return DeflectionCurve({0, c, params.seat_m / R, params.nu, params.prestrain});
+}
+
+[[nodiscard]] MembraneState large_deflection_law(const MembraneParams& params, const DeflectionCurve& curve,
+                                                 double wd_m, double R_m) NONBLOCKING {
+  const auto [R, c] = sizes(params, R_m);
+  const Deflection at = curve.at(wd_m / R);
   const double Eh = std::clamp(params.E_Pa * params.h_m, 0.0, kLargest);
   // Eq. 4 at the rim, where the membrane cannot be steeper than the needle; and its smooth edge, where
   // F = pi a^2 p: not within the pipette.
@@ -117,10 +128,10 @@ double dimple_reach(double R_m, double wd_m, double scale) NONBLOCKING {
   return scale * std::sqrt(std::clamp(2 * R_m * wd_m, 0.0, std::numeric_limits<double>::max()));
 }
 
-MembraneState membrane_law(const MembraneParams& params, double wd_m, double R_m, double scale) NONBLOCKING {
+MembraneState MembraneLaw::at(double wd_m, double R_m, double scale) NONBLOCKING {
   MembraneState s;
-  for (const double x :
-       {params.E_Pa, params.nu, params.h_m, params.c_m, params.seat_m, params.prestrain, wd_m, R_m, scale}) {
+  for (const double x : {params_.E_Pa, params_.nu, params_.h_m, params_.c_m, params_.seat_m,
+                         params_.prestrain, wd_m, R_m, scale}) {
     if (!std::isfinite(x)) {
       s.force_N = std::numeric_limits<double>::quiet_NaN();
       s.shallow = false;
@@ -131,8 +142,15 @@ MembraneState membrane_law(const MembraneParams& params, double wd_m, double R_m
   if (wd_m <= 0) {
     return s;
   }
-  s = params.law == MembraneParams::Law::paper ? paper_law(params, wd_m, R_m, scale)
-                                               : large_deflection_law(params, wd_m, R_m);
+  if (params_.law == MembraneParams::Law::paper) {
+    s = paper_law(params_, wd_m, R_m, scale);
+  } else {
+    if (R_m != curve_R_m_) {
+      curve_ = deflection_curve(params_, R_m);
+      curve_R_m_ = R_m;
+    }
+    s = large_deflection_law(params_, curve_, wd_m, R_m);
+  }
   saturate(s);
   return s;
 }
@@ -192,7 +210,7 @@ void Membrane::advance(double depth_m, const EffectInput& in) NONBLOCKING {
     since_puncture_s_ = 0;
   }
   if (!punctured_) {
-    state_ = membrane_law(params_, depth_m, in.cell_radius_m, in.dimple_scale);
+    state_ = law_.at(depth_m, in.cell_radius_m, in.dimple_scale);
     return;
   }
   since_puncture_s_ += std::max(in.dt_s, 0.0);

@@ -24,6 +24,7 @@
 #include "hal/parameters.hpp"
 #include "hal/realtime.hpp"
 #include "rt/forces/effect.hpp"
+#include "rt/forces/large_deflection.hpp"
 #include "rt/forces/ramp.hpp"
 
 namespace punctum::rt {
@@ -148,9 +149,22 @@ inline constexpr double kMembraneSlopeMax = 0.7;
 [[nodiscard]] double dimple_reach(double R_m, double wd_m, double scale) NONBLOCKING;
 
 // By params.law; `scale` is for the paper's. Exactly 0 for wd_m <= 0. R_m, scale > 0. Paper: valid = small
-// slope, thin film (h <= c), dimple smaller than the cell; large deflection: within its calibration.
-[[nodiscard]] MembraneState membrane_law(const MembraneParams& params, double wd_m, double R_m, double scale)
-    NONBLOCKING;
+// slope, thin film (h <= c), dimple smaller than the cell; large deflection: within its calibration, and what
+// does not depend on the depth is kept for as long as R_m stays.
+class MembraneLaw {
+ public:
+  explicit MembraneLaw(const MembraneParams& params) NONBLOCKING : params_(params) {}
+  [[nodiscard]] MembraneState at(double wd_m, double R_m, double scale) NONBLOCKING;
+
+ private:
+  MembraneParams params_;
+  double curve_R_m_ = 0;
+  DeflectionCurve curve_;
+};
+[[nodiscard]] inline MembraneState membrane_law(const MembraneParams& params, double wd_m, double R_m,
+                                                double scale) NONBLOCKING {
+  return MembraneLaw(params).at(wd_m, R_m, scale);
+}
 
 // The force as vectors at points of the pipette's rim, spread evenly round the axis: each has its share of
 // the axial force and of the outward pull of the membrane. Their sum is -F b.
@@ -166,8 +180,7 @@ class Membrane {
  public:
   using Params = MembraneParams;
 
-  Membrane(const MembraneParams& params, const EffectSetup& setup) NONBLOCKING : params_(params),
-                                                                                 setup_(setup) {
+  Membrane(const MembraneParams& params, const EffectSetup& setup) NONBLOCKING : law_(params), setup_(setup) {
     rim_.fill(hal::Vec3::Zero());
   }
 
@@ -183,7 +196,7 @@ class Membrane {
  private:
   void advance(double depth_m, const EffectInput& in) NONBLOCKING;
 
-  MembraneParams params_;
+  MembraneLaw law_;
   EffectSetup setup_;
   MembraneState state_;
   bool punctured_ = false;

@@ -36,8 +36,10 @@ class Wall {
     if (cell.membrane_E_Pa <= 0) {
       return;
     }
-    membrane_.emplace();
-    membrane_->E_Pa = cell.membrane_E_Pa;
+    rt::MembraneParams params;
+    params.E_Pa = cell.membrane_E_Pa;
+    R_m_ = params.R_m;
+    membrane_.emplace(params);
   }
   struct At {
     double force_N = 0;  // at the hand
@@ -51,7 +53,7 @@ class Wall {
     if (!membrane_) {
       return {-K_ * x_m, K_, 0.5 * K_ * x_m * x_m};
     }
-    const auto s = rt::membrane_law(*membrane_, x_m / scale_.position_scale, membrane_->R_m, 1);
+    const auto s = membrane_->at(x_m / scale_.position_scale, R_m_, 1);
     const double k_f = scale_.force_scale;
     return {-k_f * s.force_N, k_f / scale_.position_scale * s.stiffness_N_m,
             k_f * scale_.position_scale * s.energy_J};
@@ -59,7 +61,8 @@ class Wall {
 
  private:
   double K_;
-  std::optional<rt::MembraneParams> membrane_;
+  mutable std::optional<rt::MembraneLaw> membrane_;  // remembers
+  double R_m_ = 0;
   rt::MappingParams scale_;
 };
 

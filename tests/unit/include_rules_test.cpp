@@ -125,8 +125,8 @@ std::vector<Room> house() {
       {"tools/report/", pictures, kTools},
       {"tests/support/", pictures, kTests},
       {"tests/*",
-       pictures + Names{"tests/support/", "hal/gpiod/", "tools/core/", "tools/punctum/", "tools/vision/",
-                        "tools/report/"},
+       pictures + Names{"tests/support/", "hal/gpiod/config", "hal/gpiod/", "tools/core/", "tools/punctum/",
+                        "tools/vision/", "tools/report/"},
        kTests},
   };
 }

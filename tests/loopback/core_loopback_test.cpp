@@ -248,7 +248,7 @@ TEST_F(CoreLoopback, stops_within_two_ticks_of_a_chip_that_is_gone_and_stays_sto
     gone_ns = clock.now_ns();
   });
   EXPECT_LE(ticks_to_stop(gone_ns), 2U);
-  EXPECT_EQ(at_ms(60).fault, Fault::estop_lost);
+  EXPECT_EQ(at_ms(50).fault, Fault::none);
   EXPECT_EQ(seen.back().fault, Fault::estop_lost);
   EXPECT_EQ(seen.back().stage, StopStage::stopped);
 }

@@ -253,12 +253,5 @@ TEST_F(CoreLoopback, stops_within_two_ticks_of_a_chip_that_is_gone_and_stays_sto
   EXPECT_EQ(seen.back().stage, StopStage::stopped);
 }
 
-TEST_F(CoreLoopback, leaves_heartbeat_low_and_lines_free_when_it_ends) {
-  run(100, [] {});
-  assembly.reset();
-  EXPECT_FALSE(board->level(kHeartbeat));
-  EXPECT_TRUE(tools::Assembly::open({scene, clock, nullptr}));
-}
-
 }  // namespace
 }  // namespace punctum::loopback

@@ -127,6 +127,7 @@ Fault DeviceInputs::read_hand(const TickTime& time, const LastOutput& last) NONB
   readings_.hand_age_s += time.elapsed_s;
   readings_.hand_fresh = false;
   readings_.hand_begins = false;
+  readings_.hand_leaps = false;
   const bool answered = status == hal::Status::ok;
   const SampleIs sample = answered ? hand_clock_.take(read.sample_ns, time.now_ns) : SampleIs::untimely;
   const bool contradicts = sample == SampleIs::repeated && read.position_m != newest_hand_m_;
@@ -141,7 +142,7 @@ Fault DeviceInputs::read_hand(const TickTime& time, const LastOutput& last) NONB
   if (sample == SampleIs::fresh) {
     newest_hand_m_ = read.position_m;
     hand_is_ = hand_check_.judge(read);
-    if (hand_is_ == HandCheck::Is::good || hand_is_ == HandCheck::Is::begins) {
+    if (hand_is_ != HandCheck::Is::ignored && hand_is_ != HandCheck::Is::invalid) {
       take_hand(read, last);
       return Fault::none;
     }
@@ -167,6 +168,7 @@ Fault DeviceInputs::read_hand(const TickTime& time, const LastOutput& last) NONB
 void DeviceInputs::take_hand(const hal::HandState& read, const LastOutput& last) NONBLOCKING {
   readings_.hand_fresh = true;
   readings_.hand_begins = hand_is_ == HandCheck::Is::begins;
+  readings_.hand_leaps = hand_is_ == HandCheck::Is::leaps;
   readings_.between_hand_s = readings_.hand_begins
                                  ? readings_.hand_age_s
                                  : 1e-9 * static_cast<double>(read.sample_ns - readings_.hand.sample_ns);

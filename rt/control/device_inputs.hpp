@@ -24,6 +24,7 @@ struct Readings {
   bool hand_seen = false;     // at least once
   bool hand_fresh = false;    // a new sample arrived on this tick
   bool hand_begins = false;   // it is the first one: it has nothing to do with what was before
+  bool hand_leaps = false;    // far from where it was going: what lies between is not believed
   bool hand_stuck = false;    // a changing force does not move it
   double hand_age_s = 0;      // of `hand`
   double between_hand_s = 0;  // between the two newest samples, by their own times; > 0

@@ -11,6 +11,16 @@ namespace {
 constexpr double kSoftHysteresis = 0.9;  // of the soft tip-force limit
 constexpr double kLongestStep = 2;       // nominal periods: a late tick is no licence for a leap
 
+// What is left of `last`, straight towards zero by `falls` at most, of what `wanted` has no more of.
+[[nodiscard]] hal::Vec3 let_go(const hal::Vec3& last, const hal::Vec3& wanted, double falls) NONBLOCKING {
+  const double size = last.norm();
+  if (!(size > 0 && falls > 0)) {
+    return last;
+  }
+  const double kept = std::clamp(wanted.dot(last) / size, std::max(size - falls, 0.0), size);
+  return last * (kept / size);
+}
+
 }  // namespace
 
 ForceLimits::ForceLimits(const LimitParams& limits, double rate_Hz) NONBLOCKING
@@ -42,10 +52,12 @@ LimitedForces ForceLimits::step(const hal::Vec3& wanted_N, double law_N, const R
   }
   if (hand.finite) {
     // Between two forces within the limit: within the limit.
-    const hal::Vec3 change = hand.force_N - last_N;
-    const double most_N = kSlew_N_s * std::min(dt_s, longest_step_s_);
+    const double step_s = std::min(dt_s, longest_step_s_);
+    const hal::Vec3 from_N = let_go(last_N, hand.force_N, kSlew_N_s * (dt_s - step_s));
+    const hal::Vec3 change = hand.force_N - from_N;
+    const double most_N = kSlew_N_s * step_s;
     const double size_N = change.norm();
-    out.hand_force_N = size_N > most_N ? hal::Vec3(last_N + change * (most_N / size_N)) : hand.force_N;
+    out.hand_force_N = size_N > most_N ? hal::Vec3(from_N + change * (most_N / size_N)) : hand.force_N;
   }
   return out;
 }

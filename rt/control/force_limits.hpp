@@ -22,7 +22,8 @@ class ForceLimits {
  public:
   // No device needs to change its force faster. It is 3 N in 10 ms: a handle of 75 g that nobody holds has
   // then moved by 0.7 mm, where a leap of 3 N would have thrown it 2 mm. Injections without a fault stay
-  // below 50 N/s.
+  // below 50 N/s. A tick that comes late lets go of what the force should have lost meanwhile: a handle that
+  // it has thrown is not pushed on while it comes down.
   static constexpr double kSlew_N_s = 300;
 
   ForceLimits(const LimitParams& limits, double rate_Hz) NONBLOCKING;

@@ -17,6 +17,8 @@ class HandCheck {
  public:
   enum class Is : std::uint8_t {
     good,
+    leaps,    // good, but so far from where it was going that what lies between is not believed; and so
+              // are those that follow, until some agree and a brief false reading would be over
     begins,   // good, and the first one: it has nothing to do with what was before
     ignored,  // cannot be true
     invalid,  // too many that cannot be true
@@ -32,9 +34,10 @@ class HandCheck {
       return bad();
     }
     if (trusted_.agreeing > 0 && fits(trusted_, sample)) {
+      watch_leaps(sample);
       advance(trusted_, sample);
       suspicion_ = std::max(suspicion_ - 1, 0);
-      return Is::good;
+      return leapt_ ? Is::leaps : Is::good;
     }
     if (!invalid_) {
       if (trusted_.agreeing >= kAgreeing) {
@@ -71,6 +74,11 @@ class HandCheck {
   // A handle in a free hand reaches some 100 m/s^2; thrown, or pushed by its own motors at the largest force
   // with no hand on it, 250 m/s^2. Braking is not limited: a handle may hit its stop.
   static constexpr double kAcceleration_m_s2 = 300;
+  // A longer interval than 1.5 ms allows so long a way that a false sample on it is no little thing: then
+  // what no hand does within 1.5 ms is a leap, and so is a hand that was stopped by as much. A hand that
+  // starts back, 40 m/s^2, does not leap at 250 Hz or more.
+  static constexpr double kLeap_m = kAcceleration_m_s2 * 1.5e-3 * 1.5e-3;
+  static constexpr double kBrief_s = 0.02;        // interference: one period of the mains
   static constexpr double kTurn_rad_s = 50;       // the wrist's fastest turn is half of it
   static constexpr double kTurnNoise_rad = 0.05;  // of the sensors in the handle
   static constexpr double kReach_m = 2;           // from the origin: the largest devices reach one metre
@@ -126,17 +134,38 @@ class HandCheck {
     return (gone_m - along * way_m).norm();
   }
 
+  [[nodiscard]] static double sped_up_m(const Track& track, double dt_s) NONBLOCKING {
+    return kAcceleration_m_s2 * (track.between_s + dt_s) / 2 * dt_s;
+  }
+
+  [[nodiscard]] bool is_leap(const Track& track, const hal::HandState& sample) const NONBLOCKING {
+    const double dt_s = seconds(sample.sample_ns - track.sample_ns);
+    return sped_up_m(track, dt_s) > kLeap_m &&
+           (sample.position_m - track.at_m - dt_s * track.velocity_m_s).norm() >
+               kLeap_m + kRounding_steps * step_m_;
+  }
+
+  void watch_leaps(const hal::HandState& sample) NONBLOCKING {
+    if (is_leap(trusted_, sample)) {
+      leapt_ = true;
+      leapt_ns_ = sample.sample_ns;
+      since_leap_ = 0;
+      return;
+    }
+    since_leap_ = std::min(since_leap_ + 1, kAgreeing);
+    leapt_ = leapt_ && (since_leap_ < kAgreeing || seconds(sample.sample_ns - leapt_ns_) < kBrief_s);
+  }
+
   [[nodiscard]] bool fits(const Track& track, const hal::HandState& sample) const NONBLOCKING {
     const double dt_s = seconds(sample.sample_ns - track.sample_ns);
     if (!(dt_s > 0)) {
       return false;
     }
     const double noise_m = kRounding_steps * step_m_ + kDeviations * track.deviation_m;
-    const double sped_up_m = kAcceleration_m_s2 * (track.between_s + dt_s) / 2 * dt_s;
     const double turned = std::min((sample.orientation.coeffs() - track.orientation.coeffs()).norm(),
                                    (sample.orientation.coeffs() + track.orientation.coeffs()).norm());
     return (sample.position_m - track.at_m).norm() <= speed_m_s_ * dt_s + noise_m &&
-           deviation_m(track, sample.position_m, dt_s) <= sped_up_m + noise_m &&
+           deviation_m(track, sample.position_m, dt_s) <= sped_up_m(track, dt_s) + noise_m &&
            turned <= 0.5 * (kTurn_rad_s * dt_s + kTurnNoise_rad);
   }
 
@@ -176,6 +205,9 @@ class HandCheck {
   Track trusted_;    // what the hand did
   Track candidate_;  // while invalid_: what it may be doing
   int suspicion_ = 0;
+  bool leapt_ = false;  // lately
+  std::int64_t leapt_ns_ = 0;
+  int since_leap_ = 0;  // samples
   bool invalid_ = false;
 };
 

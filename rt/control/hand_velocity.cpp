@@ -16,7 +16,7 @@ HandVelocity::HandVelocity(const VelocityParams& params, double rate_Hz) NONBLOC
 }
 
 const hal::Vec3& HandVelocity::step(const Readings& readings, double dt_s) NONBLOCKING {
-  if (readings.hand_begins) {
+  if (readings.hand_begins || readings.hand_leaps) {
     restart();
   }
   if (readings.hand_fresh && kalman_) {

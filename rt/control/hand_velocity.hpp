@@ -13,7 +13,8 @@ class HandVelocity {
  public:
   HandVelocity(const VelocityParams& params, double rate_Hz) NONBLOCKING;
 
-  // m/s, device frame; from one sample to the next the last estimate counts. 0 where the hand begins.
+  // m/s, device frame; from one sample to the next the last estimate counts. 0 where the hand begins or
+  // leaps.
   const hal::Vec3& step(const Readings& readings, double dt_s) NONBLOCKING;
 
  private:

@@ -323,7 +323,7 @@ hal::Vec3 PassivityGuard::step(const GuardInput& in) NONBLOCKING {
   if (in.fresh) {
     const double between_s = in.between_s > 0 ? in.between_s : since_s_;
     sample_.follow(between_s, params_.recover_s);
-    gap_ = between_s > kSeen * regular_s();
+    gap_ = in.leaps || between_s > kSeen * regular_s();
   }
   lower_gain(in);
   if (!first_) {

@@ -61,6 +61,7 @@ struct GuardInput : ForceParts {
   double between_s = 0;  // between the two newest samples; 0: not known, the time of the ticks counts
   double age_s = 0;      // of the position
   bool begins = false;   // it has nothing to do with the one before: no motion lies between them
+  bool leaps = false;    // it tells nothing of a velocity
 };
 
 class PassivityGuard {
@@ -145,9 +146,9 @@ class PassivityGuard {
   Period sample_;
 
   bool first_ = true;
-  bool gap_ = false;                                      // samples were missed before the last one
-  hal::Vec3 position_m_ = hal::Vec3::Zero();              // the last sample
-  hal::Vec3 moved_m_ = hal::Vec3::Zero();                 // to it
+  bool gap_ = false;                          // samples were missed before the last one, or it leapt
+  hal::Vec3 position_m_ = hal::Vec3::Zero();  // the last sample
+  hal::Vec3 moved_m_ = hal::Vec3::Zero();     // to it
   std::array<StoringForce, kEnergyPoints> last_storing_;  // as rendered on the last step
   std::array<Forces, kRing> written_;
   std::size_t newest_ = 0;

@@ -44,7 +44,7 @@ std::uint32_t StageSetPoint::follow_hand(const Readings& readings, const FollowI
   // What the hand did meanwhile is forgotten: the needle does not catch up by itself.
   if (in.elapsed_s > kHandGap_s) {
     anchor(readings.hand, limits_.set_point().tip_m, limits_.set_point().axis);
-  } else if (hand_moves_again || hand_had_a_gap || way_closes_or_opens) {
+  } else if (hand_moves_again || hand_had_a_gap || readings.hand_leaps || way_closes_or_opens) {
     mapping_.anchor(readings.hand, limits_.stops_at_m(), limits_.set_point().axis);
   }
   last_withdrawal_only_ = in.constraint.withdrawal_only;
@@ -61,6 +61,9 @@ std::uint32_t StageSetPoint::follow_hand(const Readings& readings, const FollowI
     allowed.point_m += std::clamp(in_vain_m, 0.0, kSlack_m / mapping_.position_scale()) * inward;
   }
   mapping_.slip(allowed.point_m);
+  if (readings.hand_leaps) {
+    allowed.alarms |= alarm_travel_limited;
+  }
   // A hand that was faster than the needle may be slips too: the needle does not go on for long after it.
   const double lead_m = limits_.allowed_speed_m_s(in.constraint) * (lag_s_ + kLead_s);
   const hal::Vec3 lead = allowed.point_m - limits_.set_point().tip_m;

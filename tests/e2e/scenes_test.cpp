@@ -4,14 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <future>
-#include <map>
 #include <regex>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "tests/e2e/quick_report.hpp"
+#include "tests/support/counted_calls.hpp"
 #include "tests/support/programs.hpp"
 #include "tools/report/simulated_frames.hpp"
 #include "tools/scene/scene_keys.hpp"
@@ -188,9 +187,6 @@ TEST_F(Scenes, every_scene_costs_the_same_without_its_tables) {
 
 // The functions that the processor called, whatever vision reports about itself.
 TEST_F(Scenes, vision_calls_nothing_for_what_is_left_out) {
-  if (!valgrind_is_there()) {
-    GTEST_SKIP() << "valgrind is not installed";
-  }
   report::InjectionPlan plan;
   plan.gap_m = 18e-6;
   plan.approach_m_s = 200e-6;
@@ -212,30 +208,18 @@ TEST_F(Scenes, vision_calls_nothing_for_what_is_left_out) {
   less.erase(less.find(holder), holder.size());
   std::ofstream(folder_ / "less.toml") << less;
 
-  // Calls by name, without arguments.
+  const std::vector<std::string> names{"punctum::vision::follow", "punctum::vision::correlation_map",
+                                       "punctum::vision::needle_merges_with_cell"};
   const auto calls = [&](const std::string& scene, const std::string& name) {
-    const fs::path counts = folder_ / (name + ".counts");
-    const std::string command =
-        "valgrind -q --tool=callgrind --compress-strings=no --callgrind-out-file=" + counts.string() + " " +
-        PUNCTUM_BIN_DIR + "/punctum-vision track --frames " + frames.string() + " --scene " + scene +
-        " --out " + (folder_ / (name + ".csv")).string() + " >" + words(name).string() + " 2>&1";
-    EXPECT_EQ(std::system(command.c_str()), 0) << read_all(words(name));
-    std::map<std::string, int> n;
-    std::ifstream in(counts);
-    std::string called;
-    for (std::string line; std::getline(in, line);) {
-      if (line.starts_with("cfn=")) {
-        called = line.substr(4, line.find('(') - 4);
-      }
-      if (line.starts_with("calls=")) {
-        n[called] += std::atoi(line.c_str() + 6);
-      }
-    }
+    auto n = tests::counted_calls(PUNCTUM_BIN_DIR "/punctum-vision",
+                                  {"track", "--frames", frames.string(), "--scene", scene, "--out",
+                                   (folder_ / (name + ".csv")).string()},
+                                  words(name).string(), names);
+    EXPECT_FALSE(HasFailure()) << read_all(words(name));
     return n;
   };
-  auto other = std::async(std::launch::async, calls, (folder_ / "less.toml").string(), "less");
   auto icsi = calls("icsi", "icsi");
-  auto without = other.get();
+  auto without = calls((folder_ / "less.toml").string(), "less");
   const int all = static_cast<int>(kFrames);
   EXPECT_EQ(icsi["punctum::vision::follow"], 2 * all);  // both membranes
   EXPECT_EQ(without["punctum::vision::follow"], all);

@@ -339,6 +339,37 @@ TEST(Passivity, after_a_late_sample_the_damper_takes_back_more_than_was_given) {
   EXPECT_LT(taken_J, 2 * 0.2e-3);
 }
 
+TEST(Passivity, no_damper_acts_on_the_velocity_of_a_leap) {
+  for (const bool leaps : {true, false}) {
+    HandDevice device;
+    device.encoder_step_m = 0;
+    PassivityGuard guard({}, device, {}, 1000);
+    GuardInput in;
+    in.elapsed_s = 1e-3;
+    in.between_s = 4e-3;
+    in.stiffness_N_m = 100;
+    double damper_N = 0;
+    for (int k = 0; k < 420; ++k) {
+      // A hand of 250 Hz that stands at 2 mm, is told to be at 4 mm once, and is told at 2 mm again.
+      const double x = k >= 400 && k < 404 ? 4e-3 : 2e-3;
+      in.fresh = k % 4 == 0;
+      in.age_s = 1e-3 * (k % 4);
+      in.leaps = leaps && in.fresh && k >= 400;
+      in.position_m = {x, 0, 0};
+      in.storing[0] = {{-100 * x, 0, 0}, in.position_m};
+      in.stored_J = 50 * x * x;
+      const hal::Vec3 force_N = guard.step(in);
+      guard.wrote(force_N);
+      damper_N = std::max(damper_N, k < 400 ? 0 : std::abs(force_N.x() + guard.gain() * 100 * x));
+    }
+    if (leaps) {
+      EXPECT_LT(damper_N, 1e-12);
+    } else {
+      EXPECT_GT(damper_N, 0.05);
+    }
+  }
+}
+
 // An active force of 0.5 N that always goes with a hand at up to 20 mm/s: 6 mW, of which it may give
 // kActive_W.
 TEST(Passivity, an_effect_that_may_give_energy_gives_no_more_than_it_is_allowed) {

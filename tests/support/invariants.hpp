@@ -425,7 +425,11 @@ class Invariants {
     stop_clock_true_ = (running || stop_clock_true_) && s.clock_true;
     stop_s_ = running ? 0 : stop_s_ + (was_running_ ? 0 : s.elapsed_s);
     if (running && was_running_ && known_) {
-      at_most(I::force_slew, (s.asked_N - asked_N_).norm(),
+      // A late tick may let go of what the force could have lost meanwhile, straight towards zero.
+      const double size = asked_N_.norm();
+      const double falls = std::min(size, b_.slew_N_s * std::max(0.0, s.elapsed_s - 2 * b_.nominal_s));
+      const double kept = size > 0 ? std::clamp(s.asked_N.dot(asked_N_) / size, size - falls, size) : 0;
+      at_most(I::force_slew, size > 0 ? (s.asked_N - asked_N_ * (kept / size)).norm() : f,
               b_.slew_N_s *
                       (s.clock_true ? std::clamp(s.elapsed_s, b_.nominal_s, 2 * b_.nominal_s)
                                     : 2 * b_.nominal_s) *

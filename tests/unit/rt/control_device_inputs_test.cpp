@@ -274,6 +274,45 @@ TEST(DeviceInputs, follows_the_fastest_hand_at_every_rate_of_samples) {
   }
 }
 
+TEST(DeviceInputs, tells_a_leap_between_two_samples_of_a_slow_hand_from_a_fast_motion) {
+  Inputs in;
+  in.settle();
+  in.hand.sample_every_ns = 4'000'000;
+  // 40 m/s^2, as a hand starts back, to 2 m/s, and as quickly to rest.
+  int fresh = 0;
+  for (int k = 0; k < 200; ++k) {
+    const double t = std::min(1e-3 * k, 0.1);
+    in.hand.x.x() = t < 0.05 ? 20 * t * t : 0.1 - 20 * (0.1 - t) * (0.1 - t);
+    const Readings& r = in.read();
+    fresh += r.hand_fresh ? 1 : 0;
+    EXPECT_FALSE(r.hand_leaps) << k;
+  }
+  EXPECT_EQ(fresh, 50);
+  // A false sample that a thrown handle could have given, the true one after it, one that does not go on as
+  // those two, and four more within 20 ms.
+  int leaps = 0;
+  for (int k = 0; k < 40; ++k) {
+    in.hand.jump_m = k >= 12 && k < 16 ? 4e-3 : 0;
+    const Readings& r = in.read();
+    EXPECT_EQ(r.device_faults.first, Fault::none) << k;
+    EXPECT_TRUE(!r.hand_leaps || r.hand_fresh) << k;
+    EXPECT_FALSE(r.hand_begins);
+    leaps += r.hand_leaps ? 1 : 0;
+  }
+  EXPECT_EQ(leaps, 7);
+}
+
+TEST(DeviceInputs, sees_no_leap_in_what_a_hand_of_1_kHz_does) {
+  Inputs in;
+  in.settle();
+  // Thrown at 250 m/s^2 to 5 m/s, and into a stop.
+  for (int k = 0; k < 60; ++k) {
+    const double t = std::min(1e-3 * k, 0.04);
+    in.hand.x.x() = t < 0.02 ? 125 * t * t : 0.05 + 5 * (t - 0.02);
+    EXPECT_FALSE(in.read().hand_leaps) << k;
+  }
+}
+
 TEST(DeviceInputs, refuses_readings_of_the_stage_that_no_stage_gives) {
   const double nan = std::nan("");
   for (const double absurd : {1e308, 1e160, -1e200, 2.0, nan}) {

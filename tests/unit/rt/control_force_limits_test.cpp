@@ -41,11 +41,18 @@ TEST(ForceLimits, changes_the_hands_force_without_a_jolt_whatever_is_wanted_and_
   std::uniform_real_distribution<double> seconds(1e-4, 0.02);
   ForceLimits limits(LimitParams{}, 1000);
   Vec3 last_N = Vec3::Zero();
-  for (int k = 0; k < 100'000; ++k) {
+  for (int k = 0; k < 10'000; ++k) {
     const double dt_s = seconds(random);
     const Vec3 wanted_N(any(random), any(random), any(random));
     const Vec3 next_N = limits.step(wanted_N, 0, Readings{}, last_N, dt_s).hand_force_N;
-    ASSERT_LE((next_N - last_N).norm(), 300 * std::min(dt_s, 2e-3) * (1 + 1e-9));
+    // Of a late tick: from what it may have let go to, straight towards zero.
+    double least_N = (next_N - last_N).norm();
+    const double lets_go_N = std::min(last_N.norm(), 300 * std::max(0.0, dt_s - 2e-3));
+    for (int i = 0; i <= 1000 && lets_go_N > 0; ++i) {
+      const Vec3 from_N = last_N * (1 - 1e-3 * i * lets_go_N / last_N.norm());
+      least_N = std::min(least_N, (next_N - from_N).norm());
+    }
+    ASSERT_LE(least_N, 300 * std::min(dt_s, 2e-3) + (lets_go_N > 0 ? 5e-4 : 1e-9));
     ASSERT_LE(next_N.norm(), LimitParams{}.hand_force_N * (1 + 1e-12));
     last_N = next_N;
   }
@@ -53,6 +60,24 @@ TEST(ForceLimits, changes_the_hands_force_without_a_jolt_whatever_is_wanted_and_
     last_N = limits.step(Vec3(0.5, 0, 0), 0, Readings{}, last_N, 1e-3).hand_force_N;
   }
   EXPECT_EQ(last_N, Vec3(0.5, 0, 0));
+}
+
+TEST(ForceLimits, lets_go_on_a_late_tick_of_what_the_force_would_have_lost_by_then) {
+  ForceLimits limits(LimitParams{}, 1000);
+  const auto next_N = [&limits](const Vec3& last_N, const Vec3& wanted_N, double dt_s) {
+    // Device axes against world axes: x alike.
+    return limits.step(wanted_N, 0, Readings{}, last_N, dt_s).hand_force_N;
+  };
+  const Vec3 last_N(2, 0, 0);
+  EXPECT_NEAR(next_N(last_N, Vec3::Zero(), 1e-3).x(), 1.7, 1e-12);
+  EXPECT_NEAR(next_N(last_N, Vec3::Zero(), 2e-3).x(), 1.4, 1e-12);
+  EXPECT_NEAR(next_N(last_N, Vec3::Zero(), 5e-3).x(), 0.5, 1e-12);
+  EXPECT_NEAR(next_N(last_N, Vec3::Zero(), 20e-3).x(), 0, 1e-12);
+  // Through zero and beyond it no faster than on time, to more force neither.
+  EXPECT_NEAR(next_N(last_N, Vec3(-2, 0, 0), 20e-3).x(), -0.6, 1e-12);
+  EXPECT_NEAR(next_N(last_N, Vec3(3, 0, 0), 20e-3).x(), 2.6, 1e-12);
+  EXPECT_NEAR(next_N(last_N, Vec3(1.9, 0, 0), 20e-3).x(), 1.9, 1e-12);
+  EXPECT_NEAR(next_N(Vec3::Zero(), Vec3(3, 0, 0), 20e-3).x(), 0.6, 1e-12);
 }
 
 TEST(ForceLimits, makes_a_force_that_is_no_number_a_fault_and_gives_none) {

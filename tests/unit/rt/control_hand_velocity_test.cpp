@@ -48,18 +48,20 @@ TEST(HandVelocity, takes_the_time_between_the_samples_of_a_slow_hand_and_not_bet
   }
 }
 
-TEST(HandVelocity, begins_at_rest_where_the_hand_begins_anew) {
+TEST(HandVelocity, begins_at_rest_where_the_hand_begins_anew_or_leaps) {
   for (const auto method : {VelocityParams::Method::kalman, VelocityParams::Method::foaw}) {
-    VelocityParams params;
-    params.method = method;
-    HandVelocity velocity(params, 1000);
-    for (int k = 0; k < 100; ++k) {
-      (void)velocity.step(moved_to(Vec3(0.03e-3 * k, 0, 0)), 1e-3);
+    for (const bool leaps : {false, true}) {
+      VelocityParams params;
+      params.method = method;
+      HandVelocity velocity(params, 1000);
+      for (int k = 0; k < 100; ++k) {
+        (void)velocity.step(moved_to(Vec3(0.03e-3 * k, 0, 0)), 1e-3);
+      }
+      Readings r = moved_to(Vec3(0.3, 0, 0));
+      (leaps ? r.hand_leaps : r.hand_begins) = true;
+      EXPECT_EQ(velocity.step(r, 1e-3), Vec3::Zero());
+      EXPECT_EQ(velocity.step(moved_to(Vec3(0.3, 0, 0)), 1e-3).norm(), 0);
     }
-    Readings r = moved_to(Vec3(0.3, 0, 0));
-    r.hand_begins = true;
-    EXPECT_EQ(velocity.step(r, 1e-3), Vec3::Zero());
-    EXPECT_EQ(velocity.step(moved_to(Vec3(0.3, 0, 0)), 1e-3).norm(), 0);
   }
 }
 

@@ -201,6 +201,26 @@ TEST(StageSetPoint, begins_anew_after_a_gap_between_ticks_or_between_samples_of_
   }
 }
 
+TEST(StageSetPoint, does_not_follow_a_leap_of_the_hand_and_says_so) {
+  Path p;
+  p.readings.hand_fresh = true;
+  p.readings.between_hand_s = 5e-3;
+  p.follow_for(0.1);
+  const double x = p.path.set_point().tip_m.x();
+  for (const double leap_m : {-5e-3, 5e-3}) {
+    p.readings.hand.position_m.x() += leap_m;
+    p.readings.hand_leaps = true;
+    EXPECT_EQ(p.path.follow_hand(p.readings, p.in), alarm_travel_limited);
+    p.readings.hand_leaps = false;
+    EXPECT_EQ(p.path.follow_hand(p.readings, p.in), 0U);
+    p.follow_for(0.1);
+    EXPECT_NEAR(p.path.set_point().tip_m.x(), x, 1e-12);
+  }
+  p.readings.hand.position_m.x() -= 5e-3;
+  p.follow_for(0.5);
+  EXPECT_NEAR(p.path.set_point().tip_m.x(), x - 10e-6, 1e-9);
+}
+
 TEST(StageSetPoint, lets_the_hand_slip_at_a_limit_and_says_so) {
   Path p;
   p.follow_for(0.01);

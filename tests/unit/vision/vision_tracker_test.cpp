@@ -36,14 +36,16 @@ struct Drawing {
 };
 
 cv::Mat draw(const Drawing& d) {
+  constexpr double kThirds[] = {-1 / 3.0, 0, 1 / 3.0};
   cv::Mat m(kH, kW, CV_32F);
   for (int y = 0; y < kH; ++y) {
     for (int x = 0; x < kW; ++x) {
       float sum = 0;
       for (int k = 0; k < 9; ++k) {
-        const Point p(x + (k % 3 - 1) / 3.0, y + (k / 3 - 1) / 3.0);
+        const Point p(x + kThirds[k % 3], y + kThirds[k / 3]);
         const Point q = p - kCentre;
-        const double r = cv::norm(q);
+        // Beyond the membrane it does not matter how far.
+        const double r = std::abs(q.x) < kR && std::abs(q.y) < kR ? cv::norm(q) : kR;
         const bool dented = d.dent > 0 && r < kR && r >= std::min(kR - kZona, kInner) - d.dent;
         const double in = dented ? dent(std::atan2(q.y, q.x), d.dent) : 0;
         double g = 150;

@@ -7,6 +7,8 @@
 #include <exception>
 #include <ranges>
 
+#include "hal/gpiod/gpiod_devices.hpp"
+
 namespace punctum::tools {
 namespace {
 
@@ -60,6 +62,12 @@ std::unique_ptr<hal::Device> make_simulated_positioner(const Surroundings& aroun
   return std::make_unique<sim::SimulatedPositioner>(sim::PositionerParams{}, around.clock);
 }
 
+std::unique_ptr<hal::Device> make_gpiod(const Surroundings& around, const Roles& wanted) {
+  return std::make_unique<gpiod::GpiodDevices>(
+      around.scene.gpiod.value_or(gpiod::GpiodParams{}),
+      gpiod::GpiodParts{wanted.has(Role::estop), wanted.has(Role::injector)}, around.clock);
+}
+
 }  // namespace
 
 std::span<const Backend> backends() {
@@ -69,6 +77,7 @@ std::span<const Backend> backends() {
                Role::camera},
               make_simulated_devices},
       Backend{kSimulated, {Role::positioner}, make_simulated_positioner},
+      Backend{kGpiod, {Role::estop, Role::injector}, make_gpiod},
   };
   return table;
 }

@@ -63,6 +63,7 @@ constexpr Saving kSavings[] = {
     {"sim.holder", "no suction to hold or lose the cell"},
     {"vacuum", "no pressure is read or watched"},
     {"injector", "no gate is driven; the inject button does nothing"},
+    {"gpiod", "no GPIO line is claimed"},
     {"force_sensor", "no force is read besides the estimate"},
     {"camera", "no pictures"},
     {"vision", "no vision process: no OpenCV in memory, the second CPU stays free"},

@@ -11,6 +11,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "hal/gpiod/config.hpp"
 #include "hal/parameters.hpp"
 #include "hal/sim/config.hpp"
 #include "rt/control/config.hpp"
@@ -39,6 +40,7 @@ struct DeviceNames {
   std::string haptic, stage, estop, injector, vacuum, force_sensor, camera, positioner;
 };
 inline constexpr std::string_view kRecorded = "recorded";
+inline constexpr std::string_view kGpiod = "gpiod";
 
 struct Scene {
   std::string name;    // of the file without folder and suffix, or the built-in name
@@ -58,6 +60,7 @@ struct Scene {
   rt::ServoConfig servo;                       // what the core does
   std::optional<sim::SimConfig> sim;           // absent: no device is simulated
   std::optional<RecordedFrames> recorded;      // camera = recorded frames
+  std::optional<gpiod::GpiodParams> gpiod;     // lines of e-stop chain and injector
   std::optional<vision::VisionConfig> vision;  // absent: no vision process
 
   [[nodiscard]] bool simulated_camera() const noexcept { return sim && sim->microscope.has_value(); }

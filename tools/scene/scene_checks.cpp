@@ -79,6 +79,55 @@ Found check_needs(const Scene& s) {
   return std::nullopt;
 }
 
+// The lines of [gpiod], and what its devices need of them.
+Found check_gpiod(const Scene& s) {
+  const bool estop = s.devices.estop == kGpiod, injector = s.devices.injector == kGpiod;
+  if (!s.gpiod) {
+    const char* device = estop ? "estop.device" : "injector.device";
+    return estop || injector ? Found{Problem{device,
+                                             "\"gpiod\" needs [gpiod] (it says which lines), allowed: "
+                                             "add [gpiod]"}}
+                             : std::nullopt;
+  }
+  if (!estop && !injector) {
+    return Problem{
+        "gpiod",
+        "no device uses it, allowed: with device = \"gpiod\" in [estop] or [injector], or leave it "
+        "out"};
+  }
+  const gpiod::GpiodParams& p = *s.gpiod;
+  if (!p.chip.starts_with('/')) {
+    return Problem{"gpiod.chip", "is no path, allowed: the path of a GPIO chip, such as \"/dev/gpiochip0\""};
+  }
+  struct Line {
+    const char* key;
+    int offset;
+    const char* needed_by;  // null: by nothing
+  };
+  const char* const chain = estop ? "estop" : nullptr;
+  const Line lines[] = {{"gpiod.contact_a", p.contact_a, chain},
+                        {"gpiod.contact_b", p.contact_b, chain},
+                        {"gpiod.reset", p.reset, chain},
+                        {"gpiod.heartbeat", p.heartbeat, chain},
+                        {"gpiod.gate", p.gate, injector ? "injector" : nullptr},
+                        {"gpiod.valve_contact", p.valve_contact, nullptr}};
+  for (const Line& line : lines) {
+    if (line.needed_by != nullptr && line.offset == gpiod::kNotWired) {
+      return Problem{line.key,
+                     fmt::format("is missing, which [{}] needs, allowed: the offset of a line, from 0 "
+                                 "on",
+                                 line.needed_by)};
+    }
+    for (const Line* other = lines; other != &line; ++other) {
+      if (line.offset != gpiod::kNotWired && line.offset == other->offset) {
+        return Problem{line.key, fmt::format("{} is the line of {} too, allowed: a line of its own",
+                                             line.offset, other->key)};
+      }
+    }
+  }
+  return std::nullopt;
+}
+
 Found check_backends(const Scene& s) {
   if (s.vision && s.vision->method == vision::Method::truth && !s.simulated_camera()) {
     return Problem{"vision.method", "\"truth\" is known of a simulated camera only, allowed: \"paper\""};
@@ -645,8 +694,8 @@ Found check_failures(const Scene& s) {
 }  // namespace
 
 std::optional<Problem> check_together(const Scene& scene) {
-  for (const auto check :
-       {check_needs, check_backends, check_plant, check_core, check_camera, check_vision, check_failures}) {
+  for (const auto check : {check_needs, check_gpiod, check_backends, check_plant, check_core, check_camera,
+                           check_vision, check_failures}) {
     if (auto p = check(scene)) {
       return p;
     }

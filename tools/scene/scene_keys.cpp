@@ -217,6 +217,7 @@ void add_devices(std::vector<Table>& t) {
                : s.simulated_camera() ? bound(*s.sim->microscope, sim::kCameraKeys)
                                       : KeyList{};
       }));
+  t.push_back(thing("gpiod", [](Scene& s) -> auto& { return s.gpiod; }));
 }
 
 void add_vision(std::vector<Table>& t) {
@@ -365,6 +366,8 @@ const Backends& known_backends() {
       b[d.table] = {std::string(kSimulated)};
     }
     b["camera"].emplace_back(kRecorded);
+    b["estop"].emplace_back(kGpiod);
+    b["injector"].emplace_back(kGpiod);
     return b;
   }();
   return known;

@@ -290,7 +290,8 @@ TEST_F(AssemblyTest, tries_every_device_and_names_each_that_fails) {
   const auto lines = lines_of(assembly.error());
   ASSERT_EQ(lines.size(), 3U) << assembly.error();
   EXPECT_EQ(lines[0], "estop: deaf: permission denied");
-  EXPECT_EQ(lines[1], "injector: device = \"nonsense\": unknown, allowed: simulated, fake, dead, deaf");
+  EXPECT_EQ(lines[1],
+            "injector: device = \"nonsense\": unknown, allowed: simulated, gpiod, fake, dead, deaf");
   EXPECT_EQ(lines[2], "stage: dead: no answer on the bus");
   // What did open was not started, and is brought to its safe state and closed; what did not is only
   // destroyed.

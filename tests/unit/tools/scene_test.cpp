@@ -57,12 +57,15 @@ std::string many_failures(int n) {
 const std::vector<Broken>& broken() {
   static const std::string cone_keys = "method, K_N_m, d0_um, r0_um, alpha_rad, eps_um, ramp_s, reach_um";
   static const std::string all_tables =
-      "scene, servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, velocity, mapping, "
+      "scene, servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, velocity, "
+      "mapping, "
       "limits, "
       "vision, phases, local_model, membrane, cone, axis, damping, repulsive, friction, vibration, "
       "forbidden, guard, "
       "enabling, "
       "sim";
+  static const std::string gpiod_scene =
+      kLeast + "[estop]\ndevice = \"gpiod\"\n[gpiod]\ncontact_a = 1\nreset = 3\n";
   static const std::string sim_tables =
       "sim.operator, sim.haptic, sim.stage, sim.needle, sim.estop, sim.cell, sim.holder, sim.dish, "
       "sim.injector, "
@@ -136,6 +139,31 @@ const std::vector<Broken>& broken() {
       {"a device misspelt", "[camera]\ndevice = \"recoded\"\n",
        "b.toml:2:10: camera.device: \"recoded\" is not one of the choices (did you mean recorded?), allowed: "
        "\"simulated\" or \"recorded\""},
+      {"lines without a device", kLeast + "[gpiod]\n",
+       "b.toml:5:2: gpiod: no device uses it, allowed: with device = \"gpiod\" in [estop] or [injector], or "
+       "leave it out"},
+      {"a device without lines", kLeast + "[estop]\ndevice = \"gpiod\"\n",
+       "b.toml:6:10: estop.device: \"gpiod\" needs [gpiod] (it says which lines), allowed: add [gpiod]"},
+      {"an injector without lines", kLeast + "[injector]\ndevice = \"gpiod\"\n",
+       "b.toml:6:10: injector.device: \"gpiod\" needs [gpiod] (it says which lines), allowed: add [gpiod]"},
+      {"a contact without a line", gpiod_scene + "contact_b = -1\n",
+       "b.toml:10:13: gpiod.contact_b: is missing, which [estop] needs, allowed: the offset of a line, from "
+       "0 on"},
+      {"no line at all for the heartbeat", gpiod_scene + "contact_b = 2\n",
+       "b.toml:7:2: gpiod.heartbeat: is missing, which [estop] needs, allowed: the offset of a line, from 0 "
+       "on"},
+      {"two contacts on a line", gpiod_scene + "contact_b = 1\nheartbeat = 4\n",
+       "b.toml:10:13: gpiod.contact_b: 1 is the line of gpiod.contact_a too, allowed: a line of its own"},
+      {"a line below zero", gpiod_scene + "contact_b = -2\n",
+       "b.toml:10:13: gpiod.contact_b: -2 is out of range, allowed: a whole number from -1 to 1023"},
+      {"a chip without a path", gpiod_scene + "contact_b = 2\nheartbeat = 4\nchip = \"gpiochip0\"\n",
+       "b.toml:12:8: gpiod.chip: is no path, allowed: the path of a GPIO chip, such as \"/dev/gpiochip0\""},
+      {"contacts that are neither", gpiod_scene + "contacts_closed = \"shut\"\n",
+       "b.toml:10:19: gpiod.contacts_closed: \"shut\" is not one of the choices, allowed: \"high\" or "
+       "\"low\""},
+      {"a real chain in virtual time",
+       "[scene]\nclock = \"virtual\"\n" + gpiod_scene + "contact_b = 2\nheartbeat = 4\n",
+       "b.toml:2:9: scene.clock: \"virtual\" cannot wait for estop.device = \"gpiod\", allowed: \"real\""},
       {"two numbers for three", "[haptic]\n[stage]\n[sim.stage]\nstart_um = [90, 6]\n",
        "b.toml:4:12: sim.stage.start_um: a list is not a list of three numbers, allowed: [x, y, z], each a "
        "number "
@@ -398,7 +426,8 @@ TEST(Scene, a_table_that_is_absent_is_a_thing_that_is_not_there) {
 // A member that no key sets would silently keep its default: of every struct of parameters, each member
 // stands in a table of keys of the same file, behind the struct.
 TEST(Scene, every_member_of_the_parameters_has_a_key) {
-  std::vector<fs::path> files = {"hal/sim/config.hpp", "vision/config.hpp", "tools/scene/scene.hpp"};
+  std::vector<fs::path> files = {"hal/gpiod/config.hpp", "hal/sim/config.hpp", "vision/config.hpp",
+                                 "tools/scene/scene.hpp"};
   for (const char* room : {"rt/control", "rt/forces"}) {
     for (const auto& entry : fs::directory_iterator(fs::path(PUNCTUM_SOURCE_DIR) / room)) {
       if (entry.path().extension() == ".hpp") {
@@ -567,21 +596,24 @@ TEST(Scene, overrides_are_read_and_checked_as_the_file_is) {
       {"sim.operator=off", "--set: sim.operator: cannot be left out, allowed: on"},
       {"operator.depth_um=25",
        "--set: operator.depth_um: unknown key (did you mean sim.operator.depth_um?), allowed: tables scene, "
-       "servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, velocity, mapping, limits, "
+       "servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, velocity, mapping, "
+       "limits, "
        "vision, "
        "phases, local_model, membrane, cone, axis, damping, repulsive, friction, vibration, forbidden, "
        "guard, enabling, "
        "sim"},
       {"cell.inner.gap_um=4",
        "--set: cell.inner.gap_um: unknown key (did you mean sim.cell.inner.gap_um?), allowed: tables scene, "
-       "servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, velocity, mapping, limits, "
+       "servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, velocity, mapping, "
+       "limits, "
        "vision, "
        "phases, local_model, membrane, cone, axis, damping, repulsive, friction, vibration, forbidden, "
        "guard, enabling, "
        "sim"},
       {"cell=off",
        "--set: cell: unknown table (did you mean sim.cell?), allowed: scene, servo, haptic, stage, estop, "
-       "vacuum, injector, force_sensor, camera, velocity, mapping, limits, vision, phases, local_model, "
+       "vacuum, injector, force_sensor, camera, gpiod, velocity, mapping, limits, vision, phases, "
+       "local_model, "
        "membrane, "
        "cone, axis, damping, repulsive, friction, vibration, forbidden, guard, enabling, sim"},
       {"damping.B2_Ns_m=0.5",
@@ -626,7 +658,8 @@ TEST(Scene, without_a_simulated_device_nothing_is_simulated) {
   const auto unknown_here = parse_scene(kReal, "real.toml");
   ASSERT_FALSE(unknown_here);
   EXPECT_EQ(unknown_here.error(),
-            "real.toml:6:10: estop.device: \"loop\" is not one of the choices, allowed: \"simulated\"");
+            "real.toml:6:10: estop.device: \"loop\" is not one of the choices, allowed: \"simulated\" or "
+            "\"gpiod\"");
 }
 
 TEST(Scene, the_size_of_a_lie_reads_back_to_the_same_bits) {

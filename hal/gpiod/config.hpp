@@ -1,0 +1,47 @@
+// Which GPIO lines the safety chain and the injector are wired to: table [gpiod] of a scene.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "hal/parameters.hpp"
+
+namespace punctum::gpiod {
+
+inline constexpr int kNotWired = -1;
+
+// Offsets count the lines of the chip from 0. How the contacts are wired decides level and bias together, so
+// that a cut wire reads as an open contact with either wiring.
+struct GpiodParams {
+  enum class Closed : std::uint8_t {
+    high,  // contacts switch to the supply, a resistor pulls the input down
+    low,   // contacts switch to ground, a resistor pulls the input up
+  };
+  enum class Pull : std::uint8_t { internal, external };  // whose resistor that is: the chip's or the board's
+  enum class Gate : std::uint8_t { high, low };           // the level that opens the injector
+
+  std::string chip = "/dev/gpiochip0";
+  Closed contacts_closed = Closed::high;
+  Pull pull = Pull::internal;
+  int contact_a = kNotWired;  // of the emergency stop: closed while it may run
+  int contact_b = kNotWired;
+  int reset = kNotWired;      // closed while it is pressed
+  int heartbeat = kNotWired;  // to the relay that watches it
+  int gate = kNotWired;
+  Gate gate_opens_at = Gate::high;
+  int valve_contact = kNotWired;  // closed while the valve is shut; not wired: the gate's line is read back
+};
+constexpr auto keys_of(const GpiodParams*) {
+  return hal::keys(hal::text("chip", &GpiodParams::chip),
+                   hal::choice("contacts_closed", &GpiodParams::contacts_closed, "high", "low"),
+                   hal::choice("pull", &GpiodParams::pull, "internal", "external"),
+                   hal::whole("contact_a", &GpiodParams::contact_a, kNotWired, 1023),
+                   hal::whole("contact_b", &GpiodParams::contact_b, kNotWired, 1023),
+                   hal::whole("reset", &GpiodParams::reset, kNotWired, 1023),
+                   hal::whole("heartbeat", &GpiodParams::heartbeat, kNotWired, 1023),
+                   hal::whole("gate", &GpiodParams::gate, kNotWired, 1023),
+                   hal::choice("gate_opens_at", &GpiodParams::gate_opens_at, "high", "low"),
+                   hal::whole("valve_contact", &GpiodParams::valve_contact, kNotWired, 1023));
+}
+
+}  // namespace punctum::gpiod

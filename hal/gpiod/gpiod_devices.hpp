@@ -1,0 +1,87 @@
+// The e-stop chain and the injector on the GPIO lines of one chip. Wiring: README.md.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <tl/expected.hpp>
+
+#include "hal/device_life.hpp"
+#include "hal/gpiod/config.hpp"
+#include "hal/gpiod/lines.hpp"
+#include "hal/realtime.hpp"
+
+namespace punctum::gpiod {
+
+// Two contacts, the reset button and the heartbeat. The level decides; the changes that the kernel kept only
+// add pulses which no reading saw.
+class GpiodEstop final : public hal::EstopChain {
+ public:
+  explicit GpiodEstop(const hal::Clock& clock) : clock_(clock) {}
+
+  // fault, disconnected: also when the heartbeat could not be written last.
+  [[nodiscard]] hal::Status read(hal::EstopState& out) NONBLOCKING override;
+  void heartbeat(bool level) NONBLOCKING override;
+
+ private:
+  friend class GpiodDevices;
+  struct Contact {
+    std::unique_ptr<Line> line;
+    bool closed = false;  // when it was read last
+  };
+  [[nodiscard]] static hal::Status read_contact(Contact& contact, bool& closed, bool& pulse) NONBLOCKING;
+
+  const hal::Clock& clock_;
+  Contact a_, b_;
+  std::unique_ptr<Line> reset_, heartbeat_;
+  hal::Status written_ = hal::Status::ok;
+};
+
+// The gate, and the contact of its valve; where that is not wired, the gate's own line is read back.
+class GpiodInjector final : public hal::Injector {
+ public:
+  explicit GpiodInjector(const hal::Clock& clock) : clock_(clock) {}
+
+  void gate(bool open) NONBLOCKING override;
+  // fault, disconnected: also when the gate could not be written last.
+  [[nodiscard]] hal::Status read(hal::InjectorState& out) NONBLOCKING override;
+
+ private:
+  friend class GpiodDevices;
+  const hal::Clock& clock_;
+  std::unique_ptr<Line> gate_, valve_;
+  hal::Status written_ = hal::Status::ok;
+};
+
+struct GpiodParts {
+  bool estop = false;
+  bool injector = false;
+};
+
+class GpiodDevices final : public hal::Device {
+ public:
+  using OpenChip = std::function<tl::expected<std::unique_ptr<Chip>, std::string>(const std::string& path)>;
+
+  // clock: the station's, on which samples are dated.
+  GpiodDevices(GpiodParams params, GpiodParts parts, const hal::Clock& clock,
+               OpenChip open_chip_at = open_chip);
+
+  [[nodiscard]] tl::expected<void, std::string> open() override;  // outputs: heartbeat low, gate shut
+  [[nodiscard]] hal::Served served() noexcept override;
+  [[nodiscard]] tl::expected<void, std::string> start(std::int64_t first_tick_ns) override;
+  void safe_state() noexcept override;  // heartbeat low, gate shut
+  void close() noexcept override;
+
+ private:
+  [[nodiscard]] tl::expected<void, std::string> claim_all();
+  [[nodiscard]] std::string claim(const char* key, int offset, Use use, std::unique_ptr<Line>& into);
+
+  const GpiodParams params_;
+  const GpiodParts parts_;
+  const OpenChip open_chip_at_;
+  std::unique_ptr<Chip> chip_;
+  GpiodEstop estop_;
+  GpiodInjector injector_;
+};
+
+}  // namespace punctum::gpiod

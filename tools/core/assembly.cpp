@@ -7,6 +7,9 @@
 #include <exception>
 #include <ranges>
 
+#include "hal/cia402/cia402_stage.hpp"
+#include "hal/cia402/socket_can.hpp"
+
 namespace punctum::tools {
 namespace {
 
@@ -60,6 +63,12 @@ std::unique_ptr<hal::Device> make_simulated_positioner(const Surroundings& aroun
   return std::make_unique<sim::SimulatedPositioner>(sim::PositionerParams{}, around.clock);
 }
 
+std::unique_ptr<hal::Device> make_cia402(const Surroundings& around, const Roles&) {
+  const cia402::CanStageParams& params = around.scene.cia402.value();
+  return std::make_unique<cia402::Cia402Stage>(params, 1 / around.scene.servo.rate_Hz, around.clock,
+                                               std::make_unique<cia402::SocketCan>(params.interface));
+}
+
 }  // namespace
 
 std::span<const Backend> backends() {
@@ -69,6 +78,7 @@ std::span<const Backend> backends() {
                Role::camera},
               make_simulated_devices},
       Backend{kSimulated, {Role::positioner}, make_simulated_positioner},
+      Backend{kCia402, {Role::stage, Role::force_sensor}, make_cia402},
   };
   return table;
 }

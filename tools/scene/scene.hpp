@@ -11,6 +11,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "hal/cia402/config.hpp"
 #include "hal/parameters.hpp"
 #include "hal/sim/config.hpp"
 #include "rt/control/config.hpp"
@@ -39,6 +40,7 @@ struct DeviceNames {
   std::string haptic, stage, estop, injector, vacuum, force_sensor, camera, positioner;
 };
 inline constexpr std::string_view kRecorded = "recorded";
+inline constexpr std::string_view kCia402 = "cia402";
 
 struct Scene {
   std::string name;    // of the file without folder and suffix, or the built-in name
@@ -55,10 +57,11 @@ struct Scene {
   int vision_nice = 5;
 
   DeviceNames devices;
-  rt::ServoConfig servo;                       // what the core does
-  std::optional<sim::SimConfig> sim;           // absent: no device is simulated
-  std::optional<RecordedFrames> recorded;      // camera = recorded frames
-  std::optional<vision::VisionConfig> vision;  // absent: no vision process
+  rt::ServoConfig servo;                         // what the core does
+  std::optional<sim::SimConfig> sim;             // absent: no device is simulated
+  std::optional<RecordedFrames> recorded;        // camera = recorded frames
+  std::optional<cia402::CanStageParams> cia402;  // stage = drives on a CAN bus
+  std::optional<vision::VisionConfig> vision;    // absent: no vision process
 
   [[nodiscard]] bool simulated_camera() const noexcept { return sim && sim->microscope.has_value(); }
   // A task that ends by itself: cells to inject. Otherwise the run is open-ended and a time limit ends it

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -304,7 +305,10 @@ TEST_F(Cia402StageTest, a_set_point_that_is_no_number_moves_nothing) {
   enable();
   const Vec3 before_m = where_m();
   for (int i = 0; i < 20; ++i) {
-    tick([&] { EXPECT_EQ(stage->command({{NAN, 0, 0}, -Vec3::UnitX()}), Status::fault); });
+    tick([&] {
+      EXPECT_EQ(stage->command({{std::numeric_limits<double>::quiet_NaN(), 0, 0}, -Vec3::UnitX()}),
+                Status::fault);
+    });
   }
   EXPECT_LT((where_m() - before_m).norm(), 1e-12);
 }
@@ -831,17 +835,49 @@ TEST_F(Cia402StageTest, a_drive_that_does_not_change_its_mode_after_homing_is_a_
 
 // ---- the force sensor ----
 
+// The sensor, node 30, is played by hand: it confirms every download and answers each SYNC with -1500 counts.
 TEST_F(Cia402StageTest, a_force_is_that_of_the_sensor_s_pdo) {
   CanStageParams params = three_axes();
   params.force_node = 30;
   params.force_count_N = -2e-9;
-  params.sync_divisor = 2;
-  // The drives configure as before; the sensor is played by hand.
+  int size = 4;
+  can.lose_of_master = [&](const can_frame& frame) {
+    if (frame.can_id == 0x61E) {
+      can_frame answer = frame;
+      answer.can_id = 0x59E;
+      answer.data[0] = 0x60;
+      can.inject(answer);
+    }
+    if (frame.can_id == 0x080 && size > 0) {
+      can_frame force = frame_of(0x19E, {0x24, 0xFA, 0xFF, 0xFF, 0, 0});
+      force.can_dlc = static_cast<std::uint8_t>(size);
+      can.inject(force);
+    }
+    return false;
+  };
+  begin(params);
+  hal::ForceState force;
+  EXPECT_EQ(stage->read(force), Status::no_data);
+  tick([&] { EXPECT_EQ(stage->read(force), Status::no_data); });
+  const std::int64_t synced = can.now_ns() - kTick_ns;
+  tick([&] { EXPECT_EQ(stage->read(force), Status::ok); });
+  EXPECT_NEAR(force.axial_force_N, 3e-6, 1e-15);
+  EXPECT_EQ(force.sample_ns, synced);
+  size = 6;
+  ticks(1);
+  EXPECT_EQ(stage->read(force), Status::ok);  // of the SYNC before
+  tick([&] { EXPECT_EQ(stage->read(force), Status::no_data); });
+  can.bus_off = true;
+  tick([&] { EXPECT_EQ(stage->read(force), Status::disconnected); });
+}
+
+TEST_F(Cia402StageTest, a_drive_at_the_node_of_the_force_sensor_is_refused) {
+  CanStageParams params = three_axes();
+  params.force_node = 30;
   can.add({.node = 30});
   can.sleep_until_ns(can.now_ns() + kTick_ns);
-  stage.emplace(params, 1e-3, can, can.master());
-  const auto opened = stage->open();
-  ASSERT_FALSE(opened);  // a drive is no force sensor: it maps no 9130
+  const auto opened = made(params).open();
+  ASSERT_FALSE(opened);
   EXPECT_NE(opened.error().find("node 30: 1A00:01 (TPDO 1): 0x91300120 is refused: there is no such object"),
             std::string::npos)
       << opened.error();

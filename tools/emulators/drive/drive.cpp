@@ -124,7 +124,8 @@ Abort Drive::check_mapping_count(const Pdo& pdo, std::int64_t count) const {
     return abort_range;
   }
   std::int64_t bits = 0;
-  for (std::uint8_t sub = 1; sub <= count; ++sub) {
+  const auto entries = static_cast<std::uint8_t>(count);
+  for (std::uint8_t sub = 1; sub <= entries; ++sub) {
     const std::int64_t entry = objects_.get(pdo.mapping, sub);
     if (entry == 0) {
       return abort_not_mappable;

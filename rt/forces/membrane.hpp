@@ -158,7 +158,7 @@ class MembraneLaw {
 
  private:
   MembraneParams params_;
-  double curve_R_m_ = 0;
+  double curve_R_m_ = std::numeric_limits<double>::quiet_NaN();
   DeflectionCurve curve_;
 };
 [[nodiscard]] inline MembraneState membrane_law(const MembraneParams& params, double wd_m, double R_m,

@@ -63,13 +63,14 @@ std::vector<Room> house() {
                                           "hal/ipc/rendezvous", "hal/ipc/sealed_text"};
   const Names sim_shared = {"hal/sim/point", "hal/sim/noise", "hal/sim/config", "hal/sim/failures"};
   const Names sim = sim_shared + Names{"hal/sim/plant/", "hal/sim/operator/", "hal/sim/"};
+  const Names cia402_shared = {"hal/cia402/config", "hal/cia402/bus_load", "hal/cia402/calibration"};
   const Names core = {
       "rt/station/", "rt/forces/", "rt/control/", "rt/executive/", "rt/executive/monotonic_clock",
       "rt/platform/"};
   const Names vision_parts = {"vision/config", "vision/image/", "vision/pipettes/", "vision/membrane/",
                               "vision/events/"};
   // What a program without pictures is made of, and one with.
-  const Names station = ground + sim + core + Names{"tools/shared/", "tools/scene/"};
+  const Names station = ground + sim + core + cia402_shared + Names{"tools/shared/", "tools/scene/"};
   const Names pictures =
       station + Names{"hal/sim/camera/", "hal/recorded/"} + vision_parts + Names{"vision/"};
   return {
@@ -88,7 +89,10 @@ std::vector<Room> house() {
       {"hal/gpiod/", ground + Names{"hal/gpiod/config"},
        "Eigen/.*|tl/expected.hpp|gpiod.*|sanitizer/rtsan_interface.h"},
       {"hal/falcon/", ground, "Eigen/.*|tl/expected.hpp|libusb.*"},
-      {"hal/cia402/", ground, kMayFail},
+      {"hal/cia402/config", interfaces, kMayFail},
+      {"hal/cia402/bus_load", interfaces, kMayFail},
+      {"hal/cia402/calibration", interfaces + Names{"hal/cia402/config"}, kMayFail},
+      {"hal/cia402/", ground + cia402_shared, "Eigen/.*|tl/expected.hpp|sanitizer/rtsan_interface.h"},
       {"hal/v4l2/", ground, kMayFail},
       // The simulated backend; hal/sim/ is the bench and whatever stands beside it.
       {"hal/sim/point", ground, kMayFail},
@@ -117,16 +121,18 @@ std::vector<Room> house() {
       {"vision/", interfaces + vision_parts + Names{"rt/station/"}, kPictures},
       // Programs do not include one another.
       {"tools/shared/", ground + sim + core, kTools},
-      {"tools/scene/", ground + sim + core + Names{"hal/gpiod/config", "vision/config", "tools/shared/"},
+      {"tools/scene/",
+       ground + sim + core + cia402_shared + Names{"hal/gpiod/config", "vision/config", "tools/shared/"},
        kTools},
-      {"tools/core/", station + Names{"hal/gpiod/"}, kTools},
+      {"tools/core/", station + Names{"hal/gpiod/", "hal/cia402/"}, kTools},
       {"tools/punctum/", station, kTools},
       {"tools/vision/", pictures, kTools},
       {"tools/report/", pictures, kTools},
-      {"tests/support/", pictures, kTests},
+      {"tools/emulators/drive/", {"tools/shared/"}, kTools},
+      {"tests/support/", pictures + Names{"hal/cia402/", "tools/emulators/drive/"}, kTests},
       {"tests/*",
-       pictures + Names{"tests/support/", "hal/gpiod/config", "hal/gpiod/", "tools/core/", "tools/punctum/",
-                        "tools/vision/", "tools/report/"},
+       pictures + Names{"hal/gpiod/config", "hal/gpiod/", "hal/cia402/", "tools/emulators/drive/",
+                        "tests/support/", "tools/core/", "tools/punctum/", "tools/vision/", "tools/report/"},
        kTests},
   };
 }

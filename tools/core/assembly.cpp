@@ -7,6 +7,8 @@
 #include <exception>
 #include <ranges>
 
+#include "hal/cia402/cia402_stage.hpp"
+#include "hal/cia402/socket_can.hpp"
 #include "hal/gpiod/gpiod_devices.hpp"
 
 namespace punctum::tools {
@@ -68,6 +70,12 @@ std::unique_ptr<hal::Device> make_gpiod(const Surroundings& around, const Roles&
       gpiod::GpiodParts{wanted.has(Role::estop), wanted.has(Role::injector)}, around.clock);
 }
 
+std::unique_ptr<hal::Device> make_cia402(const Surroundings& around, const Roles&) {
+  const cia402::CanStageParams& params = around.scene.cia402.value();
+  return std::make_unique<cia402::Cia402Stage>(params, 1 / around.scene.servo.rate_Hz, around.clock,
+                                               std::make_unique<cia402::SocketCan>(params.interface));
+}
+
 }  // namespace
 
 std::span<const Backend> backends() {
@@ -78,6 +86,7 @@ std::span<const Backend> backends() {
               make_simulated_devices},
       Backend{kSimulated, {Role::positioner}, make_simulated_positioner},
       Backend{kGpiod, {Role::estop, Role::injector}, make_gpiod},
+      Backend{kCia402, {Role::stage, Role::force_sensor}, make_cia402},
   };
   return table;
 }

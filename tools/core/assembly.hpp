@@ -56,7 +56,7 @@ class Roles {
 // What a backend may use to make its device.
 struct Surroundings {
   const Scene& scene;
-  const hal::Clock& clock;      // the station's, for sample times
+  hal::Clock& clock;            // the station's, for sample times and for waits of the set-up
   sim::Bench* bench = nullptr;  // null: the simulated plant publishes nothing
 };
 

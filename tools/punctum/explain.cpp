@@ -83,6 +83,7 @@ constexpr Saving kSavings[] = {
     {"forbidden.floor", "nothing keeps the needle from the dish floor but the workspace"},
     {"forbidden.holder", "nothing keeps the needle from the holding pipette"},
     {"sim.dish", "the simulated dish has no floor"},
+    {"cia402", "no CAN bus"},
 };
 
 // An effect in one phrase; by its name alone where there is nothing more to say.

@@ -11,6 +11,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "hal/cia402/config.hpp"
 #include "hal/gpiod/config.hpp"
 #include "hal/parameters.hpp"
 #include "hal/sim/config.hpp"
@@ -41,6 +42,7 @@ struct DeviceNames {
 };
 inline constexpr std::string_view kRecorded = "recorded";
 inline constexpr std::string_view kGpiod = "gpiod";
+inline constexpr std::string_view kCia402 = "cia402";
 
 struct Scene {
   std::string name;    // of the file without folder and suffix, or the built-in name
@@ -57,11 +59,12 @@ struct Scene {
   int vision_nice = 5;
 
   DeviceNames devices;
-  rt::ServoConfig servo;                       // what the core does
-  std::optional<sim::SimConfig> sim;           // absent: no device is simulated
-  std::optional<RecordedFrames> recorded;      // camera = recorded frames
-  std::optional<gpiod::GpiodParams> gpiod;     // lines of e-stop chain and injector
-  std::optional<vision::VisionConfig> vision;  // absent: no vision process
+  rt::ServoConfig servo;                         // what the core does
+  std::optional<sim::SimConfig> sim;             // absent: no device is simulated
+  std::optional<RecordedFrames> recorded;        // camera = recorded frames
+  std::optional<cia402::CanStageParams> cia402;  // stage = drives on a CAN bus
+  std::optional<gpiod::GpiodParams> gpiod;       // lines of e-stop chain and injector
+  std::optional<vision::VisionConfig> vision;    // absent: no vision process
 
   [[nodiscard]] bool simulated_camera() const noexcept { return sim && sim->microscope.has_value(); }
   // A task that ends by itself: cells to inject. Otherwise the run is open-ended and a time limit ends it

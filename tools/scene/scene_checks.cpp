@@ -6,6 +6,8 @@
 #include <tuple>
 #include <type_traits>
 
+#include "hal/cia402/bus_load.hpp"
+#include "hal/cia402/calibration.hpp"
 #include "hal/sim/failures.hpp"
 #include "rt/control/renderable.hpp"
 #include "tools/scene/scene_keys.hpp"
@@ -149,6 +151,141 @@ Found check_backends(const Scene& s) {
     return Problem{"camera.frames", "is missing, allowed: a folder, a glob or a video file"};
   }
   return std::nullopt;
+}
+
+// ---- drives on a CAN bus ----
+
+Found check_nodes(const cia402::CanStageParams& can) {
+  std::vector<int> nodes = {can.master_node};
+  const auto taken = [&nodes](int node) {
+    const bool known = std::find(nodes.begin(), nodes.end(), node) != nodes.end();
+    nodes.push_back(node);
+    return known;
+  };
+  for (int i = 0; i < can.axis_count; ++i) {
+    const int node = can.axes[static_cast<std::size_t>(i)].node;
+    if (node == 0 || taken(node)) {
+      return Problem{
+          fmt::format("cia402.axis[{}].node", i),
+          fmt::format("{}, allowed: a number from 1 to {} that no other node has, nor the master",
+                      node == 0 ? "is missing" : fmt::format("{} is taken", node), cia402::kMaxNode)};
+    }
+  }
+  if (can.force_node != 0 && taken(can.force_node)) {
+    return Problem{"cia402.force_node",
+                   fmt::format("{} is taken, allowed: a number that no other node has", can.force_node)};
+  }
+  return std::nullopt;
+}
+
+// Axes that enclose less than about 11 degrees magnify every error of a count by more than this.
+constexpr double kWorstCondition = 10;
+
+Found check_axes(const cia402::CanStageParams& can) {
+  if (can.axis_count < 3) {
+    return Problem{"cia402.axis",
+                   fmt::format("{} cannot follow the hand in space, allowed: from 3 to {} [[cia402.axis]]",
+                               can.axis_count, cia402::kMaxAxes)};
+  }
+  for (int i = 0; i < can.axis_count; ++i) {
+    const cia402::AxisParams& axis = can.axes[static_cast<std::size_t>(i)];
+    const std::string name = fmt::format("cia402.axis[{}].", i);
+    if (axis.count_m.isZero()) {
+      return Problem{name + "count_um",
+                     "moves nothing, allowed: how the tip moves with one count, [x, y, z], not zero"};
+    }
+    if (axis.min_counts >= axis.max_counts) {
+      return Problem{name + "min_counts",
+                     fmt::format("is not below max_counts, allowed: below {}", axis.max_counts)};
+    }
+  }
+  const double condition = cia402::condition_of_axes(can);
+  if (!(condition <= kWorstCondition)) {
+    return Problem{
+        "cia402.axis",
+        fmt::format("the axes' directions count_um hardly span space, condition {:.3g}, allowed: at "
+                    "most {:g} (axes more than about 11 degrees apart)",
+                    condition, kWorstCondition)};
+  }
+  return std::nullopt;
+}
+
+Found check_bus(const cia402::CanStageParams& can, const rt::ServoConfig& servo) {
+  const double cycle_s = can.sync_divisor / servo.rate_Hz;
+  if (cia402::interpolation_period(cycle_s).mantissa == 0) {
+    return Problem{
+        "cia402.sync_divisor",
+        fmt::format("a period of {:g} us is none that drives can interpolate, allowed: 1 to 255 ms, or "
+                    "tenths, hundredths or thousandths of it",
+                    cycle_s * 1e6)};
+  }
+  constexpr double kCycles = 3;  // an answer is two cycles old when it is judged, and one may be lost
+  if (servo.stage_timeout_s < kCycles * cycle_s) {
+    return Problem{
+        "cia402.sync_divisor",
+        fmt::format("the stage would time out between two SYNCs, allowed: at most {}, or stage.timeout_ms "
+                    "of at least {:g}",
+                    static_cast<int>(servo.stage_timeout_s * servo.rate_Hz / kCycles),
+                    kCycles * cycle_s * 1e3)};
+  }
+  if (can.heartbeat_timeout_s < 2 * can.heartbeat_s) {
+    return Problem{
+        "cia402.heartbeat_timeout_ms",
+        fmt::format("one late heartbeat would stop the stage, allowed: at least 2 heartbeat_ms = {:g}",
+                    2e3 * can.heartbeat_s)};
+  }
+  const auto load_of = [&](double cycle) {
+    return cia402::bus_load(can.axis_count, can.force_node != 0, 1e-3 / can.bitrate_kbit, cycle,
+                            can.heartbeat_s);
+  };
+  const cia402::BusLoad load = load_of(cycle_s);
+  if (!load.fits(cycle_s)) {
+    int divisor = can.sync_divisor;
+    while (divisor < 64 && !load_of(divisor / servo.rate_Hz).fits(divisor / servo.rate_Hz)) {
+      ++divisor;
+    }
+    return Problem{
+        "cia402.sync_divisor",
+        fmt::format("the bus cannot carry {} axes: SYNC and PDOs take up to {:.0f} us, an emergency and a "
+                    "heartbeat {:.0f} us, of {:.0f} us from SYNC to SYNC at {:g} kbit/s, load {:.0f} %, "
+                    "allowed: at least {} (or fewer axes, or a higher bitrate_kbit)",
+                    can.axis_count, load.cyclic_s * 1e6, load.spare_s * 1e6, cycle_s * 1e6, can.bitrate_kbit,
+                    load.part * 100, divisor)};
+  }
+  return std::nullopt;
+}
+
+Found check_can_stage(const Scene& s) {
+  const bool stage = s.devices.stage == kCia402, sensor = s.devices.force_sensor == kCia402;
+  if (!s.cia402) {
+    return stage || sensor
+               ? Found(Problem{
+                     stage ? "stage.device" : "force_sensor.device",
+                     "\"cia402\" needs to know its drives, allowed: with [cia402] and [[cia402.axis]]"})
+               : std::nullopt;
+  }
+  const cia402::CanStageParams& can = *s.cia402;
+  if (!stage) {
+    return Problem{"cia402",
+                   "no stage uses it, allowed: with device = \"cia402\" in [stage], or leave it out"};
+  }
+  if (sensor != (can.force_node != 0)) {
+    return Problem{"cia402.force_node", sensor
+                                            ? "0 is no force sensor, allowed: its node number"
+                                            : "no force sensor uses it, allowed: with device = \"cia402\" in "
+                                              "[force_sensor], or 0"};
+  }
+  if (s.servo.mapping.max_tilt_rad != 0) {
+    return Problem{"mapping.max_tilt_rad",
+                   "no drive of [cia402] tilts the needle, allowed: 0 with stage.device = \"cia402\""};
+  }
+  if (auto p = check_nodes(can)) {
+    return p;
+  }
+  if (auto p = check_axes(can)) {
+    return p;
+  }
+  return check_bus(can, s.servo);
 }
 
 // ---- needle, cell and pipettes of the simulation ----
@@ -694,8 +831,8 @@ Found check_failures(const Scene& s) {
 }  // namespace
 
 std::optional<Problem> check_together(const Scene& scene) {
-  for (const auto check : {check_needs, check_gpiod, check_backends, check_plant, check_core, check_camera,
-                           check_vision, check_failures}) {
+  for (const auto check : {check_needs, check_gpiod, check_backends, check_can_stage, check_plant, check_core,
+                           check_camera, check_vision, check_failures}) {
     if (auto p = check(scene)) {
       return p;
     }

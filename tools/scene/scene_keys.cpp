@@ -217,7 +217,13 @@ void add_devices(std::vector<Table>& t) {
                : s.simulated_camera() ? bound(*s.sim->microscope, sim::kCameraKeys)
                                       : KeyList{};
       }));
+}
+
+void add_backends(std::vector<Table>& t) {
   t.push_back(thing("gpiod", [](Scene& s) -> auto& { return s.gpiod; }));
+  t.push_back(thing(
+      "cia402", [](Scene& s) -> auto& { return s.cia402; },
+      [](Scene& s) { return bound(*s.cia402, cia402::kCia402Keys); }));
 }
 
 void add_vision(std::vector<Table>& t) {
@@ -325,6 +331,7 @@ std::vector<Table> make_tables() {
   t.push_back(
       settings("servo", [](Scene& s) { return bound(s.servo, rt::kServoKeys) + bound(s, kCoreKeys); }));
   add_devices(t);
+  add_backends(t);
   add_tasks(t);
   add_vision(t);
   add_effects(t);
@@ -342,7 +349,13 @@ std::vector<List> make_lists() {
            static_cast<int>(std::tuple_size_v<decltype(sim::SimConfig::estop_events)>),
            [](Scene& s) -> int& { return s.sim->estop_event_count; },
            [](Scene& s, int i) { return bound(s.sim->estop_events[static_cast<std::size_t>(i)]); },
-           {"estop"}}};
+           {"estop"}},
+          {"cia402.axis",
+           cia402::kMaxAxes,
+           [](Scene& s) -> int& { return s.cia402->axis_count; },
+           [](Scene& s, int i) { return bound(s.cia402->axes[static_cast<std::size_t>(i)]); },
+           {},
+           [](const Scene& s) { return s.cia402.has_value(); }}};
 }
 
 std::string words(std::vector<std::string> names, bool quoted) {
@@ -368,6 +381,8 @@ const Backends& known_backends() {
     b["camera"].emplace_back(kRecorded);
     b["estop"].emplace_back(kGpiod);
     b["injector"].emplace_back(kGpiod);
+    b["stage"].emplace_back(kCia402);
+    b["force_sensor"].emplace_back(kCia402);
     return b;
   }();
   return known;

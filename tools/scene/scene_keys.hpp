@@ -75,6 +75,7 @@ struct List {
   std::function<int&(Scene&)> count;
   std::function<std::vector<Key>(Scene&, int index)> keys;  // of entry `index`
   std::vector<std::string> used_by = {};                    // as of a table
+  std::function<bool(const Scene&)> there = [](const Scene& s) { return s.sim.has_value(); };
 };
 
 [[nodiscard]] const std::vector<Table>& scene_tables();

@@ -248,8 +248,10 @@ Done SceneReader::read_content(const Table& table, const toml::table& content) {
         continue;
       }
       const Table* inner = table_named(table.name + "." + name);
-      auto r = inner != nullptr ? read_table(*inner, key.source().begin, value)
-                                : read_key(table.name, keys_of_table(table), key, value);
+      const List* list = list_named(table.name + "." + name);
+      auto r = inner != nullptr  ? read_table(*inner, key.source().begin, value)
+               : list != nullptr ? read_list(*list, key.source().begin, value)
+                                 : read_key(table.name, keys_of_table(table), key, value);
       if (!r) {
         return r;
       }
@@ -341,6 +343,11 @@ tl::unexpected<std::string> SceneReader::unknown_key(const std::string& table, c
   for (const auto& t : scene_tables()) {
     if (is_inside(t.name, table)) {
       names.push_back("[" + t.name + "]");
+    }
+  }
+  for (const auto& l : scene_lists()) {
+    if (is_inside(l.name, table)) {
+      names.push_back("[[" + l.name + "]]");
     }
   }
   const std::string full = table + "." + name;

@@ -103,11 +103,8 @@ std::string to_toml(const Scene& scene) {
       out += fmt::format("\n[{}]\n", t.name) + lines(t.keys(s));
     }
   }
-  if (!s.sim) {
-    return out;
-  }
   for (const auto& l : scene_lists()) {
-    for (int i = 0; i < l.count(s); ++i) {
+    for (int i = 0; l.there(s) && i < l.count(s); ++i) {
       out += fmt::format("\n[[{}]]\n", l.name) + lines(l.keys(s, i));
     }
   }

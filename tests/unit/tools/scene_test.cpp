@@ -57,7 +57,7 @@ std::string many_failures(int n) {
 const std::vector<Broken>& broken() {
   static const std::string cone_keys = "method, K_N_m, d0_um, r0_um, alpha_rad, eps_um, ramp_s, reach_um";
   static const std::string all_tables =
-      "scene, servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, velocity, "
+      "scene, servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, cia402, velocity, "
       "mapping, "
       "limits, "
       "vision, phases, local_model, membrane, cone, axis, damping, repulsive, friction, vibration, "
@@ -426,8 +426,8 @@ TEST(Scene, a_table_that_is_absent_is_a_thing_that_is_not_there) {
 // A member that no key sets would silently keep its default: of every struct of parameters, each member
 // stands in a table of keys of the same file, behind the struct.
 TEST(Scene, every_member_of_the_parameters_has_a_key) {
-  std::vector<fs::path> files = {"hal/gpiod/config.hpp", "hal/sim/config.hpp", "vision/config.hpp",
-                                 "tools/scene/scene.hpp"};
+  std::vector<fs::path> files = {"hal/gpiod/config.hpp", "hal/cia402/config.hpp", "hal/sim/config.hpp",
+                                 "vision/config.hpp", "tools/scene/scene.hpp"};
   for (const char* room : {"rt/control", "rt/forces"}) {
     for (const auto& entry : fs::directory_iterator(fs::path(PUNCTUM_SOURCE_DIR) / room)) {
       if (entry.path().extension() == ".hpp") {
@@ -457,6 +457,7 @@ TEST(Scene, every_member_of_the_parameters_has_a_key) {
                                          "SimConfig::position_scale",
                                          "SimConfig::failure_count",
                                          "SimConfig::estop_event_count",
+                                         "CanStageParams::axis_count",
                                          "CellParams::inner",
                                          "Scene::name",
                                          "Scene::source"};
@@ -596,7 +597,8 @@ TEST(Scene, overrides_are_read_and_checked_as_the_file_is) {
       {"sim.operator=off", "--set: sim.operator: cannot be left out, allowed: on"},
       {"operator.depth_um=25",
        "--set: operator.depth_um: unknown key (did you mean sim.operator.depth_um?), allowed: tables scene, "
-       "servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, velocity, mapping, "
+       "servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, cia402, velocity, "
+       "mapping, "
        "limits, "
        "vision, "
        "phases, local_model, membrane, cone, axis, damping, repulsive, friction, vibration, forbidden, "
@@ -604,7 +606,8 @@ TEST(Scene, overrides_are_read_and_checked_as_the_file_is) {
        "sim"},
       {"cell.inner.gap_um=4",
        "--set: cell.inner.gap_um: unknown key (did you mean sim.cell.inner.gap_um?), allowed: tables scene, "
-       "servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, velocity, mapping, "
+       "servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, cia402, velocity, "
+       "mapping, "
        "limits, "
        "vision, "
        "phases, local_model, membrane, cone, axis, damping, repulsive, friction, vibration, forbidden, "
@@ -612,7 +615,7 @@ TEST(Scene, overrides_are_read_and_checked_as_the_file_is) {
        "sim"},
       {"cell=off",
        "--set: cell: unknown table (did you mean sim.cell?), allowed: scene, servo, haptic, stage, estop, "
-       "vacuum, injector, force_sensor, camera, gpiod, velocity, mapping, limits, vision, phases, "
+       "vacuum, injector, force_sensor, camera, gpiod, cia402, velocity, mapping, limits, vision, phases, "
        "local_model, "
        "membrane, "
        "cone, axis, damping, repulsive, friction, vibration, forbidden, guard, enabling, sim"},

@@ -40,6 +40,9 @@ void map_pdo(std::vector<Object>& list, std::uint16_t parameter, std::uint32_t i
   list.push_back({{parameter, 1}, 4, id, name, kMapping});
 }
 
+// No list is longer. Room for all of it at once; g++ 14 takes a list that grows for one that overflows.
+constexpr std::size_t kObjects = 32;
+
 void add_heartbeat(std::vector<Object>& list, const CanStageParams& params) {
   list.push_back(
       {{0x1016, 1},
@@ -158,6 +161,7 @@ std::vector<Object> configuration(const CanStageParams& params, const AxisParams
   const auto byte_of = [](int value) { return static_cast<std::uint32_t>(value) & 0xFFU; };
   const auto word_of = [](int value) { return static_cast<std::uint32_t>(value); };
   std::vector<Object> list;
+  list.reserve(kObjects);
   list.push_back({{0x1006, 0},
                   4,
                   static_cast<std::uint32_t>(std::lround(cycle_s * 1e6)),
@@ -194,6 +198,7 @@ std::vector<Object> configuration(const CanStageParams& params, const AxisParams
 
 std::vector<Object> force_sensor_configuration(const CanStageParams& params) {
   std::vector<Object> list;
+  list.reserve(kObjects);
   add_heartbeat(list, params);
   map_pdo(list, 0x1800, (0x180U + static_cast<std::uint32_t>(params.force_node)) | kNoRemoteRequest,
           {0x91300120}, "TPDO 1");

@@ -23,18 +23,6 @@ using emulator::DriveState;
 using hal::Status;
 using hal::Vec3;
 
-constexpr double kCount_m = 40e-9;
-
-cia402::CanStageParams three_drives() {
-  cia402::CanStageParams params;
-  params.axis_count = 3;
-  for (int i = 0; i < 3; ++i) {
-    params.axes[static_cast<std::size_t>(i)].node = i + 1;
-    params.axes[static_cast<std::size_t>(i)].count_m[i] = kCount_m;
-  }
-  return params;
-}
-
 class CanLoopback : public testing::Test {
  protected:
   CanLoopback() {
@@ -234,21 +222,3 @@ TEST_F(CanLoopback, an_interface_that_is_down_or_has_a_short_queue_is_refused_wi
 
 }  // namespace
 }  // namespace punctum::loopback
-
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  if (!std::filesystem::exists("/sys/class/net/can0") || !std::filesystem::exists("/sys/class/net/can1")) {
-    std::printf(
-        "can_loopback_test: here are no two CAN controllers: run it as toolchain/rt-guest/run "
-        "--deterministic "
-        "--with can PROGRAM\n");
-    return 1;
-  }
-  const int result = RUN_ALL_TESTS();
-  const testing::UnitTest& all = *testing::UnitTest::GetInstance();
-  if (all.successful_test_count() + all.failed_test_count() == 0) {
-    std::printf("can_loopback_test: no test was run: ask for one that exists\n");
-    return 1;
-  }
-  return result;
-}

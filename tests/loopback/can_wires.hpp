@@ -24,6 +24,7 @@
 #include <utility>
 #include <vector>
 
+#include "hal/cia402/config.hpp"
 #include "tools/emulators/drive/drive.hpp"
 
 namespace punctum::loopback {
@@ -78,6 +79,18 @@ class LinkRequest {
   nlmsghdr& header() { return *reinterpret_cast<nlmsghdr*>(bytes_); }
   alignas(nlmsghdr) char bytes_[512]{};
 };
+
+inline constexpr double kCount_m = 40e-9;
+
+inline cia402::CanStageParams three_drives() {
+  cia402::CanStageParams params;
+  params.axis_count = 3;
+  for (int i = 0; i < 3; ++i) {
+    params.axes[static_cast<std::size_t>(i)].node = i + 1;
+    params.axes[static_cast<std::size_t>(i)].count_m[i] = kCount_m;
+  }
+  return params;
+}
 
 class CanInterface {
  public:

@@ -60,7 +60,8 @@ class GpioSim {
     EXPECT_TRUE(put(wire(line) / "pull", high ? "pull-up" : "pull-down")) << line;
   }
   // The level of a line, whoever drives it.
-  [[nodiscard]] bool level(int line) const { return text_of(wire(line) / "value") == "1"; }
+  [[nodiscard]] bool level(int line) const { return text_of(value_file(line)) == "1"; }
+  [[nodiscard]] fs::path value_file(int line) const { return wire(line) / "value"; }
   // The chip is gone, as when its driver is unloaded or its bus is pulled.
   void unplug() const { put(config_ / "live", "0"); }
 

@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 #include <linux/can.h>
 #include <linux/can/netlink.h>
-#include <linux/can/raw.h>
 #include <linux/rtnetlink.h>
 #include <net/if.h>
 #include <poll.h>
@@ -16,8 +15,6 @@
 #include <atomic>
 #include <cerrno>
 #include <cstring>
-#include <ctime>
-#include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -25,7 +22,7 @@
 #include <vector>
 
 #include "hal/cia402/config.hpp"
-#include "tools/emulators/drive/drive.hpp"
+#include "tools/emulators/drive/drive_bus.hpp"
 
 namespace punctum::loopback {
 
@@ -124,21 +121,14 @@ class DrivesOnBus {
  public:
   DrivesOnBus(const char* interface, int count) {
     for (int node = 1; node <= count; ++node) {
-      drives_.push_back(std::make_unique<emulator::Drive>(emulator::DriveParams{.node = node}));
+      bus_.add(emulator::DriveParams{.node = node});
     }
-    socket_ = socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW);
-    sockaddr_can address{};
-    address.can_family = AF_CAN;
-    address.can_ifindex = static_cast<int>(if_nametoindex(interface));
-    EXPECT_EQ(bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), 0);
+    EXPECT_EQ(bus_.open(interface), "");
     thread_ = std::thread([this] { run(); });
     const sched_param priority{90};
     EXPECT_EQ(pthread_setschedparam(thread_.native_handle(), SCHED_FIFO, &priority), 0);
   }
-  ~DrivesOnBus() {
-    stop();
-    close(socket_);
-  }
+  ~DrivesOnBus() { stop(); }
   DrivesOnBus(const DrivesOnBus&) = delete;
   DrivesOnBus& operator=(const DrivesOnBus&) = delete;
 
@@ -152,41 +142,25 @@ class DrivesOnBus {
   template <class Function>
   auto with(std::size_t i, Function&& function) {
     const std::lock_guard lock(mutex_);
-    return function(*drives_[i]);
+    return function(bus_.drive(i));
   }
   void send(const can_frame& frame) {
-    EXPECT_EQ(write(socket_, &frame, sizeof(frame)), static_cast<ssize_t>(sizeof(frame)));
+    EXPECT_EQ(write(bus_.socket(), &frame, sizeof(frame)), static_cast<ssize_t>(sizeof(frame)));
   }
 
  private:
-  static std::int64_t now_ns() {
-    timespec t{};
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return t.tv_sec * 1'000'000'000 + t.tv_nsec;
-  }
   void run() {
     while (!stop_) {
-      pollfd in{socket_, POLLIN, 0};
+      pollfd in{bus_.socket(), POLLIN, 0};
       (void)poll(&in, 1, 1);
       const std::lock_guard lock(mutex_);
-      can_frame frame{};
-      while (read(socket_, &frame, sizeof(frame)) == static_cast<ssize_t>(sizeof(frame))) {
-        for (const auto& drive : drives_) {
-          drive->on_frame(frame, now_ns());
-        }
-      }
-      for (const auto& drive : drives_) {
-        for (const can_frame& out : drive->step(now_ns())) {
-          (void)!write(socket_, &out, sizeof(out));
-        }
-      }
+      (void)bus_.serve();
     }
   }
 
-  std::vector<std::unique_ptr<emulator::Drive>> drives_;
+  emulator::DriveBus bus_;
   std::mutex mutex_;
   std::atomic<bool> stop_{false};
-  int socket_ = -1;
   std::thread thread_;
 };
 

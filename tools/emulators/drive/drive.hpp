@@ -51,6 +51,7 @@ class Drive {
   [[nodiscard]] std::string command(std::string_view line);
   static const char* const kCommands;
 
+  [[nodiscard]] int node() const { return params_.node; }
   [[nodiscard]] DriveState state() const { return state_; }
   [[nodiscard]] std::uint16_t statusword() const;
   [[nodiscard]] int nmt_state() const { return nmt_; }  // as its heartbeat says

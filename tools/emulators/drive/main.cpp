@@ -1,24 +1,17 @@
 // punctum-drive: a CiA 402 drive on a CAN interface, for trying and testing a station without hardware. Lines
 // on the standard input make it misbehave.
-#include <linux/can.h>
-#include <linux/can/raw.h>
-#include <net/if.h>
 #include <poll.h>
-#include <sys/ioctl.h>
-#include <sys/socket.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <cerrno>
 #include <csignal>
 #include <cstring>
-#include <ctime>
 #include <exception>
-#include <memory>
 #include <string>
 #include <vector>
 
-#include "tools/emulators/drive/drive.hpp"
+#include "tools/emulators/drive/drive_bus.hpp"
 #include "tools/shared/command_line.hpp"
 #include "tools/shared/exit_codes.hpp"
 #include "tools/shared/program_start.hpp"
@@ -38,94 +31,6 @@ int bad(const std::string& text) {
   tools::complain("punctum-drive: " + text);
   return tools::exit_bad_input;
 }
-
-std::int64_t now_ns() {
-  timespec t{};
-  clock_gettime(CLOCK_MONOTONIC, &t);
-  return t.tv_sec * 1'000'000'000 + t.tv_nsec;
-}
-
-// A raw socket on the interface, or the line that says why not.
-struct Opened {
-  int socket = -1;
-  std::string problem;
-};
-Opened open_interface(const std::string& name) {
-  const auto failed = [&](int socket, const char* what) {
-    const std::string why = name + ": " + what + ": " + std::strerror(errno);
-    if (socket >= 0) {
-      close(socket);
-    }
-    return Opened{-1, why};
-  };
-  const int socket = ::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW);
-  if (socket < 0) {
-    return failed(socket, "this kernel gives no CAN socket");
-  }
-  ifreq request{};
-  if (name.size() >= sizeof(request.ifr_name)) {
-    errno = ENODEV;
-    return failed(socket, "is no interface");
-  }
-  name.copy(request.ifr_name, name.size());
-  if (ioctl(socket, SIOCGIFINDEX, &request) != 0) {
-    return failed(socket, "there is no such interface");
-  }
-  sockaddr_can address{};
-  address.can_family = AF_CAN;
-  address.can_ifindex = request.ifr_ifindex;
-  if (bind(socket, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0) {
-    return failed(socket, "cannot be bound");
-  }
-  return {socket, {}};
-}
-
-// One program can be several drives: each command begins with a node number, or is for all.
-class Drives {
- public:
-  void add(const emulator::DriveParams& params) {
-    drives_.push_back({params.node, std::make_unique<emulator::Drive>(params)});
-  }
-  void on_frame(const can_frame& frame) {
-    for (One& one : drives_) {
-      one.drive->on_frame(frame, now_ns());
-    }
-  }
-  [[nodiscard]] bool step(int socket) {
-    for (One& one : drives_) {
-      for (const can_frame& frame : one.drive->step(now_ns())) {
-        if (write(socket, &frame, sizeof(frame)) < 0 && errno != ENOBUFS && errno != EAGAIN) {
-          return false;
-        }
-      }
-    }
-    return true;
-  }
-  [[nodiscard]] std::string command(const std::string& line) {
-    char* end = nullptr;
-    const long node = std::strtol(line.c_str(), &end, 10);
-    const bool for_one = end != line.c_str();
-    bool found = false;
-    for (One& one : drives_) {
-      if (for_one && one.node != node) {
-        continue;
-      }
-      found = true;
-      const std::string rest = for_one ? line.substr(static_cast<std::size_t>(end - line.c_str())) : line;
-      if (std::string problem = one.drive->command(rest); !problem.empty()) {
-        return problem;
-      }
-    }
-    return found ? std::string{} : "\"" + line + "\": there is no such node";
-  }
-
- private:
-  struct One {
-    int node;
-    std::unique_ptr<emulator::Drive> drive;
-  };
-  std::vector<One> drives_;
-};
 
 // Whole lines from a descriptor that does not block.
 class Lines {
@@ -149,19 +54,15 @@ class Lines {
   std::string rest_;
 };
 
-int serve(Drives& drives, int socket) {
+int serve(emulator::DriveBus& drives) {
   Lines input;
   bool listening = true;
   while (stop_signal::count() == 0) {
-    pollfd ready[] = {{socket, POLLIN, 0}, {listening ? kInput : -1, POLLIN, 0}};
+    pollfd ready[] = {{drives.socket(), POLLIN, 0}, {listening ? kInput : -1, POLLIN, 0}};
     if (poll(ready, 2, kStep_ms) < 0 && errno != EINTR) {
       return bad(std::strerror(errno));
     }
-    can_frame frame{};
-    while (read(socket, &frame, sizeof(frame)) == static_cast<ssize_t>(sizeof(frame))) {
-      drives.on_frame(frame);
-    }
-    if (!drives.step(socket)) {
+    if (!drives.serve()) {
       return bad(std::string("the interface is gone: ") + std::strerror(errno));
     }
     if ((ready[1].revents & (POLLIN | POLLHUP)) != 0) {
@@ -202,7 +103,7 @@ int run(int argc, char** argv) {
   if (const auto over = tools::parse_command_line(app, argc, argv)) {
     return *over;
   }
-  Drives drives;
+  emulator::DriveBus drives;
   for (const int node : nodes) {
     emulator::DriveParams params;
     params.node = node;
@@ -214,14 +115,11 @@ int run(int argc, char** argv) {
       return bad(problem);
     }
   }
-  const Opened opened = open_interface(interface);
-  if (opened.socket < 0) {
-    return bad(opened.problem);
+  if (const std::string problem = drives.open(interface); !problem.empty()) {
+    return bad(problem);
   }
   stop_signal::watch({SIGTERM, SIGINT, SIGHUP});
-  const int code = serve(drives, opened.socket);
-  close(opened.socket);
-  return code;
+  return serve(drives);
 }
 
 }  // namespace

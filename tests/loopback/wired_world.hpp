@@ -1,5 +1,5 @@
-// The simulated cell and operator behind emulated devices: the drives carry the needle, the operator's hand holds
-// the handle. A station with real drivers finds one world behind its wires.
+// The simulated cell and operator behind emulated devices: the drives carry the needle, the operator's hand
+// holds the handle. A station with real drivers finds one world behind its wires.
 #pragma once
 
 #include <array>
@@ -24,16 +24,16 @@ struct WorldEvent {
 struct WorldSummary {
   bool contact = false, zona_punctured = false, punctured = false;
   bool cell_held = true, cell_lost = false;
-  double deepest_m = 0;       // of the tip past the cell's outer face
-  double depth_m = 0;         // now; < 0 outside
-  double moved_m = 0;         // way of the tip
+  double deepest_m = 0;        // of the tip past the cell's outer face
+  double depth_m = 0;          // now; < 0 outside
+  double moved_m = 0;          // way of the tip
   double largest_force_N = 0;  // on the hand
   double force_N = 0;          // now
 };
 
 class WiredWorld {
  public:
-  static constexpr int kAxes = 3;           // nodes 1, 2 and 3 carry the needle along x, y and z
+  static constexpr int kAxes = 3;            // nodes 1, 2 and 3 carry the needle along x, y and z
   static constexpr double kCount_m = 40e-9;  // of each drive; all at zero: the needle is where it starts
 
   // The bench gets the exposures of the camera. May take a second: the cell's tables are solved.

@@ -24,6 +24,7 @@
 #include "tools/punctum/core_process.hpp"
 #include "tools/punctum/disk_space.hpp"
 #include "tools/punctum/judge.hpp"
+#include "tools/punctum/kernel_watchdog.hpp"
 #include "tools/punctum/lab_report.hpp"
 #include "tools/punctum/provenance.hpp"
 #include "tools/punctum/recorder.hpp"
@@ -268,6 +269,7 @@ class Run {
   Terminal& terminal_;
   CoreProcess core_;
   VisionProcess vision_;
+  KernelWatchdog watchdog_;
   std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
   bool vision_was_refused_ = false;
   bool frames_are_over_ = false, stop_for_good_ = false;
@@ -295,6 +297,11 @@ int Run::run() {
   }
   (void)write_begun(folder_, begun_facts_);
 
+  if (scene_.watchdog) {
+    if (auto armed = watchdog_.arm(*scene_.watchdog); !armed) {
+      return refuse(armed.error());
+    }
+  }
   // Recorded frames play from the core's first tick on; a camera is there before it.
   const bool vision_follows_core = scene_.recorded && scene_.clock == ClockKind::real;
   if (scene_.vision && !vision_follows_core) {
@@ -310,6 +317,7 @@ int Run::run() {
   }
   begun_ = std::chrono::steady_clock::now();
   const Ended core = watch_until_the_core_ends();
+  watchdog_.disarm();
   recorder_.finish();
   tell_faults();
   terminal_.clear_progress();
@@ -341,6 +349,7 @@ Ended Run::watch_until_the_core_ends() {
       return ended;
     }
     segments_.rendezvous.serve();
+    watchdog_.feed(status().ticks.load(), now_s());
     watch_vision();
     watch_recording();
     core_.watch(now_s(), stop_signal::count());

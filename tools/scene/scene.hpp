@@ -34,6 +34,16 @@ constexpr auto keys_of(const RecordedFrames*) {
                    hal::micro("pixel_um", &RecordedFrames::pixel_m, 0.01, 50));
 }
 
+// The machine's hardware watchdog: fed while the core ticks, disarmed at the end of a run.
+struct WatchdogParams {
+  std::string path = "/dev/watchdog";
+  int timeout_s = 10;  // from the last feeding to the restart of the machine
+};
+constexpr auto keys_of(const WatchdogParams*) {
+  return hal::keys(hal::text("path", &WatchdogParams::path),
+                   hal::whole("timeout_s", &WatchdogParams::timeout_s, 2, 600));
+}
+
 inline constexpr std::string_view kSimulated = "simulated";
 
 // Which backend stands behind each device: its name; empty where the scene has no such device.
@@ -64,6 +74,7 @@ struct Scene {
   std::optional<RecordedFrames> recorded;        // camera = recorded frames
   std::optional<cia402::CanStageParams> cia402;  // stage = drives on a CAN bus
   std::optional<gpiod::GpiodParams> gpiod;       // lines of e-stop chain and injector
+  std::optional<WatchdogParams> watchdog;        // of the machine
   std::optional<vision::VisionConfig> vision;    // absent: no vision process
 
   [[nodiscard]] bool simulated_camera() const noexcept { return sim && sim->microscope.has_value(); }

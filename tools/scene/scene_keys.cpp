@@ -226,6 +226,10 @@ void add_backends(std::vector<Table>& t) {
       [](Scene& s) { return bound(*s.cia402, cia402::kCia402Keys); }));
 }
 
+void add_machine(std::vector<Table>& t) {
+  t.push_back(thing("watchdog", [](Scene& s) -> auto& { return s.watchdog; }));
+}
+
 void add_vision(std::vector<Table>& t) {
   t.push_back(thing(
       "vision", [](Scene& s) -> auto& { return s.vision; },
@@ -332,6 +336,7 @@ std::vector<Table> make_tables() {
       settings("servo", [](Scene& s) { return bound(s.servo, rt::kServoKeys) + bound(s, kCoreKeys); }));
   add_devices(t);
   add_backends(t);
+  add_machine(t);
   add_tasks(t);
   add_vision(t);
   add_effects(t);

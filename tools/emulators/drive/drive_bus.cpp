@@ -30,9 +30,7 @@ DriveBus::~DriveBus() {
 }
 
 std::string DriveBus::open(const std::string& interface) {
-  const auto failed = [&](const char* what) {
-    return interface + ": " + what + ": " + std::strerror(errno);
-  };
+  const auto failed = [&](const char* what) { return interface + ": " + what + ": " + std::strerror(errno); };
   socket_ = ::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC | SOCK_NONBLOCK, CAN_RAW);
   if (socket_ < 0) {
     return failed("this kernel gives no CAN socket");

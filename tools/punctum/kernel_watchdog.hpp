@@ -1,0 +1,32 @@
+// The machine's hardware watchdog, through the kernel (Documentation/watchdog/watchdog-api.rst): unless it is fed
+// in time, the machine restarts. It is for what kills the parent or the kernel; of a core that hangs the parent
+// takes care, and the relay of the heartbeat before everybody.
+#pragma once
+
+#include <string>
+#include <tl/expected.hpp>
+
+#include "tools/scene/scene.hpp"
+
+namespace punctum::tools {
+
+class KernelWatchdog {
+ public:
+  KernelWatchdog() = default;
+  KernelWatchdog(const KernelWatchdog&) = delete;
+  KernelWatchdog& operator=(const KernelWatchdog&) = delete;
+  ~KernelWatchdog() { disarm(); }
+
+  // Armed from here on. One line says why not; one that could not be disarmed again is not armed.
+  [[nodiscard]] tl::expected<void, std::string> arm(const WatchdogParams& params);
+  // Feeds it if `ticks` have gone on since the last call, at most ten times in its time-out.
+  void feed(std::uint64_t ticks, double now_s);
+  void disarm();
+
+ private:
+  int file_ = -1;
+  double timeout_s_ = 0, next_s_ = 0;
+  std::uint64_t ticks_ = 0;
+};
+
+}  // namespace punctum::tools

@@ -31,7 +31,7 @@ constexpr auto keys_of(const CameraSettings*) {
       real("gain", &CameraSettings::gain, kAsItIs, 1e6));
 }
 
-// Since open(); all zero again after the next one.
+// Since the camera was opened for the first time.
 struct CameraCounts {
   std::uint64_t delivered = 0;
   std::uint64_t lost = 0;      // by the camera, its bus or its driver: gaps in its own count

@@ -85,10 +85,7 @@ Answer V4l2Camera::call(unsigned long request, void* argument) {
 V4l2Camera::Done V4l2Camera::open() {
   close();
   notes_.clear();
-  counts_ = {};
   counted_ = false;
-  sequence_ = 0;
-  last_exposure_ns_ = 0;
   const Answer opened = kernel_.open(params_.path.c_str());
   if (opened.value < 0) {
     return wrong(params_.path + ": " + reason(opened.error));
@@ -407,11 +404,10 @@ hal::Status V4l2Camera::lost(const char* what, int error) {
 V4l2Camera::Taken V4l2Camera::judged(const v4l2_buffer& buffer) {
   Taken taken;
   taken.index = buffer.index;
-  // A driver that does not count repeats its number; one that starts anew jumps back.
+  // A driver that does not count repeats its number; one that starts anew jumps back. After a replug the
+  // count goes on.
   const std::uint32_t gap = buffer.sequence - driver_sequence_;
-  if (!counted_) {
-    sequence_ = buffer.sequence;
-  } else if (gap == 0 || gap > 0x7fffffffU) {
+  if (!counted_ || gap == 0 || gap > 0x7fffffffU) {
     sequence_ += 1;
   } else {
     sequence_ += gap;

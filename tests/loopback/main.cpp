@@ -15,7 +15,7 @@ struct Needed {
 constexpr Needed kNeeded[] = {{"gpio", "/sys/kernel/config/gpio-sim"},
                               {"can", "/sys/class/net/can0"},
                               {"can", "/sys/class/net/can1"},
-                              {"camera", "/dev/video0"},
+                              {"camera", "/sys/module/vivid"},
                               {"usb", "/sys/devices/platform/vhci_hcd.0"},
                               {"input", "/dev/uinput"},
                               {"watchdog", "/dev/watchdog"}};

@@ -59,8 +59,9 @@ struct Room {
 // line.
 std::vector<Room> house() {
   const Names interfaces = {"hal/realtime", "hal/math/", "hal/"};
-  const Names ground = interfaces + Names{"hal/device_life", "hal/ipc/", "hal/ipc/segment",
-                                          "hal/ipc/rendezvous", "hal/ipc/sealed_text"};
+  const Names ground =
+      interfaces + Names{"hal/device_life",     "hal/ipc/",       "hal/ipc/segment", "hal/ipc/rendezvous",
+                         "hal/ipc/sealed_text", "hal/live_camera"};
   const Names sim_shared = {"hal/sim/point", "hal/sim/noise", "hal/sim/config", "hal/sim/failures"};
   const Names sim = sim_shared + Names{"hal/sim/plant/", "hal/sim/operator/", "hal/sim/"};
   const Names cia402_shared = {"hal/cia402/config", "hal/cia402/bus_load", "hal/cia402/calibration"};
@@ -79,6 +80,7 @@ std::vector<Room> house() {
       {"hal/math/", {"hal/realtime"}, kPlain, true},
       {"hal/", {"hal/realtime", "hal/math/"}, kPlain, true},
       {"hal/device_life", interfaces, kMayFail},
+      {"hal/live_camera", interfaces, kMayFail},
       {"hal/ipc/", interfaces, kPlain, true},
       {"hal/ipc/segment", interfaces + Names{"hal/ipc/"}, kMayFail},
       {"hal/ipc/rendezvous", interfaces + Names{"hal/ipc/", "hal/ipc/segment"}, kMayFail},
@@ -93,7 +95,10 @@ std::vector<Room> house() {
       {"hal/cia402/bus_load", interfaces, kMayFail},
       {"hal/cia402/calibration", interfaces + Names{"hal/cia402/config"}, kMayFail},
       {"hal/cia402/", ground + cia402_shared, "Eigen/.*|tl/expected.hpp|sanitizer/rtsan_interface.h"},
-      {"hal/v4l2/", ground, kMayFail},
+      {"hal/aravis/config", interfaces, kMayFail},
+      {"hal/aravis/", ground + Names{"hal/aravis/config"}, "Eigen/.*|tl/expected.hpp|arv.h"},
+      {"hal/v4l2/config", interfaces, kMayFail},
+      {"hal/v4l2/", ground + Names{"hal/v4l2/config"}, kMayFail},
       // The simulated backend; hal/sim/ is the bench and whatever stands beside it.
       {"hal/sim/point", ground, kMayFail},
       {"hal/sim/noise", ground, kMayFail},
@@ -122,17 +127,21 @@ std::vector<Room> house() {
       // Programs do not include one another.
       {"tools/shared/", ground + sim + core, kTools},
       {"tools/scene/",
-       ground + sim + core + cia402_shared + Names{"hal/gpiod/config", "vision/config", "tools/shared/"},
+       ground + sim + core + cia402_shared +
+           Names{"hal/gpiod/config", "hal/v4l2/config", "hal/aravis/config", "vision/config",
+                 "tools/shared/"},
        kTools},
       {"tools/core/", station + Names{"hal/gpiod/", "hal/cia402/"}, kTools},
       {"tools/punctum/", station, kTools},
-      {"tools/vision/", pictures, kTools},
+      {"tools/vision/", pictures + Names{"hal/v4l2/", "hal/aravis/"}, kTools},
       {"tools/report/", pictures, kTools},
       {"tools/emulators/drive/", {"tools/shared/"}, kTools},
-      {"tests/support/", pictures + Names{"hal/cia402/", "tools/emulators/drive/"}, kTests},
+      {"tests/support/",
+       pictures + Names{"hal/v4l2/config", "hal/v4l2/", "hal/cia402/", "tools/emulators/drive/"}, kTests},
       {"tests/*",
-       pictures + Names{"hal/gpiod/config", "hal/gpiod/", "hal/cia402/", "tools/emulators/drive/",
-                        "tests/support/", "tools/core/", "tools/punctum/", "tools/vision/", "tools/report/"},
+       pictures + Names{"hal/gpiod/config", "hal/gpiod/", "hal/v4l2/config", "hal/v4l2/", "hal/aravis/config",
+                        "hal/aravis/", "hal/cia402/", "tools/emulators/drive/", "tests/support/",
+                        "tools/core/", "tools/punctum/", "tools/vision/", "tools/report/"},
        kTests},
   };
 }

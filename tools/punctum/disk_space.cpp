@@ -16,7 +16,11 @@ constexpr double kFramesPerAnnotated = 12;
 constexpr double kRest_bytes = 4e6;  // the report, the figure and its script, the logs
 
 double frame_rate(const Scene& scene) {
-  return scene.recorded ? scene.recorded->fps : scene.simulated_camera() ? scene.sim->microscope->fps : 0;
+  constexpr double kUsual = 30;  // of a camera whose rate the scene does not say
+  return scene.recorded             ? scene.recorded->fps
+         : scene.camera             ? (scene.camera->fps > 0 ? scene.camera->fps : kUsual)
+         : scene.simulated_camera() ? scene.sim->microscope->fps
+                                    : 0;
 }
 
 }  // namespace

@@ -36,6 +36,15 @@ std::string camera_text(const Scene& s) {
   if (s.recorded) {
     return fmt::format("  recorded frames       {} at {:g} per s", s.recorded->frames, s.recorded->fps);
   }
+  if (s.camera) {
+    const hal::CameraSettings& c = *s.camera;
+    const std::string which = s.v4l2                                ? s.v4l2->path
+                              : s.aravis && !s.aravis->name.empty() ? s.aravis->name
+                                                                    : "";
+    return fmt::format("  camera                {}{}{}, {} x {} px, {:g} um/px{}", s.devices.camera,
+                       which.empty() ? "" : " ", which, c.width, c.height, c.pixel_m * 1e6,
+                       c.fps > 0 ? fmt::format(", {:g} per s", c.fps) : "");
+  }
   if (!s.simulated_camera()) {
     return fmt::format("  camera                {}", s.devices.camera);
   }
@@ -85,6 +94,8 @@ constexpr Saving kSavings[] = {
     {"sim.dish", "the simulated dish has no floor"},
     {"cia402", "no CAN bus"},
     {"watchdog", "a machine that hangs stays as it is, with the drives off by the relay"},
+    {"v4l2", "no camera of the kernel's is opened"},
+    {"aravis", "no GenICam camera is looked for, and its library is not loaded"},
 };
 
 // An effect in one phrase; by its name alone where there is nothing more to say.
@@ -332,6 +343,19 @@ tl::expected<std::string, std::string> files_of(const Scene& s) {
     }
     found = fmt::format("{}: {} file(s)", f, n);
   }
+  if (s.v4l2) {
+    const std::string& f = s.v4l2->path;
+    std::error_code ec;
+    if (!fs::is_character_file(f, ec)) {
+      return tl::unexpected(fmt::format(
+          "v4l2.path: {}: no camera is there, allowed: one that is plugged in (ls /dev/v4l/by-id)", f));
+    }
+    if (access(f.c_str(), R_OK | W_OK) != 0) {
+      return tl::unexpected(fmt::format(
+          "v4l2.path: {}: may not be opened, add the user to the group of the device (video)", f));
+    }
+    found = f;
+  }
   if (s.vision && s.vision->holder && !s.vision->holder->template_path.empty()) {
     const std::string& f = s.vision->holder->template_path;
     std::error_code ec;
@@ -360,7 +384,7 @@ int check(const Scene& s, std::string& text) {
            good;
   }
   row(true, "devices", s.servo.real_actuators ? backends(s) : "all simulated: no actuator is there to touch");
-  if (s.recorded || (s.vision && s.vision->holder && !s.vision->holder->template_path.empty())) {
+  if (s.recorded || s.v4l2 || (s.vision && s.vision->holder && !s.vision->holder->template_path.empty())) {
     const auto files = files_of(s);
     good = row(files.has_value(), "files", files ? *files : files.error()) && good;
   }

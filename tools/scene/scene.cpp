@@ -61,6 +61,7 @@ void settle(Scene& s) {
   }
   if (s.vision) {
     s.vision->pixel_m = s.recorded             ? s.recorded->pixel_m
+                        : s.camera             ? s.camera->pixel_m
                         : s.simulated_camera() ? s.sim->microscope->pixel_m
                                                : s.vision->pixel_m;
     if (const auto& m = s.servo.membrane) {

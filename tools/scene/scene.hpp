@@ -11,10 +11,13 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "hal/aravis/config.hpp"
 #include "hal/cia402/config.hpp"
 #include "hal/gpiod/config.hpp"
+#include "hal/live_camera.hpp"
 #include "hal/parameters.hpp"
 #include "hal/sim/config.hpp"
+#include "hal/v4l2/config.hpp"
 #include "rt/control/config.hpp"
 #include "vision/config.hpp"
 
@@ -53,6 +56,8 @@ struct DeviceNames {
 inline constexpr std::string_view kRecorded = "recorded";
 inline constexpr std::string_view kGpiod = "gpiod";
 inline constexpr std::string_view kCia402 = "cia402";
+inline constexpr std::string_view kV4l2 = "v4l2";
+inline constexpr std::string_view kAravis = "aravis";
 
 struct Scene {
   std::string name;    // of the file without folder and suffix, or the built-in name
@@ -75,7 +80,10 @@ struct Scene {
   std::optional<cia402::CanStageParams> cia402;  // stage = drives on a CAN bus
   std::optional<gpiod::GpiodParams> gpiod;       // lines of e-stop chain and injector
   std::optional<WatchdogParams> watchdog;        // of the machine
-  std::optional<vision::VisionConfig> vision;    // absent: no vision process
+  std::optional<hal::CameraSettings> camera;     // camera = one that is plugged in
+  std::optional<v4l2::V4l2Params> v4l2;
+  std::optional<aravis::AravisParams> aravis;
+  std::optional<vision::VisionConfig> vision;  // absent: no vision process
 
   [[nodiscard]] bool simulated_camera() const noexcept { return sim && sim->microscope.has_value(); }
   // A task that ends by itself: cells to inject. Otherwise the run is open-ended and a time limit ends it

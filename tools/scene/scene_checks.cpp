@@ -81,6 +81,40 @@ Found check_needs(const Scene& s) {
   return std::nullopt;
 }
 
+// The table of a camera that is plugged in says which one.
+Found check_camera_table(const Scene& s, std::string_view backend, bool there) {
+  const bool used = s.devices.camera == backend;
+  if (used && !there) {
+    return Problem{"camera.device", fmt::format("\"{}\" needs [{}] (it says which camera), allowed: add [{}]",
+                                                backend, backend, backend)};
+  }
+  if (there && !used) {
+    return Problem{
+        std::string(backend),
+        fmt::format("no camera uses it, allowed: with device = \"{}\" in [camera], or leave it out",
+                    backend)};
+  }
+  return std::nullopt;
+}
+
+Found check_live_camera(const Scene& s) {
+  if (auto p = check_camera_table(s, kV4l2, s.v4l2.has_value())) {
+    return p;
+  }
+  if (auto p = check_camera_table(s, kAravis, s.aravis.has_value())) {
+    return p;
+  }
+  if (s.v4l2 && !s.v4l2->path.starts_with('/')) {
+    return Problem{"v4l2.path", "is no path, allowed: the path of a camera, such as \"/dev/video0\""};
+  }
+  if (s.camera && s.camera->fps > 0 && s.camera->exposure_s * s.camera->fps > 1) {
+    return Problem{"camera.exposure_ms",
+                   fmt::format("is longer than a frame, allowed: at most 1000 / fps = {:g}",
+                               rounded_down(1e3 / s.camera->fps))};
+  }
+  return std::nullopt;
+}
+
 // The lines of [gpiod], and what its devices need of them.
 Found check_gpiod(const Scene& s) {
   const bool estop = s.devices.estop == kGpiod, injector = s.devices.injector == kGpiod;
@@ -658,7 +692,10 @@ Found check_core(const Scene& s) {
 
 Found check_camera(const Scene& s) {
   const sim::MicroscopeParams* microscope = s.simulated_camera() ? &*s.sim->microscope : nullptr;
-  const double fps = s.recorded ? s.recorded->fps : microscope != nullptr ? microscope->fps : 0;
+  const double fps = s.recorded              ? s.recorded->fps
+                     : s.camera              ? s.camera->fps
+                     : microscope != nullptr ? microscope->fps
+                                             : 0;
   if (fps > s.servo.rate_Hz / 2) {
     return Problem{"camera.fps", fmt::format("is too fast for the servo, allowed: at most rate_hz / 2 = {:g}",
                                              s.servo.rate_Hz / 2)};
@@ -831,8 +868,8 @@ Found check_failures(const Scene& s) {
 }  // namespace
 
 std::optional<Problem> check_together(const Scene& scene) {
-  for (const auto check : {check_needs, check_gpiod, check_backends, check_can_stage, check_plant, check_core,
-                           check_camera, check_vision, check_failures}) {
+  for (const auto check : {check_needs, check_live_camera, check_gpiod, check_backends, check_can_stage,
+                           check_plant, check_core, check_camera, check_vision, check_failures}) {
     if (auto p = check(scene)) {
       return p;
     }

@@ -98,6 +98,7 @@ void follow_backends(Scene& s) {
   have(s.sim,
        std::any_of(all.begin(), all.end(), [&s](const NamedDevice& d) { return simulated(s, d.backend); }));
   have(s.recorded, s.devices.camera == kRecorded);
+  have(s.camera, s.devices.camera == kV4l2 || s.devices.camera == kAravis);
   if (!s.sim) {
     return;
   }
@@ -214,6 +215,7 @@ void add_devices(std::vector<Table>& t) {
       "camera", Kind::thing, &DeviceNames::camera, [](Scene&, bool) {},
       [](Scene& s) {
         return s.recorded             ? bound(*s.recorded)
+               : s.camera             ? bound(*s.camera)
                : s.simulated_camera() ? bound(*s.sim->microscope, sim::kCameraKeys)
                                       : KeyList{};
       }));
@@ -224,6 +226,8 @@ void add_backends(std::vector<Table>& t) {
   t.push_back(thing(
       "cia402", [](Scene& s) -> auto& { return s.cia402; },
       [](Scene& s) { return bound(*s.cia402, cia402::kCia402Keys); }));
+  t.push_back(thing("v4l2", [](Scene& s) -> auto& { return s.v4l2; }));
+  t.push_back(thing("aravis", [](Scene& s) -> auto& { return s.aravis; }));
 }
 
 void add_machine(std::vector<Table>& t) {
@@ -384,6 +388,8 @@ const Backends& known_backends() {
       b[d.table] = {std::string(kSimulated)};
     }
     b["camera"].emplace_back(kRecorded);
+    b["camera"].emplace_back(kV4l2);
+    b["camera"].emplace_back(kAravis);
     b["estop"].emplace_back(kGpiod);
     b["injector"].emplace_back(kGpiod);
     b["stage"].emplace_back(kCia402);

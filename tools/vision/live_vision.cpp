@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <filesystem>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <string>
@@ -28,6 +29,7 @@
 #include "tools/shared/stop_signal.hpp"
 #include "tools/shared/truth_observer.hpp"
 #include "tools/shared/vision_lies.hpp"
+#include "tools/vision/live_camera.hpp"
 #include "tools/vision/live_tracker.hpp"
 #include "tools/vision/observation_csv.hpp"
 #include "tools/vision/picture_file.hpp"
@@ -39,6 +41,8 @@ namespace punctum::tools {
 namespace {
 
 constexpr std::int64_t kFrameTimeout_ns = 100'000'000;
+// A camera that is unplugged is looked for so often; to plug one in takes a person longer.
+constexpr std::int64_t kLookAgain_ns = 500'000'000;
 
 using Opened = tl::expected<void, std::string>;  // the error is one line
 
@@ -89,6 +93,7 @@ class LiveVision {
   [[nodiscard]] Opened join_station();
   [[nodiscard]] Opened join_bench(int descriptor);
   [[nodiscard]] Opened open_camera();
+  [[nodiscard]] Opened open_live_camera();
   [[nodiscard]] Opened begin_tracker();
   [[nodiscard]] Opened open_files();
 
@@ -96,11 +101,15 @@ class LiveVision {
     return bench_clock_ ? static_cast<hal::Clock&>(*bench_clock_) : monotonic_;
   }
   [[nodiscard]] hal::Camera& camera() {
-    return sim_camera_ ? static_cast<hal::Camera&>(*sim_camera_) : static_cast<hal::Camera&>(*recorded_);
+    return sim_camera_ ? static_cast<hal::Camera&>(*sim_camera_)
+           : live_     ? static_cast<hal::Camera&>(*live_)
+                       : static_cast<hal::Camera&>(*recorded_);
   }
   [[nodiscard]] bool plant_has_stopped() const { return bench_ && (*bench_)->finished.load() != 0; }
   void go_round();
   void wait_until(std::int64_t t_ns);
+  void look_for_camera();
+  void tell_silence(hal::Status status);
   [[nodiscard]] double time_to_play(hal::Frame& frame);
   void tell_unusable(const hal::Frame& frame, double t_s);
   [[nodiscard]] Seen look_at(const hal::Frame& frame);
@@ -119,6 +128,9 @@ class LiveVision {
   std::optional<sim::BenchClock> bench_clock_;
   std::optional<sim::SimCamera> sim_camera_;
   std::optional<recorded::Camera> recorded_;
+  std::unique_ptr<hal::LiveCamera> live_;
+  std::int64_t last_picture_ns_ = 0;
+  bool silent_ = false;                                   // and said to be
   std::optional<sim::ExposureTaker> in_place_of_camera_;  // so that virtual time knows vision is there
   int width_ = 0, height_ = 0;
   std::int64_t began_ns_ = 0;
@@ -140,7 +152,7 @@ Opened LiveVision::open() {
       return opened;
     }
   }
-  began_ns_ = clock().now_ns();
+  began_ns_ = last_picture_ns_ = clock().now_ns();
   return {};
 }
 
@@ -153,8 +165,8 @@ Opened LiveVision::read_scene() {
   if (!scene_->vision) {
     return tl::unexpected(fmt::format("{}: it has no [vision]", options_.scene));
   }
-  simulated_ = !scene_->recorded && scene_->simulated_camera();
-  if (!simulated_ && !scene_->recorded) {
+  simulated_ = scene_->simulated_camera();
+  if (!simulated_ && !scene_->recorded && !scene_->camera) {
     return tl::unexpected(fmt::format("{}: it names no camera", options_.scene));
   }
   truth_only_ = scene_->vision->method == vision::Method::truth;
@@ -209,6 +221,9 @@ Opened LiveVision::open_camera() {
     liar_.emplace(scene_->sim->seed);
     return {};
   }
+  if (scene_->camera) {
+    return open_live_camera();
+  }
   auto opened = recorded::Camera::open(scene_->recorded->frames, scene_->recorded->fps);
   if (!opened) {
     return tl::unexpected(opened.error());
@@ -220,6 +235,23 @@ Opened LiveVision::open_camera() {
     in_place_of_camera_.emplace(**bench_, **answers_);
     in_place_of_camera_->attach();
   }
+  return {};
+}
+
+Opened LiveVision::open_live_camera() {
+  auto made = make_live_camera(*scene_, clock());
+  if (!made) {
+    return tl::unexpected(made.error());
+  }
+  live_ = std::move(*made);
+  if (auto opened = live_->open(); !opened) {
+    return opened;
+  }
+  for (const std::string& note : live_->notes()) {
+    complain(note);
+  }
+  width_ = scene_->camera->width;
+  height_ = scene_->camera->height;
   return {};
 }
 
@@ -265,12 +297,17 @@ ExitCode LiveVision::run() {
     go_round();
     hal::Frame frame;
     const hal::Status status = camera().next(frame, kFrameTimeout_ns);
+    tell_silence(status);
     if (status == hal::Status::no_data) {
       continue;
     }
     if (status == hal::Status::disconnected) {
       if (recorded_ || plant_has_stopped()) {
         return exit_done;
+      }
+      if (live_) {
+        look_for_camera();
+        continue;
       }
       complain("the camera is gone");
       return exit_not_done;  // a restart may help
@@ -284,6 +321,11 @@ ExitCode LiveVision::run() {
     seen.t_s = t_s;
     publish(frame, seen.observation);
     record(frame, seen);
+  }
+  if (live_) {
+    const hal::CameraCounts& n = live_->counts();
+    complain(fmt::format("the camera gave {} pictures; {} were lost, {} skipped for newer ones, {} unusable",
+                         n.delivered, n.lost, n.skipped, n.unusable));
   }
   if (plant_has_stopped()) {
     return exit_done;
@@ -309,10 +351,56 @@ void LiveVision::wait_until(std::int64_t t_ns) {
   clock().sleep_until_ns(t_ns);
 }
 
+// Until it is back, or the run has ended. Meanwhile observations age, as the core expects of a lost camera.
+void LiveVision::look_for_camera() {
+  complain(live_->last_error() + "; looking for it");
+  live_->close();
+  const std::int64_t gone_ns = clock().now_ns();
+  std::string why;
+  while (stop_signal::count() == 0 && !plant_has_stopped()) {
+    wait_until(clock().now_ns() + kLookAgain_ns);
+    go_round();
+    const Opened opened = live_->open();
+    if (opened) {
+      complain(fmt::format("the camera is back after {:.1f} s",
+                           static_cast<double>(clock().now_ns() - gone_ns) * 1e-9));
+      return;
+    }
+    if (why != opened.error()) {
+      why = opened.error();
+      complain(why);
+    }
+  }
+}
+
+// Once, when a plugged camera has given no picture for longer than the tracker bridges; and when it has one
+// again.
+void LiveVision::tell_silence(hal::Status status) {
+  if (!live_) {
+    return;
+  }
+  const std::int64_t now_ns = clock().now_ns();
+  const std::int64_t since_ns = now_ns - last_picture_ns_;
+  const auto exposure_ns = static_cast<std::int64_t>(scene_->camera->exposure_s * 1e9);
+  if (status == hal::Status::ok) {
+    if (silent_) {
+      complain(fmt::format("the camera gives pictures again, after {:.1f} s without",
+                           static_cast<double>(since_ns) * 1e-9));
+    }
+    silent_ = false;
+    last_picture_ns_ = now_ns;
+  } else if (!silent_ && since_ns > LiveTracker::kLongestGap_ns + 2 * exposure_ns) {
+    silent_ = true;
+    complain(fmt::format("the camera has given no {}picture for {:.1f} s",
+                         status == hal::Status::fault ? "usable " : "",
+                         static_cast<double>(since_ns) * 1e-9));
+  }
+}
+
 // Recorded pictures are shown at their own pace. Returns when this one was taken, in seconds of the run.
 double LiveVision::time_to_play(hal::Frame& frame) {
   const std::int64_t start_ns = simulated_ ? sim_camera_->snapshot().start_ns : began_ns_;
-  if (!simulated_) {
+  if (recorded_) {
     frame.exposure_ns += began_ns_;
     frame.deliver_ns = 0;
     wait_until(frame.exposure_ns);
@@ -323,7 +411,9 @@ double LiveVision::time_to_play(hal::Frame& frame) {
 void LiveVision::tell_unusable(const hal::Frame& frame, double t_s) {
   if (csv_) {
     csv_->row(frame.sequence, t_s, 0,
-              recorded_ ? recorded_->last_error() : "the camera delivered no usable picture");
+              recorded_ ? recorded_->last_error()
+              : live_   ? live_->last_error()
+                        : "the camera delivered no usable picture");
   }
   camera().release(frame);
 }

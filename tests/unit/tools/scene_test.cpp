@@ -56,7 +56,8 @@ std::string many_failures(int n) {
 
 // As a message lists them.
 const std::string kTables =
-    "scene, servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, cia402, watchdog, "
+    "scene, servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, cia402, v4l2, "
+    "aravis, watchdog, "
     "velocity, mapping, limits, vision, phases, local_model, membrane, cone, axis, damping, repulsive, "
     "friction, vibration, forbidden, guard, enabling, sim";
 
@@ -136,7 +137,8 @@ const std::vector<Broken>& broken() {
        "b.toml:2:10: haptic.device: \"falcon\" is not one of the choices, allowed: \"simulated\""},
       {"a device misspelt", "[camera]\ndevice = \"recoded\"\n",
        "b.toml:2:10: camera.device: \"recoded\" is not one of the choices (did you mean recorded?), allowed: "
-       "\"simulated\" or \"recorded\""},
+       "\"simulated\", \"recorded\", "
+       "\"v4l2\" or \"aravis\""},
       {"lines without a device", kLeast + "[gpiod]\n",
        "b.toml:5:2: gpiod: no device uses it, allowed: with device = \"gpiod\" in [estop] or [injector], or "
        "leave it out"},
@@ -281,6 +283,23 @@ const std::vector<Broken>& broken() {
       {"every frame stale", kCell + "[local_model]\nstale_after_s = 0.05\n",
        "b.toml:10:17: local_model.stale_after_s: every frame would be stale, allowed: at least 1.5 / fps + "
        "latency = 0.1"},
+      {"a plugged camera without its table", kLeast + "[camera]\ndevice = \"v4l2\"\n[vision]\n",
+       "b.toml:6:10: camera.device: \"v4l2\" needs [v4l2] (it says which camera), allowed: add [v4l2]"},
+      {"the table of another camera", kLeast + "[camera]\ndevice = \"v4l2\"\n[vision]\n[v4l2]\n[aravis]\n",
+       "b.toml:9:2: aravis: no camera uses it, allowed: with device = \"aravis\" in [camera], or leave it "
+       "out"},
+      {"a camera by its number",
+       kLeast + "[camera]\ndevice = \"v4l2\"\n[vision]\n[v4l2]\npath = \"video0\"\n",
+       "b.toml:9:8: v4l2.path: is no path, allowed: the path of a camera, such as \"/dev/video0\""},
+      {"an exposure longer than a frame",
+       kLeast + "[camera]\ndevice = \"aravis\"\nfps = 30\nexposure_ms = 40\n[vision]\n[aravis]\n",
+       "b.toml:8:15: camera.exposure_ms: is longer than a frame, allowed: at most 1000 / fps = 33.33"},
+      {"a plugged camera in virtual time",
+       "[scene]\nclock = \"virtual\"\n" + kLeast + "[camera]\ndevice = \"v4l2\"\n[vision]\n[v4l2]\n",
+       "b.toml:2:9: scene.clock: \"virtual\" cannot wait for camera.device = \"v4l2\", allowed: \"real\""},
+      {"a plugged camera faster than the servo can take",
+       kLeast + "[camera]\ndevice = \"v4l2\"\nfps = 900\n[vision]\n[v4l2]\n",
+       "b.toml:7:7: camera.fps: is too fast for the servo, allowed: at most rate_hz / 2 = 500"},
       {"a camera faster than the servo can take",
        kLeast + "[sim.cell]\n[vision]\ninner = false\n[camera]\nfps = 900\n",
        "b.toml:9:7: camera.fps: is too fast for the servo, allowed: at most rate_hz / 2 = 500"},
@@ -424,8 +443,9 @@ TEST(Scene, a_table_that_is_absent_is_a_thing_that_is_not_there) {
 // A member that no key sets would silently keep its default: of every struct of parameters, each member
 // stands in a table of keys of the same file, behind the struct.
 TEST(Scene, every_member_of_the_parameters_has_a_key) {
-  std::vector<fs::path> files = {"hal/gpiod/config.hpp", "hal/cia402/config.hpp", "hal/sim/config.hpp",
-                                 "vision/config.hpp", "tools/scene/scene.hpp"};
+  std::vector<fs::path> files = {"hal/live_camera.hpp",  "hal/v4l2/config.hpp",   "hal/aravis/config.hpp",
+                                 "hal/gpiod/config.hpp", "hal/cia402/config.hpp", "hal/sim/config.hpp",
+                                 "vision/config.hpp",    "tools/scene/scene.hpp"};
   for (const char* room : {"rt/control", "rt/forces"}) {
     for (const auto& entry : fs::directory_iterator(fs::path(PUNCTUM_SOURCE_DIR) / room)) {
       if (entry.path().extension() == ".hpp") {
@@ -434,11 +454,11 @@ TEST(Scene, every_member_of_the_parameters_has_a_key) {
     }
   }
   const std::regex begins(
-      R"(^struct (\w+Params|\w+Config|HandDevice|HolderVision|RecordedFrames|ScheduledFailure|EstopEvent|Scene) \{)");
+      R"(^struct (\w+Params|\w+Config|CameraSettings|HandDevice|HolderVision|RecordedFrames|ScheduledFailure|EstopEvent|Scene) \{)");
   const std::regex member(R"(^  ([\w:]+(?:<[\w:]+>)?)\s+(\w+)(?:\[\d+\])?\s*(?:=.*|\{.*\})?;)");
   // Parts with a table of their own, and what follows from other keys.
   const std::regex part(
-      R"(.*(?:Params|Config|HandDevice|HolderVision|RecordedFrames|DeviceNames|HolderVision>)>?|std::array.*)");
+      R"(.*(?:Params|Config|CameraSettings|HandDevice|HolderVision|RecordedFrames|DeviceNames|HolderVision>)>?|std::array.*)");
   const std::set<std::string> follows = {"ServoConfig::real_actuators",
                                          "ServoConfig::vision",
                                          "ServoConfig::inner_membrane",
@@ -609,6 +629,27 @@ TEST(Scene, overrides_are_read_and_checked_as_the_file_is) {
     ASSERT_FALSE(scene.has_value()) << text;
     EXPECT_EQ(scene.error(), message);
   }
+}
+
+TEST(Scene, a_plugged_camera_is_read_and_written_again) {
+  const auto scene = parse_scene(kLeast +
+                                     "[camera]\ndevice = \"v4l2\"\nwidth = 727\nheight = 485\nfps = 25\n"
+                                     "pixel_um = 0.5\nexposure_ms = 12.5\ngain = 3\n[vision]\n"
+                                     "[v4l2]\npath = \"/dev/video2\"\nformat = \"y16\"\nbits = 12\n",
+                                 "c.toml");
+  ASSERT_TRUE(scene) << scene.error();
+  ASSERT_TRUE(scene->camera && scene->v4l2);
+  EXPECT_FALSE(scene->aravis || scene->recorded || scene->simulated_camera());
+  EXPECT_EQ(scene->camera->width, 727);
+  EXPECT_EQ(scene->camera->exposure_s, 12.5 / 1e3);
+  EXPECT_EQ(scene->vision->pixel_m, 0.5 / 1e6);
+  EXPECT_EQ(scene->v4l2->format, v4l2::V4l2Params::Format::y16);
+  EXPECT_EQ(scene->v4l2->bits, 12);
+  EXPECT_FALSE(scene->servo.real_actuators) << "a camera moves nothing";
+  const auto again = parse_scene(to_toml(*scene), "c.toml");
+  ASSERT_TRUE(again) << again.error();
+  EXPECT_EQ(to_toml(*again), to_toml(*scene));
+  EXPECT_EQ(again->v4l2->path, "/dev/video2");
 }
 
 // Backends that exist only here: a scene with real devices only, and one of both kinds.

@@ -19,6 +19,9 @@ constexpr double kResetHeld_s = 0.02;  // a finger is on the button for longer, 
 
 constexpr double kStageReach_m = 1;  // no stage that carries a needle travels as far
 constexpr double kUnit = 1e-3;       // the axis' length is as near to 1
+// No drive turns a needle further than this between two samples, nor further than the operator may tilt it,
+// once each way, from where it stood when the station began to move: the bound of both is that, and this.
+constexpr double kTurn_rad = 0.1;
 // From switched-on to operation: a CiA 402 drive charges its DC link, releases its brake and answers each of
 // three transitions; vendors state up to 2 s.
 constexpr double kEnablesWithin_s = 3;
@@ -174,8 +177,12 @@ void DeviceInputs::take_hand(const hal::HandState& read, const LastOutput& last)
                                  : 1e-9 * static_cast<double>(read.sample_ns - readings_.hand.sample_ns);
   readings_.hand = read;
   readings_.hand.orientation.normalize();
-  buttons_held_ &= read.buttons;
-  readings_.hand.buttons = read.buttons & ~buttons_held_;
+  readings_.inject_down = (read.buttons & hal::kButtonInject) != 0;
+  inject_.step(readings_.inject_down, readings_.between_hand_s);
+  next_cell_.step((read.buttons & hal::kButtonNextCell) != 0, readings_.between_hand_s);
+  readings_.hand.buttons &= ~(hal::kButtonInject | hal::kButtonNextCell);
+  readings_.hand.buttons |=
+      (inject_.pressed() ? hal::kButtonInject : 0U) | (next_cell_.pressed() ? hal::kButtonNextCell : 0U);
   readings_.hand_seen = true;
   readings_.hand_age_s = hand_clock_.age_s();
   hand_watch_.step(read.position_m, last.hand_force_N, readings_.between_hand_s);
@@ -189,7 +196,9 @@ void DeviceInputs::take_hand(const hal::HandState& read, const LastOutput& last)
 // or call for the next cell. The clutch counts as it is: it only keeps the needle where it is.
 void DeviceInputs::release_buttons() NONBLOCKING {
   readings_.hand.buttons = 0;
-  buttons_held_ = hal::kButtonInject | hal::kButtonNextCell;
+  readings_.inject_down = false;
+  inject_.mute();
+  next_cell_.mute();
 }
 
 Fault DeviceInputs::judge_enabling(const TickTime& time, const LastOutput& last) NONBLOCKING {
@@ -197,7 +206,7 @@ Fault DeviceInputs::judge_enabling(const TickTime& time, const LastOutput& last)
     return Fault::none;
   }
   if (readings_.hand_fresh) {
-    enabling_->read(readings_.hand.buttons);
+    enabling_->read(readings_.hand.buttons, readings_.between_hand_s);
   }
   const Fault fault = enabling_->step(last.running, time.elapsed_s);
   readings_.enabled = enabling_->enabled();
@@ -232,8 +241,9 @@ Fault DeviceInputs::read_stage(const TickTime& time, const LastOutput& last) NON
     readings_.alarms |= alarm_sensor;
     return Fault::stage_fault;
   }
-  const SampleIs sample =
-      status == hal::Status::ok ? stage_clock_.take(read.sample_ns, time.now_ns) : SampleIs::untimely;
+  const SampleIs sample = status == hal::Status::ok && axis_can_be_true(read.axis.normalized(), last)
+                              ? stage_clock_.take(read.sample_ns, time.now_ns)
+                              : SampleIs::untimely;
   if (sample == SampleIs::untimely || stage_clock_.timed_out()) {
     readings_.alarms |= alarm_sensor;
   }
@@ -246,6 +256,17 @@ Fault DeviceInputs::read_stage(const TickTime& time, const LastOutput& last) NON
   readings_.stage_fresh = true;
   readings_.stage_age_s = stage_clock_.age_s();
   return first_of(judge_stage(last), not_enabled(time, last));
+}
+
+// Every depth is measured along the needle's axis: one that points elsewhere turns inward and outward round.
+bool DeviceInputs::axis_can_be_true(const hal::Vec3& axis, const LastOutput& last) NONBLOCKING {
+  if (!last.running || !readings_.stage_seen) {
+    mounted_axis_ = axis;
+    return true;
+  }
+  const double tilt_rad = 2 * config_.mapping.max_tilt_rad + kTurn_rad;
+  return axis.dot(readings_.stage.axis) > 1 - 0.5 * kTurn_rad * kTurn_rad &&
+         axis.dot(mounted_axis_) > 1 - 0.5 * tilt_rad * tilt_rad;
 }
 
 Fault DeviceInputs::judge_stage(const LastOutput& last) NONBLOCKING {

@@ -12,6 +12,7 @@
 #include "rt/control/following.hpp"
 #include "rt/control/hand_check.hpp"
 #include "rt/control/hand_watch.hpp"
+#include "rt/control/lasting_button.hpp"
 #include "rt/control/sample_clock.hpp"
 #include "rt/control/tick_timing.hpp"
 #include "rt/station/fault.hpp"
@@ -30,6 +31,8 @@ struct Readings {
   double between_hand_s = 0;  // between the two newest samples, by their own times; > 0
   bool enabled = true;  // the enabling device was pressed since the start or the last stop, or there is none
   bool pressed_anew = false;  // the enabling device, on this tick
+
+  bool inject_down = false;  // as read; the button of `hand`: once it has lasted
 
   bool has_stage = false;
   hal::StageState stage;
@@ -88,6 +91,7 @@ class DeviceInputs {
   [[nodiscard]] Fault read_stage(const TickTime& time, const LastOutput& last) NONBLOCKING;
   void take_hand(const hal::HandState& read, const LastOutput& last) NONBLOCKING;
   void release_buttons() NONBLOCKING;
+  [[nodiscard]] bool axis_can_be_true(const hal::Vec3& axis, const LastOutput& last) NONBLOCKING;
   [[nodiscard]] Fault judge_stage(const LastOutput& last) NONBLOCKING;
   [[nodiscard]] Fault not_enabled(const TickTime& time, const LastOutput& last) NONBLOCKING;
   [[nodiscard]] Fault read_vacuum(const TickTime& time, const LastOutput& last) NONBLOCKING;
@@ -103,8 +107,9 @@ class DeviceInputs {
   HandCheck::Is hand_is_ = HandCheck::Is::ignored;  // the newest sample
   hal::Vec3 newest_hand_m_ = hal::Vec3::Zero();
   HandWatch hand_watch_;
-  std::uint32_t buttons_held_ = 0;  // since the hand was lost: they count again when pressed anew
+  LastingButton inject_, next_cell_;
   SampleClock stage_clock_;
+  hal::Vec3 mounted_axis_ = -hal::Vec3::UnitX();  // before the station moved
   std::optional<EnablingDevice> enabling_;
   FollowingCheck following_;
   bool stage_was_enabled_ = false;

@@ -16,7 +16,7 @@ bool InjectionGate::step(const Readings& readings, const GateInput& in, double e
   const bool pressed = readings.button(hal::kButtonInject);
   const bool allowed = !in.stopped && in.vision_fresh;
   const bool may_stay = allowed && in.injection_phase;
-  armed_ = allowed && in.may_inject && hand_known && (armed_ || !pressed);
+  armed_ = allowed && in.may_inject && hand_known && (armed_ || !(pressed || readings.inject_down));
   const bool wanted = !in.ending && armed_ && pressed;
   const bool too_short = open_ && this_time_s_ + kRounding_s < kShortest_s;
   const bool open = params_ && may_stay && (wanted || too_short) &&

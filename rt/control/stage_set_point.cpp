@@ -2,14 +2,19 @@
 
 #include <algorithm>
 
+#include "hal/frames.hpp"
 #include "rt/station/alarm.hpp"
 
 namespace punctum::rt {
 namespace {
 
-// Nobody has seen where the hand went in a longer gap: the needle does not catch it up. Twice the period of
-// the slowest device that hand_watch.hpp allows for.
-constexpr double kHandGap_s = 0.01;
+// Nobody has seen where the hand went in a longer gap of its samples: three times the period of a device of
+// 200 Hz, or one and a half of one of 100 Hz, whose periods vary.
+constexpr double kHandGap_s = 0.016;
+constexpr double kStall_s = 0.01;  // nor in a longer one of the ticks
+// One false sample of the tip is nothing to begin from: the next one agrees with it. More than an encoder's
+// last digit flickers by, and no more than may be seen of a needle that moves by itself.
+constexpr double kTipAgrees_m = 1e-6;
 // Of the hand, between pushing in vain and drawing back: more than it trembles by (0.7 mm from peak to peak),
 // or every tremble would draw the needle back a little more.
 constexpr double kSlack_m = 1e-3;
@@ -33,18 +38,22 @@ std::uint32_t StageSetPoint::follow_hand(const Readings& readings, const FollowI
   if (in.nothing_felt && (!holding || !mapping_.anchored() || readings.button(hal::kButtonClutch))) {
     mapping_.set_position_scale(in.position_scale);
   }
-  if (!holding || !mapping_.anchored() || readings.hand_begins) {
+  const bool begins = last_uncoupled_ && mapping_.anchored() && readings.has_stage;
+  const bool contradicted =
+      begins && (readings.stage.tip_m - limits_.set_point().tip_m).norm() > kTipAgrees_m;
+  const bool unconfirmed = contradicted || (begins && !readings.stage_fresh);
+  last_uncoupled_ = !holding || !mapping_.anchored() || readings.hand_begins || unconfirmed;
+  if (last_uncoupled_) {
     anchor(readings.hand, readings.stage.tip_m, readings.stage.axis);
     uncoupled_ = true;
-    return 0;
+    return holding && contradicted ? alarm_travel_limited : 0U;
   }
   const bool hand_moves_again = last_hand_stuck_ && !readings.hand_stuck;
-  const bool hand_had_a_gap = readings.hand_fresh && readings.between_hand_s > kHandGap_s;
   const bool way_closes_or_opens = in.constraint.withdrawal_only != last_withdrawal_only_;
   // What the hand did meanwhile is forgotten: the needle does not catch up by itself.
-  if (in.elapsed_s > kHandGap_s) {
+  if (in.elapsed_s > kStall_s) {
     anchor(readings.hand, limits_.set_point().tip_m, limits_.set_point().axis);
-  } else if (hand_moves_again || hand_had_a_gap || readings.hand_leaps || way_closes_or_opens) {
+  } else if (hand_moves_again || way_closes_or_opens) {
     mapping_.anchor(readings.hand, limits_.stops_at_m(), limits_.set_point().axis);
   }
   last_withdrawal_only_ = in.constraint.withdrawal_only;
@@ -52,7 +61,11 @@ std::uint32_t StageSetPoint::follow_hand(const Readings& readings, const FollowI
   // Of what the hand did between two samples, nobody knows what was before the clutch was released.
   const bool clutched = in.clutched || last_clutched_;
   last_clutched_ = in.clutched;
+  const hal::Vec3 believed_m = mapping_.hand_point();
   mapping_.step(readings.hand, !clutched, in.may_tilt && in.vision_fresh);
+  if (readings.hand_fresh) {
+    catch_up(readings, believed_m, clutched, in.constraint.membrane.axis);
+  }
   // Without vision too: a hand that pushes in vain slips, and draws the needle back as soon as it turns.
   StageLimits::Checked allowed = limits_.check(mapping_.hand_point(), in.constraint);
   if (in.constraint.withdrawal_only) {
@@ -61,7 +74,7 @@ std::uint32_t StageSetPoint::follow_hand(const Readings& readings, const FollowI
     allowed.point_m += std::clamp(in_vain_m, 0.0, kSlack_m / mapping_.position_scale()) * inward;
   }
   mapping_.slip(allowed.point_m);
-  if (readings.hand_leaps) {
+  if (out_of_sight_) {
     allowed.alarms |= alarm_travel_limited;
   }
   // A hand that was faster than the needle may be slips too: the needle does not go on for long after it.
@@ -83,10 +96,30 @@ std::uint32_t StageSetPoint::step(const StageConstraint& constraint, double dt_s
   return limits_.alarms();
 }
 
+void StageSetPoint::catch_up(const Readings& readings, const hal::Vec3& believed_m, bool clutched,
+                             const hal::Vec3& inward) NONBLOCKING {
+  const bool lost = readings.hand_leaps || readings.between_hand_s > kHandGap_s;
+  if (lost) {
+    mapping_.slip(believed_m);
+  } else {
+    if (out_of_sight_ && !clutched) {
+      const hal::Vec3 way_m = world_from_hand(readings.hand.position_m - last_seen_m_);
+      const double drew_back_m = std::max(0.0, -inward.dot(way_m)) / mapping_.position_scale();
+      mapping_.slip(mapping_.hand_point() - drew_back_m * inward);
+    }
+  }
+  if (!lost || clutched) {
+    last_seen_m_ = readings.hand.position_m;
+  }
+  out_of_sight_ = lost;
+}
+
 void StageSetPoint::anchor(const hal::HandState& hand, const hal::Vec3& tip_m, const hal::Vec3& axis)
     NONBLOCKING {
   mapping_.anchor(hand, tip_m, axis);
   limits_.restart(tip_m, axis);
+  last_seen_m_ = hand.position_m;
+  out_of_sight_ = false;
 }
 
 }  // namespace punctum::rt

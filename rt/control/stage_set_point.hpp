@@ -48,6 +48,9 @@ class StageSetPoint {
   [[nodiscard]] const hal::StageCommand& set_point() const NONBLOCKING { return limits_.set_point(); }
 
  private:
+  // What of the hand's way between two samples was not believed stays undone, but for what drew back.
+  void catch_up(const Readings& readings, const hal::Vec3& believed_m, bool clutched, const hal::Vec3& inward)
+      NONBLOCKING;
   // From here on the hand moves the needle relative to where both are now.
   void anchor(const hal::HandState& hand, const hal::Vec3& tip_m, const hal::Vec3& axis) NONBLOCKING;
 
@@ -58,6 +61,9 @@ class StageSetPoint {
   bool last_withdrawal_only_ = false;
   bool last_hand_stuck_ = false;
   bool last_clutched_ = false;
+  bool last_uncoupled_ = true;
+  bool out_of_sight_ = false;                  // the hand: after a gap or in a leap
+  hal::Vec3 last_seen_m_ = hal::Vec3::Zero();  // the hand, before that
 };
 
 }  // namespace punctum::rt

@@ -31,16 +31,19 @@ const TaskFacts& Task::step(const Readings& readings, const CellFacts& cell, dou
   in.vision_contradicts = cell.vision_implausible;
   in.may_inject = cell.vision_fresh && cell.puncture_seen && cell.contact_depth_m > 0 &&
                   (!has_inner_membrane_ || cell.inner_puncture_seen);
-  in.inject = readings.button(hal::kButtonInject);
+  const bool pressed = readings.button(hal::kButtonInject);
+  in.inject = pressed && press_begins_here_;
   in.next_cell = readings.button(hal::kButtonNextCell);
   facts_.phase = phases.step(in, dt_s);
+  const bool may_begin = facts_.phase == Phase::puncture || facts_.phase == Phase::injection;
+  press_begins_here_ = may_begin && (press_begins_here_ || !(pressed || readings.inject_down));
   facts_.cell = phases.cell();
   facts_.inside_cell = phases.inside();
   facts_.punctured = facts_.inside_cell || facts_.phase == Phase::clear;
   facts_.contact_or_puncture_begins = phases.entered(Phase::contact) || phases.entered(Phase::puncture);
   facts_.may_inject = in.may_inject && (facts_.phase == Phase::puncture || facts_.phase == Phase::injection);
   facts_.alarms = phases.timed_out() ? alarm_phase_timeout : 0U;
-  if (has_injector_ && in.inject && facts_.phase == Phase::puncture) {
+  if (has_injector_ && pressed && facts_.phase == Phase::puncture) {
     facts_.alarms |= alarm_injection_refused;
   }
   if (phases.entered(Phase::puncture)) {

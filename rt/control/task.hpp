@@ -50,7 +50,8 @@ class Task {
   bool has_injector_;
   bool has_inner_membrane_;
   TaskFacts facts_;
-  bool injected_ = false;  // this cell, as the injector reported
+  bool press_begins_here_ = false;  // of the inject button: it was up where an injection may begin
+  bool injected_ = false;           // this cell, as the injector reported
   std::uint32_t cells_done_ = 0;
   std::uint32_t cells_injected_ = 0;
   std::uint32_t cells_begun_ = 0;  // after the first one

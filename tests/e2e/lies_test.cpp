@@ -322,6 +322,7 @@ std::vector<Row> rows() {
       {"stage_axis_huge", "stage", "set", 7, "axis", "size=1e308, component=\"all\""},
       {"stage_axis_back", "stage", "set", 7, "axis", "size=1"},
       {"stage_axis_glitch", "stage", "glitch", 7, "axis", "size=2"},
+      {"stage_axis_glitch_before_contact", "stage", "glitch", 3, "axis", "size=2"},
       {"stage_error_huge", "stage", "set", 7, "following_error", "size=1e308, component=\"all\""},
       {"stage_enabled_glitch", "stage", "glitch", 7, "enabled"},
       {"stage_says_disabled", "stage", "set", 7, "enabled", "size=0"},

@@ -147,6 +147,7 @@ inline constexpr std::array<Draw, kLies> kDraws{{
     {Lie::stage_never_enables, 3, 1, 1, false, 10, 2000},
     {Lie::stage_drops_power, 3, 1, 1, false, 1, 300},
     {Lie::stage_never_stands, 3, 1, 1, false, 10, 2000},
+    {Lie::stage_axis, 3, 1e-3, 3.1416, true, 1, 300},
     {Lie::contact_a, 4, 1, 1, false, 1, 300},
     {Lie::contact_b, 4, 1, 1, false, 1, 300},
     {Lie::contacts, 4, 1, 1, false, 1, 600},

@@ -73,6 +73,7 @@ enum class Lie : std::uint8_t {
   stage_never_enables,
   stage_drops_power,
   stage_never_stands,
+  stage_axis,  // rad, turned about an axis
   // The e-stop chain.
   contact_a,
   contact_b,
@@ -158,6 +159,7 @@ inline constexpr std::array<const char*, kLies> kLieNames{"moves",
                                                           "stage_never_enables",
                                                           "stage_drops_power",
                                                           "stage_never_stands",
+                                                          "stage_axis",
                                                           "contact_a",
                                                           "contact_b",
                                                           "contacts",
@@ -441,7 +443,7 @@ class LyingStation {
     w.buttons = (on(Lie::clutches) ? hal::kButtonClutch : 0) | (on(Lie::injects) ? hal::kButtonInject : 0) |
                 (on(Lie::next_cell) ? hal::kButtonNextCell : 0) |
                 // Seen let go before the first press.
-                (on(Lie::enable_up) || w.tick < 10 ? 0 : hal::kButtonEnable) |
+                (on(Lie::enable_up) || w.tick < 60 ? 0 : hal::kButtonEnable) |
                 (on(Lie::squeezes) ? hal::kButtonPanic : 0);
     hal::HandState& now = w.hand_past[w.tick % kPast];
     now = {};
@@ -578,12 +580,12 @@ class LyingStation {
              : begins(Lie::command_end)   ? Command::end
              : begins(Lie::command_scale) ? Command::force_scale
                                           : Command::none;
-    if (begins(Lie::command_odd)) {
-      c.kind = 17;
-    }
     c.value = value(Lie::command_scale);
     if (c.kind != Command::none) {
       (void)station_->parent.queue.try_push(c);
+    }
+    if (begins(Lie::command_odd)) {
+      (void)station_->parent.queue.try_push({17, 0, 0});
     }
     if (begins(Lie::command_position_scale)) {
       const double scale = value(Lie::command_position_scale);
@@ -725,6 +727,10 @@ class LyingStation {
     }
     if (on(Lie::stage_stuck)) {
       told.tip_m = w.told_stage.tip_m;
+    }
+    if (on(Lie::stage_axis)) {
+      const int about = std::max(1, active_[static_cast<std::size_t>(Lie::stage_axis)]->axis);
+      told.axis = Eigen::AngleAxisd(value(Lie::stage_axis), Vec3::Unit(about)) * told.axis;
     }
     if (on(Lie::stage_never_stands)) {
       told.at_standstill = false;

@@ -51,6 +51,7 @@ struct Inputs {
 TEST(DeviceInputs, passes_good_values_on_without_fault_or_alarm) {
   Inputs in;
   in.sensor.force = 3e-6;
+  in.settle();
   in.hand.buttons = hal::kButtonInject;
   in.settle();
   const Readings& r = in.inputs.readings();
@@ -204,18 +205,25 @@ TEST(DeviceInputs, bears_bad_samples_of_a_slow_hand_no_longer_than_its_time) {
 TEST(DeviceInputs, takes_no_button_of_a_sample_that_cannot_be_true) {
   for (const bool pressed : {false, true}) {
     Inputs in;
+    in.settle();
     in.hand.buttons = pressed ? hal::kButtonInject : 0;
     in.settle();
+    EXPECT_EQ(in.inputs.readings().button(hal::kButtonInject), pressed);
     in.hand.jump_m = 0.03;
     in.hand.buttons = pressed ? 0 : hal::kButtonInject;
     EXPECT_EQ(in.read().button(hal::kButtonInject), pressed);
+    EXPECT_EQ(in.inputs.readings().inject_down, pressed);
     in.hand.jump_m = 0;
-    EXPECT_EQ(in.read().button(hal::kButtonInject), !pressed);
+    (void)in.read();
+    EXPECT_EQ(in.inputs.readings().inject_down, !pressed);
+    in.settle();
+    EXPECT_EQ(in.inputs.readings().button(hal::kButtonInject), !pressed);
   }
 }
 
 TEST(DeviceInputs, releases_the_buttons_of_an_invalid_hand_until_they_are_pressed_anew) {
   Inputs in;
+  in.settle();
   in.hand.buttons = hal::kButtonInject | hal::kButtonNextCell | hal::kButtonClutch;
   in.settle();
   EXPECT_TRUE(in.inputs.readings().button(hal::kButtonInject));
@@ -229,9 +237,34 @@ TEST(DeviceInputs, releases_the_buttons_of_an_invalid_hand_until_they_are_presse
   in.settle();
   EXPECT_EQ(in.inputs.readings().hand.buttons, hal::kButtonClutch);  // the clutch only holds the needle
   in.hand.buttons = 0;
-  (void)in.read();
+  in.settle();
   in.hand.buttons = hal::kButtonInject;
-  EXPECT_TRUE(in.read().button(hal::kButtonInject));
+  in.settle();
+  EXPECT_TRUE(in.inputs.readings().button(hal::kButtonInject));
+}
+
+TEST(DeviceInputs, takes_a_button_that_begins_something_once_it_has_lasted) {
+  for (const std::uint32_t button : {hal::kButtonInject, hal::kButtonNextCell}) {
+    Inputs in;
+    const auto pressed_after_ms = [&](std::uint32_t buttons, bool pressed) {
+      in.hand.buttons = buttons;
+      for (int ms = 0; ms < 100; ++ms) {
+        if (in.read().button(button) == pressed) {
+          return ms;
+        }
+      }
+      return -1;
+    };
+    in.settle();
+    for (int k = 0; k < 50; ++k) {  // a line that is disturbed
+      in.hand.buttons = k % 20 == 0 ? 0 : button;
+      EXPECT_FALSE(in.read().button(button)) << k;
+    }
+    EXPECT_EQ(pressed_after_ms(0, false), 0);
+    in.settle();
+    EXPECT_NEAR(pressed_after_ms(button, true), 21, 1);
+    EXPECT_NEAR(pressed_after_ms(0, false), 21, 1);
+  }
 }
 
 TEST(DeviceInputs, refuses_an_orientation_that_is_none_or_turns_faster_than_a_hand) {

@@ -94,9 +94,9 @@ TEST(Servo, takes_the_next_cell_with_a_fresh_model) {
   EXPECT_EQ(b.servo->cells_done(), 1U);
   b.centre = Vec3(-44e-6, 3e-6, 0);
   b.R = 64e-6;
-  b.hand.buttons = hal::kButtonNextCell;
-  b.tick();
-  b.tick();
+  b.hold(hal::kButtonNextCell, 0.02);
+  EXPECT_EQ(b.servo->phase(), clear);
+  b.run(0.003);
   EXPECT_EQ(b.servo->phase(), free);
   EXPECT_EQ(b.sample().cell, 1U);
   EXPECT_EQ(b.sample().R_m, 0);

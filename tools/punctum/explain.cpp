@@ -84,6 +84,7 @@ constexpr Saving kSavings[] = {
     {"forbidden.holder", "nothing keeps the needle from the holding pipette"},
     {"sim.dish", "the simulated dish has no floor"},
     {"cia402", "no CAN bus"},
+    {"falcon", "no USB handle, or one that was booted before and has no CPU of its own"},
 };
 
 // An effect in one phrase; by its name alone where there is nothing more to say.

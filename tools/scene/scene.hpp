@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "hal/cia402/config.hpp"
+#include "hal/falcon/config.hpp"
 #include "hal/gpiod/config.hpp"
 #include "hal/parameters.hpp"
 #include "hal/sim/config.hpp"
@@ -43,6 +44,7 @@ struct DeviceNames {
 inline constexpr std::string_view kRecorded = "recorded";
 inline constexpr std::string_view kGpiod = "gpiod";
 inline constexpr std::string_view kCia402 = "cia402";
+inline constexpr std::string_view kFalcon = "falcon";
 
 struct Scene {
   std::string name;    // of the file without folder and suffix, or the built-in name
@@ -64,6 +66,7 @@ struct Scene {
   std::optional<RecordedFrames> recorded;        // camera = recorded frames
   std::optional<cia402::CanStageParams> cia402;  // stage = drives on a CAN bus
   std::optional<gpiod::GpiodParams> gpiod;       // lines of e-stop chain and injector
+  std::optional<falcon::FalconParams> falcon;    // haptic = a Novint Falcon
   std::optional<vision::VisionConfig> vision;    // absent: no vision process
 
   [[nodiscard]] bool simulated_camera() const noexcept { return sim && sim->microscope.has_value(); }

@@ -57,7 +57,8 @@ std::string many_failures(int n) {
 const std::vector<Broken>& broken() {
   static const std::string cone_keys = "method, K_N_m, d0_um, r0_um, alpha_rad, eps_um, ramp_s, reach_um";
   static const std::string all_tables =
-      "scene, servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, cia402, velocity, "
+      "scene, servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, cia402, falcon, "
+      "velocity, "
       "mapping, "
       "limits, "
       "vision, phases, local_model, membrane, cone, axis, damping, repulsive, friction, vibration, "
@@ -134,8 +135,14 @@ const std::vector<Broken>& broken() {
        "b.toml:6:11: servo.rate_hz: 3000 is not one of the choices, allowed: 1000, 2000, 4000 or 8000"},
       {"a method that is none", kLeast + "[cone]\nmethod = \"funnel\"\n",
        "b.toml:6:10: cone.method: \"funnel\" is not one of the choices, allowed: \"potential\" or \"paper\""},
-      {"a device that does not exist", "[haptic]\ndevice = \"falcon\"\n",
-       "b.toml:2:10: haptic.device: \"falcon\" is not one of the choices, allowed: \"simulated\""},
+      {"a device that does not exist", "[haptic]\ndevice = \"phantom\"\n",
+       "b.toml:2:10: haptic.device: \"phantom\" is not one of the choices, allowed: \"simulated\" or "
+       "\"falcon\""},
+      {"a Falcon that nobody holds", kLeast + "[falcon]\nfirmware = \"a.bin\"\n",
+       "b.toml:5:2: falcon: no handle uses it, allowed: with device = \"falcon\" in [haptic], or leave it "
+       "out"},
+      {"a CPU that no machine has", kLeast + "[falcon]\ncpu = 1024\n",
+       "b.toml:6:7: falcon.cpu: 1024 is out of range, allowed: a whole number from -1 to 1023"},
       {"a device misspelt", "[camera]\ndevice = \"recoded\"\n",
        "b.toml:2:10: camera.device: \"recoded\" is not one of the choices (did you mean recorded?), allowed: "
        "\"simulated\" or \"recorded\""},
@@ -426,8 +433,8 @@ TEST(Scene, a_table_that_is_absent_is_a_thing_that_is_not_there) {
 // A member that no key sets would silently keep its default: of every struct of parameters, each member
 // stands in a table of keys of the same file, behind the struct.
 TEST(Scene, every_member_of_the_parameters_has_a_key) {
-  std::vector<fs::path> files = {"hal/gpiod/config.hpp", "hal/cia402/config.hpp", "hal/sim/config.hpp",
-                                 "vision/config.hpp", "tools/scene/scene.hpp"};
+  std::vector<fs::path> files = {"hal/gpiod/config.hpp", "hal/cia402/config.hpp", "hal/falcon/config.hpp",
+                                 "hal/sim/config.hpp",   "vision/config.hpp",     "tools/scene/scene.hpp"};
   for (const char* room : {"rt/control", "rt/forces"}) {
     for (const auto& entry : fs::directory_iterator(fs::path(PUNCTUM_SOURCE_DIR) / room)) {
       if (entry.path().extension() == ".hpp") {
@@ -597,7 +604,8 @@ TEST(Scene, overrides_are_read_and_checked_as_the_file_is) {
       {"sim.operator=off", "--set: sim.operator: cannot be left out, allowed: on"},
       {"operator.depth_um=25",
        "--set: operator.depth_um: unknown key (did you mean sim.operator.depth_um?), allowed: tables scene, "
-       "servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, cia402, velocity, "
+       "servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, cia402, falcon, "
+       "velocity, "
        "mapping, "
        "limits, "
        "vision, "
@@ -606,7 +614,8 @@ TEST(Scene, overrides_are_read_and_checked_as_the_file_is) {
        "sim"},
       {"cell.inner.gap_um=4",
        "--set: cell.inner.gap_um: unknown key (did you mean sim.cell.inner.gap_um?), allowed: tables scene, "
-       "servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, cia402, velocity, "
+       "servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, cia402, falcon, "
+       "velocity, "
        "mapping, "
        "limits, "
        "vision, "
@@ -615,7 +624,8 @@ TEST(Scene, overrides_are_read_and_checked_as_the_file_is) {
        "sim"},
       {"cell=off",
        "--set: cell: unknown table (did you mean sim.cell?), allowed: scene, servo, haptic, stage, estop, "
-       "vacuum, injector, force_sensor, camera, gpiod, cia402, velocity, mapping, limits, vision, phases, "
+       "vacuum, injector, force_sensor, camera, gpiod, cia402, falcon, velocity, mapping, limits, vision, "
+       "phases, "
        "local_model, "
        "membrane, "
        "cone, axis, damping, repulsive, friction, vibration, forbidden, guard, enabling, sim"},
@@ -843,6 +853,22 @@ TEST(Scene, a_path_of_a_frame_folder_is_seen_from_the_scenes_own_folder) {
                   "/some/folder");
   ASSERT_TRUE(scene.has_value()) << scene.error();
   EXPECT_EQ(scene->recorded->frames, "/some/folder/pictures");
+}
+
+TEST(Scene, a_falcon_is_the_handle_and_its_firmware_is_seen_from_the_scenes_own_folder) {
+  const auto scene = parse_scene(
+      "[haptic]\ndevice = \"falcon\"\n[falcon]\nfirmware = \"falcon.bin\"\ncpu = 2\n[stage]\n[sim.needle]\n",
+      "s.toml", {}, "/some/folder");
+  ASSERT_TRUE(scene.has_value()) << scene.error();
+  EXPECT_EQ(scene->falcon->firmware, "/some/folder/falcon.bin");
+  EXPECT_EQ(scene->falcon->cpu, 2);
+  EXPECT_TRUE(scene->servo.real_actuators);
+  const auto again = parse_scene(to_toml(*scene), "s.toml");
+  ASSERT_TRUE(again.has_value()) << again.error();
+  EXPECT_EQ(to_toml(*again), to_toml(*scene));
+  const auto booted = parse_scene("[haptic]\ndevice = \"falcon\"\n[stage]\n[sim.needle]\n", "s.toml");
+  ASSERT_TRUE(booted.has_value()) << booted.error();
+  EXPECT_FALSE(booted->falcon.has_value());
 }
 
 class SceneFiles : public testing::Test {

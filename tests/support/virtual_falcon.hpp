@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <limits>
 #include <optional>
 #include <string>
@@ -110,7 +111,7 @@ class VirtualFalcon final : public hal::Clock, public falcon::UsbLink {
   static constexpr std::int64_t kPacket_ns = 60'000;  // on the wire, and the host's part of it
   std::int64_t now_ns_ = 1'000'000'000, out_ends_ns_ = 0;
   std::vector<std::uint8_t> out_;
-  bool woken_ = false;
+  std::atomic<bool> woken_{false};
 };
 
 }  // namespace punctum::tests

@@ -65,8 +65,9 @@ def main():
                 moved[i] += sign * h
                 ends.append(position(moved, found[:3], found[3:])[:3])
             columns.append([(a - b) / (2 * h) for a, b in zip(*ends)])
-        numbers = theta1 + found[:3] + [columns[j][i] for i in range(3) for j in range(3)]
-        print("{" + ", ".join(nstr(x, 20) for x in numbers) + "},")
+        jacobian = [columns[j][i] for i in range(3) for j in range(3)]
+        lists = ["{" + ", ".join(nstr(x, 20) for x in part) + "}" for part in (theta1, found[:3], jacobian)]
+        print("{" + ",\n ".join(lists) + "},")
 
 
 main()

@@ -6,9 +6,14 @@
 #include <array>
 #include <exception>
 #include <ranges>
+#include <stdexcept>
 
 #include "hal/cia402/cia402_stage.hpp"
 #include "hal/cia402/socket_can.hpp"
+#ifdef PUNCTUM_HAS_LIBUSB
+#include "hal/falcon/falcon_handle.hpp"
+#include "hal/falcon/libusb_link.hpp"
+#endif
 #include "hal/gpiod/gpiod_devices.hpp"
 
 namespace punctum::tools {
@@ -76,6 +81,19 @@ std::unique_ptr<hal::Device> make_cia402(const Surroundings& around, const Roles
                                                std::make_unique<cia402::SocketCan>(params.interface));
 }
 
+#ifdef PUNCTUM_HAS_LIBUSB
+std::unique_ptr<hal::Device> make_falcon(const Surroundings& around, const Roles&) {
+  const Scene& scene = around.scene;
+  return std::make_unique<falcon::FalconHandle>(scene.falcon.value_or(falcon::FalconParams{}),
+                                                falcon::ServoThread{scene.core_priority, scene.core_cpu},
+                                                around.clock, falcon::libusb_link(around.clock));
+}
+#else
+std::unique_ptr<hal::Device> make_falcon(const Surroundings&, const Roles&) {
+  throw std::runtime_error("this punctum was built without libusb: install libusb-1.0-0-dev and build again");
+}
+#endif
+
 }  // namespace
 
 std::span<const Backend> backends() {
@@ -87,6 +105,7 @@ std::span<const Backend> backends() {
       Backend{kSimulated, {Role::positioner}, make_simulated_positioner},
       Backend{kGpiod, {Role::estop, Role::injector}, make_gpiod},
       Backend{kCia402, {Role::stage, Role::force_sensor}, make_cia402},
+      Backend{kFalcon, {Role::haptic}, make_falcon},
   };
   return table;
 }

@@ -4,6 +4,7 @@
 #include <glob.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <thread>
@@ -96,6 +97,7 @@ constexpr Saving kSavings[] = {
     {"watchdog", "a machine that hangs stays as it is, with the drives off by the relay"},
     {"v4l2", "no camera of the kernel's is opened"},
     {"aravis", "no GenICam camera is looked for, and its library is not loaded"},
+    {"falcon", "no firmware is loaded into a USB handle"},
 };
 
 // An effect in one phrase; by its name alone where there is nothing more to say.
@@ -163,12 +165,20 @@ std::string task_text(const Scene& s) {
 }
 
 std::string processes_text(const Scene& s) {
+  const bool falcon = s.devices.haptic == kFalcon;
   std::string out = fmt::format(
-      "{} processes of one thread each\n"
+      "{} processes of one thread each{}\n"
       "  punctum         ordinary, memory not locked: starts, watches, records, reports\n"
       "  punctum-core    one real-time thread: SCHED_FIFO {}, {}, memory locked, {} Hz (every "
       "{:g} us)\n",
-      s.vision ? 3 : 2, s.core_priority, cpu(s.core_cpu), s.servo.rate_Hz, 1e6 / s.servo.rate_Hz);
+      s.vision ? 3 : 2, falcon ? ", and one of the handle" : "", s.core_priority, cpu(s.core_cpu),
+      s.servo.rate_Hz, 1e6 / s.servo.rate_Hz);
+  if (falcon) {
+    const int own_cpu = s.falcon ? s.falcon->cpu : -1;
+    out += fmt::format("                  and the Falcon's: SCHED_FIFO {}, {}, a frame out and one back\n",
+                       std::max(s.core_priority - 1, 1),
+                       own_cpu < 0 && s.core_cpu >= 0 ? "any other CPU" : cpu(own_cpu));
+  }
   if (s.vision) {
     out += fmt::format("  punctum-vision  nice {}, {}, one observation per frame\n", s.vision_nice,
                        cpu(s.vision_cpu));
@@ -387,6 +397,15 @@ int check(const Scene& s, std::string& text) {
   if (s.recorded || s.v4l2 || (s.vision && s.vision->holder && !s.vision->holder->template_path.empty())) {
     const auto files = files_of(s);
     good = row(files.has_value(), "files", files ? *files : files.error()) && good;
+  }
+  if (s.falcon && !s.falcon->firmware.empty()) {
+    const std::string& file = s.falcon->firmware;
+    const bool there = std::filesystem::is_regular_file(file) && access(file.c_str(), R_OK) == 0;
+    good =
+        row(there, "firmware",
+            there ? file
+                  : fmt::format("falcon.firmware: {}: cannot be read, allowed: a C2000 boot stream", file)) &&
+        good;
   }
   const int cpus = static_cast<int>(std::thread::hardware_concurrency());
   for (const auto& [what, n] : {std::pair{"servo.cpu", s.core_cpu}, std::pair{"vision.cpu", s.vision_cpu}}) {

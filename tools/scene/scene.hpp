@@ -13,6 +13,7 @@
 
 #include "hal/aravis/config.hpp"
 #include "hal/cia402/config.hpp"
+#include "hal/falcon/config.hpp"
 #include "hal/gpiod/config.hpp"
 #include "hal/live_camera.hpp"
 #include "hal/parameters.hpp"
@@ -58,6 +59,7 @@ inline constexpr std::string_view kGpiod = "gpiod";
 inline constexpr std::string_view kCia402 = "cia402";
 inline constexpr std::string_view kV4l2 = "v4l2";
 inline constexpr std::string_view kAravis = "aravis";
+inline constexpr std::string_view kFalcon = "falcon";
 
 struct Scene {
   std::string name;    // of the file without folder and suffix, or the built-in name
@@ -83,6 +85,7 @@ struct Scene {
   std::optional<hal::CameraSettings> camera;     // camera = one that is plugged in
   std::optional<v4l2::V4l2Params> v4l2;
   std::optional<aravis::AravisParams> aravis;
+  std::optional<falcon::FalconParams> falcon;  // haptic = a Novint Falcon
   std::optional<vision::VisionConfig> vision;  // absent: no vision process
 
   [[nodiscard]] bool simulated_camera() const noexcept { return sim && sim->microscope.has_value(); }

@@ -164,6 +164,14 @@ Found check_gpiod(const Scene& s) {
   return std::nullopt;
 }
 
+Found check_falcon(const Scene& s) {
+  if (s.falcon && s.devices.haptic != kFalcon) {
+    return Problem{"falcon",
+                   "no handle uses it, allowed: with device = \"falcon\" in [haptic], or leave it out"};
+  }
+  return std::nullopt;
+}
+
 Found check_backends(const Scene& s) {
   if (s.vision && s.vision->method == vision::Method::truth && !s.simulated_camera()) {
     return Problem{"vision.method", "\"truth\" is known of a simulated camera only, allowed: \"paper\""};
@@ -868,8 +876,9 @@ Found check_failures(const Scene& s) {
 }  // namespace
 
 std::optional<Problem> check_together(const Scene& scene) {
-  for (const auto check : {check_needs, check_live_camera, check_gpiod, check_backends, check_can_stage,
-                           check_plant, check_core, check_camera, check_vision, check_failures}) {
+  for (const auto check :
+       {check_needs, check_live_camera, check_gpiod, check_backends, check_can_stage, check_falcon,
+        check_plant, check_core, check_camera, check_vision, check_failures}) {
     if (auto p = check(scene)) {
       return p;
     }

@@ -226,6 +226,7 @@ void add_backends(std::vector<Table>& t) {
   t.push_back(thing(
       "cia402", [](Scene& s) -> auto& { return s.cia402; },
       [](Scene& s) { return bound(*s.cia402, cia402::kCia402Keys); }));
+  t.push_back(thing("falcon", [](Scene& s) -> auto& { return s.falcon; }));
   t.push_back(thing("v4l2", [](Scene& s) -> auto& { return s.v4l2; }));
   t.push_back(thing("aravis", [](Scene& s) -> auto& { return s.aravis; }));
 }
@@ -394,6 +395,7 @@ const Backends& known_backends() {
     b["injector"].emplace_back(kGpiod);
     b["stage"].emplace_back(kCia402);
     b["force_sensor"].emplace_back(kCia402);
+    b["haptic"].emplace_back(kFalcon);
     return b;
   }();
   return known;

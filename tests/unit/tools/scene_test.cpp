@@ -56,8 +56,8 @@ std::string many_failures(int n) {
 
 // As a message lists them.
 const std::string kTables =
-    "scene, servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, cia402, v4l2, "
-    "aravis, watchdog, "
+    "scene, servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, cia402, falcon, "
+    "v4l2, aravis, watchdog, "
     "velocity, mapping, limits, vision, phases, local_model, membrane, cone, axis, damping, repulsive, "
     "friction, vibration, forbidden, guard, enabling, sim";
 
@@ -133,8 +133,14 @@ const std::vector<Broken>& broken() {
        "b.toml:6:11: servo.rate_hz: 3000 is not one of the choices, allowed: 1000, 2000, 4000 or 8000"},
       {"a method that is none", kLeast + "[cone]\nmethod = \"funnel\"\n",
        "b.toml:6:10: cone.method: \"funnel\" is not one of the choices, allowed: \"potential\" or \"paper\""},
-      {"a device that does not exist", "[haptic]\ndevice = \"falcon\"\n",
-       "b.toml:2:10: haptic.device: \"falcon\" is not one of the choices, allowed: \"simulated\""},
+      {"a device that does not exist", "[haptic]\ndevice = \"phantom\"\n",
+       "b.toml:2:10: haptic.device: \"phantom\" is not one of the choices, allowed: \"simulated\" or "
+       "\"falcon\""},
+      {"a Falcon that nobody holds", kLeast + "[falcon]\nfirmware = \"a.bin\"\n",
+       "b.toml:5:2: falcon: no handle uses it, allowed: with device = \"falcon\" in [haptic], or leave it "
+       "out"},
+      {"a CPU that no machine has", kLeast + "[falcon]\ncpu = 1024\n",
+       "b.toml:6:7: falcon.cpu: 1024 is out of range, allowed: a whole number from -1 to 1023"},
       {"a device misspelt", "[camera]\ndevice = \"recoded\"\n",
        "b.toml:2:10: camera.device: \"recoded\" is not one of the choices (did you mean recorded?), allowed: "
        "\"simulated\", \"recorded\", "
@@ -444,8 +450,8 @@ TEST(Scene, a_table_that_is_absent_is_a_thing_that_is_not_there) {
 // stands in a table of keys of the same file, behind the struct.
 TEST(Scene, every_member_of_the_parameters_has_a_key) {
   std::vector<fs::path> files = {"hal/live_camera.hpp",  "hal/v4l2/config.hpp",   "hal/aravis/config.hpp",
-                                 "hal/gpiod/config.hpp", "hal/cia402/config.hpp", "hal/sim/config.hpp",
-                                 "vision/config.hpp",    "tools/scene/scene.hpp"};
+                                 "hal/gpiod/config.hpp", "hal/falcon/config.hpp", "hal/cia402/config.hpp",
+                                 "hal/sim/config.hpp",   "vision/config.hpp",     "tools/scene/scene.hpp"};
   for (const char* room : {"rt/control", "rt/forces"}) {
     for (const auto& entry : fs::directory_iterator(fs::path(PUNCTUM_SOURCE_DIR) / room)) {
       if (entry.path().extension() == ".hpp") {
@@ -865,6 +871,22 @@ TEST(Scene, a_path_of_a_frame_folder_is_seen_from_the_scenes_own_folder) {
                   "/some/folder");
   ASSERT_TRUE(scene.has_value()) << scene.error();
   EXPECT_EQ(scene->recorded->frames, "/some/folder/pictures");
+}
+
+TEST(Scene, a_falcon_is_the_handle_and_its_firmware_is_seen_from_the_scenes_own_folder) {
+  const auto scene = parse_scene(
+      "[haptic]\ndevice = \"falcon\"\n[falcon]\nfirmware = \"falcon.bin\"\ncpu = 2\n[stage]\n[sim.needle]\n",
+      "s.toml", {}, "/some/folder");
+  ASSERT_TRUE(scene.has_value()) << scene.error();
+  EXPECT_EQ(scene->falcon->firmware, "/some/folder/falcon.bin");
+  EXPECT_EQ(scene->falcon->cpu, 2);
+  EXPECT_TRUE(scene->servo.real_actuators);
+  const auto again = parse_scene(to_toml(*scene), "s.toml");
+  ASSERT_TRUE(again.has_value()) << again.error();
+  EXPECT_EQ(to_toml(*again), to_toml(*scene));
+  const auto booted = parse_scene("[haptic]\ndevice = \"falcon\"\n[stage]\n[sim.needle]\n", "s.toml");
+  ASSERT_TRUE(booted.has_value()) << booted.error();
+  EXPECT_FALSE(booted->falcon.has_value());
 }
 
 class SceneFiles : public testing::Test {

@@ -149,7 +149,7 @@ TEST_F(UsbLoopback, firmware_homing_and_two_seconds_at_1_kHz_without_a_tick_that
   write_firmware(3000);
   plug_in({});
   const std::int64_t begun_ns = clock.now_ns();
-  begin();
+  ASSERT_NO_FATAL_FAILURE(begin());
   std::printf("booted with %zu words and homed after %.2f s\n",
               usb->with([](FalconEmulator& f, WatchedHand&) { return f.loaded_words(); }),
               1e-9 * static_cast<double>(clock.now_ns() - begun_ns));
@@ -177,7 +177,7 @@ TEST_F(UsbLoopback, firmware_homing_and_two_seconds_at_1_kHz_without_a_tick_that
 
 TEST_F(UsbLoopback, round_trips_of_force_and_of_encoders) {
   plug_in();
-  begin();
+  ASSERT_NO_FATAL_FAILURE(begin());
   (void)ticks_with(Status::ok, 20);
   std::vector<std::int64_t> force_ns, encoder_ns;
   for (int i = 0; i < 500; ++i) {
@@ -210,7 +210,7 @@ TEST_F(UsbLoopback, round_trips_of_force_and_of_encoders) {
 
 TEST_F(UsbLoopback, force_is_right_in_newtons_wherever_the_grip_is) {
   plug_in();
-  begin();
+  ASSERT_NO_FATAL_FAILURE(begin());
   double worst_N = 0;
   for (const Vec3& at :
        {Vec3(0, 0, 0), Vec3(0.03, 0.02, -0.02), Vec3(-0.04, 0.01, 0.02), Vec3(0, -0.04, 0.01)}) {
@@ -227,7 +227,7 @@ TEST_F(UsbLoopback, force_is_right_in_newtons_wherever_the_grip_is) {
 
 TEST_F(UsbLoopback, frames_that_are_short_corrupt_or_do_not_fit_cost_ticks_and_nothing_else) {
   plug_in();
-  begin();
+  ASSERT_NO_FATAL_FAILURE(begin());
   (void)ticks_with(Status::ok, 20);
   for (const char* fault : {"short 5", "corrupt 5", "oversized 5", "long 5", "line-error 5", "split 5"}) {
     command(fault);
@@ -249,7 +249,7 @@ TEST_F(UsbLoopback, frames_that_are_short_corrupt_or_do_not_fit_cost_ticks_and_n
 TEST_F(UsbLoopback,
        unplugged_in_the_middle_it_is_disconnected_within_ticks_and_a_deliberate_opening_brings_it_back) {
   plug_in();
-  begin();
+  ASSERT_NO_FATAL_FAILURE(begin());
   (void)ticks_with(Status::ok, 20, {0, 0, 2});
   usb->unplug();
   const int lost = until([&] { return status == Status::disconnected; }, {0, 0, 2});
@@ -262,7 +262,7 @@ TEST_F(UsbLoopback,
   EXPECT_EQ(felt(), Vec3::Zero());
   handle->safe_state();
   handle->close();
-  begin();
+  ASSERT_NO_FATAL_FAILURE(begin());
   (void)ticks_with(Status::ok, 20);
   EXPECT_EQ(felt(), Vec3::Zero()) << "the old force is forgotten";
   EXPECT_EQ(ticks_with(Status::ok, 100, {0, 0, 2}), 100);
@@ -271,7 +271,7 @@ TEST_F(UsbLoopback,
 
 TEST_F(UsbLoopback, a_falcon_that_another_program_holds_is_refused) {
   plug_in();
-  begin();
+  ASSERT_NO_FATAL_FAILURE(begin());
   FalconHandle other({}, {}, clock, falcon::libusb_link(clock));
   const auto opened = other.open();
   ASSERT_FALSE(opened);

@@ -111,9 +111,11 @@ TEST_F(FalconHandleTest, its_thread_reads_and_pushes_until_the_safe_state) {
   EXPECT_TRUE(soon([&] { return handle->write_force({0, 0, 2}) == Status::ok && pushes(); }));
   handle->safe_state();
   EXPECT_FALSE(pushes());
-  EXPECT_EQ(handle->write_force({0, 0, 2}), Status::ok);
-  std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  EXPECT_FALSE(pushes()) << "nothing but zero from then on";
+  for (int i = 0; i < 50; ++i) {
+    EXPECT_EQ(handle->write_force({0, 0, 2}), Status::ok);
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    EXPECT_FALSE(pushes()) << "nothing but zero from then on";
+  }
   handle->safe_state();
   handle->close();
   EXPECT_FALSE(usb.is_open);

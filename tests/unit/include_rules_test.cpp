@@ -93,6 +93,9 @@ std::vector<Room> house() {
       {"hal/cia402/bus_load", interfaces, kMayFail},
       {"hal/cia402/calibration", interfaces + Names{"hal/cia402/config"}, kMayFail},
       {"hal/cia402/", ground + cia402_shared, "Eigen/.*|tl/expected.hpp|sanitizer/rtsan_interface.h"},
+      {"hal/evdev/config", interfaces, kMayFail},
+      {"hal/evdev/", ground + Names{"hal/evdev/config"},
+       "Eigen/.*|tl/expected.hpp|sanitizer/rtsan_interface.h"},
       {"hal/v4l2/", ground, kMayFail},
       // The simulated backend; hal/sim/ is the bench and whatever stands beside it.
       {"hal/sim/point", ground, kMayFail},
@@ -122,17 +125,19 @@ std::vector<Room> house() {
       // Programs do not include one another.
       {"tools/shared/", ground + sim + core, kTools},
       {"tools/scene/",
-       ground + sim + core + cia402_shared + Names{"hal/gpiod/config", "vision/config", "tools/shared/"},
+       ground + sim + core + cia402_shared +
+           Names{"hal/gpiod/config", "hal/evdev/config", "vision/config", "tools/shared/"},
        kTools},
-      {"tools/core/", station + Names{"hal/gpiod/", "hal/cia402/"}, kTools},
+      {"tools/core/", station + Names{"hal/gpiod/", "hal/cia402/", "hal/evdev/"}, kTools},
       {"tools/punctum/", station, kTools},
       {"tools/vision/", pictures, kTools},
       {"tools/report/", pictures, kTools},
       {"tools/emulators/drive/", {"tools/shared/"}, kTools},
       {"tests/support/", pictures + Names{"hal/cia402/", "tools/emulators/drive/"}, kTests},
       {"tests/*",
-       pictures + Names{"hal/gpiod/config", "hal/gpiod/", "hal/cia402/", "tools/emulators/drive/",
-                        "tests/support/", "tools/core/", "tools/punctum/", "tools/vision/", "tools/report/"},
+       pictures + Names{"hal/gpiod/config", "hal/gpiod/", "hal/cia402/", "hal/evdev/config", "hal/evdev/",
+                        "tools/emulators/drive/", "tests/support/", "tools/core/", "tools/punctum/",
+                        "tools/vision/", "tools/report/"},
        kTests},
   };
 }

@@ -9,6 +9,7 @@
 
 #include "hal/cia402/cia402_stage.hpp"
 #include "hal/cia402/socket_can.hpp"
+#include "hal/evdev/evdev_hand.hpp"
 #include "hal/gpiod/gpiod_devices.hpp"
 
 namespace punctum::tools {
@@ -76,6 +77,10 @@ std::unique_ptr<hal::Device> make_cia402(const Surroundings& around, const Roles
                                                std::make_unique<cia402::SocketCan>(params.interface));
 }
 
+std::unique_ptr<hal::Device> make_evdev(const Surroundings& around, const Roles&) {
+  return std::make_unique<evdev::EvdevHand>(around.scene.evdev.value_or(evdev::EvdevParams{}), around.clock);
+}
+
 }  // namespace
 
 std::span<const Backend> backends() {
@@ -87,6 +92,7 @@ std::span<const Backend> backends() {
       Backend{kSimulated, {Role::positioner}, make_simulated_positioner},
       Backend{kGpiod, {Role::estop, Role::injector}, make_gpiod},
       Backend{kCia402, {Role::stage, Role::force_sensor}, make_cia402},
+      Backend{kEvdev, {Role::haptic}, make_evdev},
   };
   return table;
 }

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "hal/cia402/config.hpp"
+#include "hal/evdev/config.hpp"
 #include "hal/gpiod/config.hpp"
 #include "hal/parameters.hpp"
 #include "hal/sim/config.hpp"
@@ -43,6 +44,7 @@ struct DeviceNames {
 inline constexpr std::string_view kRecorded = "recorded";
 inline constexpr std::string_view kGpiod = "gpiod";
 inline constexpr std::string_view kCia402 = "cia402";
+inline constexpr std::string_view kEvdev = "evdev";
 
 struct Scene {
   std::string name;    // of the file without folder and suffix, or the built-in name
@@ -64,9 +66,14 @@ struct Scene {
   std::optional<RecordedFrames> recorded;        // camera = recorded frames
   std::optional<cia402::CanStageParams> cia402;  // stage = drives on a CAN bus
   std::optional<gpiod::GpiodParams> gpiod;       // lines of e-stop chain and injector
+  std::optional<evdev::EvdevParams> evdev;       // the hand is an input device of Linux
   std::optional<vision::VisionConfig> vision;    // absent: no vision process
 
   [[nodiscard]] bool simulated_camera() const noexcept { return sim && sim->microscope.has_value(); }
+  // A device that is neither simulated nor recorded.
+  [[nodiscard]] bool needs_hardware() const;
+  // By the core's own account; the effects are summed and shown all the same.
+  [[nodiscard]] bool hand_feels() const noexcept { return servo.device.force_max_N > 0; }
   // A task that ends by itself: cells to inject. Otherwise the run is open-ended and a time limit ends it
   // well.
   [[nodiscard]] bool has_task() const noexcept { return servo.phases.has_value() && servo.cells > 0; }

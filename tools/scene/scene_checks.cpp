@@ -130,6 +130,28 @@ Found check_gpiod(const Scene& s) {
   return std::nullopt;
 }
 
+// A hand without force.
+Found check_evdev(const Scene& s) {
+  const bool hand = s.devices.haptic == kEvdev;
+  if (!hand && s.evdev) {
+    return Problem{"evdev", "no hand uses it, allowed: with device = \"evdev\" in [haptic], or leave it out"};
+  }
+  if (hand && !s.evdev) {
+    return Problem{"haptic.device", "\"evdev\" needs [evdev] (it says which device), allowed: add [evdev]"};
+  }
+  if (hand && s.hand_feels()) {
+    return Problem{"haptic.force_max_N",
+                   fmt::format("{:g}, but mice, gamepads and knobs render no force, allowed: 0 with "
+                               "haptic.device = \"evdev\"",
+                               s.servo.device.force_max_N)};
+  }
+  if (hand && !s.evdev->path.empty() && !s.evdev->path.starts_with('/')) {
+    return Problem{"evdev.path",
+                   "is no path, allowed: an input device, such as \"/dev/input/event5\", or empty"};
+  }
+  return std::nullopt;
+}
+
 Found check_backends(const Scene& s) {
   if (s.vision && s.vision->method == vision::Method::truth && !s.simulated_camera()) {
     return Problem{"vision.method", "\"truth\" is known of a simulated camera only, allowed: \"paper\""};
@@ -499,7 +521,7 @@ Found check_limits(const rt::ServoConfig& servo) {
                    fmt::format("is not below the hard limit, allowed: below tip_force_hard_uN = {:g}",
                                um(limits.tip_force_hard_N))};
   }
-  if (limits.hand_force_N > servo.device.force_max_N) {
+  if (servo.device.force_max_N > 0 && limits.hand_force_N > servo.device.force_max_N) {
     return Problem{"limits.hand_force_N", fmt::format("is more than the device can do, allowed: at most "
                                                       "haptic.force_max_N = {:g}",
                                                       servo.device.force_max_N)};
@@ -831,8 +853,8 @@ Found check_failures(const Scene& s) {
 }  // namespace
 
 std::optional<Problem> check_together(const Scene& scene) {
-  for (const auto check : {check_needs, check_gpiod, check_backends, check_can_stage, check_plant, check_core,
-                           check_camera, check_vision, check_failures}) {
+  for (const auto check : {check_needs, check_gpiod, check_evdev, check_backends, check_can_stage,
+                           check_plant, check_core, check_camera, check_vision, check_failures}) {
     if (auto p = check(scene)) {
       return p;
     }

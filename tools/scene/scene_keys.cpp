@@ -224,6 +224,7 @@ void add_backends(std::vector<Table>& t) {
   t.push_back(thing(
       "cia402", [](Scene& s) -> auto& { return s.cia402; },
       [](Scene& s) { return bound(*s.cia402, cia402::kCia402Keys); }));
+  t.push_back(thing("evdev", [](Scene& s) -> auto& { return s.evdev; }));
 }
 
 void add_vision(std::vector<Table>& t) {
@@ -383,6 +384,7 @@ const Backends& known_backends() {
     b["injector"].emplace_back(kGpiod);
     b["stage"].emplace_back(kCia402);
     b["force_sensor"].emplace_back(kCia402);
+    b["haptic"].emplace_back(kEvdev);
     return b;
   }();
   return known;

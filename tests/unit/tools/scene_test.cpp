@@ -57,13 +57,15 @@ std::string many_failures(int n) {
 const std::vector<Broken>& broken() {
   static const std::string cone_keys = "method, K_N_m, d0_um, r0_um, alpha_rad, eps_um, ramp_s, reach_um";
   static const std::string all_tables =
-      "scene, servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, cia402, velocity, "
+      "scene, servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, cia402, evdev, "
+      "velocity, "
       "mapping, "
       "limits, "
       "vision, phases, local_model, membrane, cone, axis, damping, repulsive, friction, vibration, "
       "forbidden, guard, "
       "enabling, "
       "sim";
+  static const std::string needle = "[stage]\n[sim.needle]\nradius_um = 3.8\n";
   static const std::string gpiod_scene =
       kLeast + "[estop]\ndevice = \"gpiod\"\n[gpiod]\ncontact_a = 1\nreset = 3\n";
   static const std::string sim_tables =
@@ -135,7 +137,8 @@ const std::vector<Broken>& broken() {
       {"a method that is none", kLeast + "[cone]\nmethod = \"funnel\"\n",
        "b.toml:6:10: cone.method: \"funnel\" is not one of the choices, allowed: \"potential\" or \"paper\""},
       {"a device that does not exist", "[haptic]\ndevice = \"falcon\"\n",
-       "b.toml:2:10: haptic.device: \"falcon\" is not one of the choices, allowed: \"simulated\""},
+       "b.toml:2:10: haptic.device: \"falcon\" is not one of the choices, allowed: \"simulated\" or "
+       "\"evdev\""},
       {"a device misspelt", "[camera]\ndevice = \"recoded\"\n",
        "b.toml:2:10: camera.device: \"recoded\" is not one of the choices (did you mean recorded?), allowed: "
        "\"simulated\" or \"recorded\""},
@@ -164,6 +167,20 @@ const std::vector<Broken>& broken() {
       {"a real chain in virtual time",
        "[scene]\nclock = \"virtual\"\n" + gpiod_scene + "contact_b = 2\nheartbeat = 4\n",
        "b.toml:2:9: scene.clock: \"virtual\" cannot wait for estop.device = \"gpiod\", allowed: \"real\""},
+      {"a hand of Linux without its table", "[haptic]\ndevice = \"evdev\"\nforce_max_N = 0\n" + needle,
+       "b.toml:2:10: haptic.device: \"evdev\" needs [evdev] (it says which device), allowed: add [evdev]"},
+      {"a hand of Linux that nobody uses", kLeast + "[evdev]\n",
+       "b.toml:5:2: evdev: no hand uses it, allowed: with device = \"evdev\" in [haptic], or leave it out"},
+      {"a mouse with force", "[haptic]\ndevice = \"evdev\"\n[evdev]\n" + needle,
+       "b.toml:1:2: haptic.force_max_N: 8.5, but mice, gamepads and knobs render no force, allowed: 0 with "
+       "haptic.device = \"evdev\""},
+      {"a hand of Linux without a path",
+       "[haptic]\ndevice = \"evdev\"\nforce_max_N = 0\n[evdev]\npath = \"event5\"\n" + needle,
+       "b.toml:5:8: evdev.path: is no path, allowed: an input device, such as \"/dev/input/event5\", or "
+       "empty"},
+      {"a mouse in virtual time",
+       "[scene]\nclock = \"virtual\"\n[haptic]\ndevice = \"evdev\"\nforce_max_N = 0\n[evdev]\n" + needle,
+       "b.toml:2:9: scene.clock: \"virtual\" cannot wait for haptic.device = \"evdev\", allowed: \"real\""},
       {"two numbers for three", "[haptic]\n[stage]\n[sim.stage]\nstart_um = [90, 6]\n",
        "b.toml:4:12: sim.stage.start_um: a list is not a list of three numbers, allowed: [x, y, z], each a "
        "number "
@@ -365,7 +382,8 @@ TEST(Scene, each_broken_file_is_told_in_one_line) {
 
 TEST(Scene, every_built_in_scene_reads_back_to_the_same_numbers) {
   const auto names = builtin_names();
-  for (const char* wanted : {"icsi", "zebrafish", "outer-only", "no-holder", "free", "recorded"}) {
+  for (const char* wanted :
+       {"icsi", "zebrafish", "outer-only", "no-holder", "free", "recorded", "hands-on"}) {
     EXPECT_NE(std::find(names.begin(), names.end(), wanted), names.end()) << wanted;
   }
   for (const auto name : names) {
@@ -426,8 +444,8 @@ TEST(Scene, a_table_that_is_absent_is_a_thing_that_is_not_there) {
 // A member that no key sets would silently keep its default: of every struct of parameters, each member
 // stands in a table of keys of the same file, behind the struct.
 TEST(Scene, every_member_of_the_parameters_has_a_key) {
-  std::vector<fs::path> files = {"hal/gpiod/config.hpp", "hal/cia402/config.hpp", "hal/sim/config.hpp",
-                                 "vision/config.hpp", "tools/scene/scene.hpp"};
+  std::vector<fs::path> files = {"hal/gpiod/config.hpp", "hal/cia402/config.hpp", "hal/evdev/config.hpp",
+                                 "hal/sim/config.hpp",   "vision/config.hpp",     "tools/scene/scene.hpp"};
   for (const char* room : {"rt/control", "rt/forces"}) {
     for (const auto& entry : fs::directory_iterator(fs::path(PUNCTUM_SOURCE_DIR) / room)) {
       if (entry.path().extension() == ".hpp") {
@@ -597,7 +615,7 @@ TEST(Scene, overrides_are_read_and_checked_as_the_file_is) {
       {"sim.operator=off", "--set: sim.operator: cannot be left out, allowed: on"},
       {"operator.depth_um=25",
        "--set: operator.depth_um: unknown key (did you mean sim.operator.depth_um?), allowed: tables scene, "
-       "servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, cia402, velocity, "
+       "servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, cia402, evdev, velocity, "
        "mapping, "
        "limits, "
        "vision, "
@@ -606,7 +624,7 @@ TEST(Scene, overrides_are_read_and_checked_as_the_file_is) {
        "sim"},
       {"cell.inner.gap_um=4",
        "--set: cell.inner.gap_um: unknown key (did you mean sim.cell.inner.gap_um?), allowed: tables scene, "
-       "servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, cia402, velocity, "
+       "servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, cia402, evdev, velocity, "
        "mapping, "
        "limits, "
        "vision, "
@@ -615,7 +633,8 @@ TEST(Scene, overrides_are_read_and_checked_as_the_file_is) {
        "sim"},
       {"cell=off",
        "--set: cell: unknown table (did you mean sim.cell?), allowed: scene, servo, haptic, stage, estop, "
-       "vacuum, injector, force_sensor, camera, gpiod, cia402, velocity, mapping, limits, vision, phases, "
+       "vacuum, injector, force_sensor, camera, gpiod, cia402, evdev, velocity, mapping, limits, vision, "
+       "phases, "
        "local_model, "
        "membrane, "
        "cone, axis, damping, repulsive, friction, vibration, forbidden, guard, enabling, sim"},
@@ -740,6 +759,9 @@ TEST(Scene, the_handle_of_the_core_is_not_the_simulated_one) {
   for (const auto name : builtin_names()) {
     const auto scene = load_scene(name);
     ASSERT_TRUE(scene);
+    if (scene->devices.haptic != kSimulated) {
+      continue;
+    }
     const rt::HandDevice& believed = scene->servo.device;
     const sim::HandParams& handle = scene->sim->hand;
     EXPECT_EQ(believed.mass_kg, handle.mass_kg) << name;
@@ -858,10 +880,12 @@ class SceneFiles : public testing::Test {
 
 TEST_F(SceneFiles, what_is_no_scene_file_is_refused_in_one_line) {
   EXPECT_EQ(load_scene("icis").error(),
-            "icis: unknown scene (did you mean icsi?), allowed: free, icsi, no-holder, outer-only, recorded, "
+            "icis: unknown scene (did you mean icsi?), allowed: free, hands-on, icsi, no-holder, outer-only, "
+            "recorded, "
             "zebrafish, or a path");
   EXPECT_EQ(load_scene("/nowhere/a.toml").error(),
-            "/nowhere/a.toml: no such file, allowed: a path, or free, icsi, no-holder, outer-only, recorded, "
+            "/nowhere/a.toml: no such file, allowed: a path, or free, hands-on, icsi, no-holder, outer-only, "
+            "recorded, "
             "zebrafish");
   EXPECT_EQ(load_scene(folder_.string()).error(),
             folder_.string() + ": not a file, allowed: a scene file (TOML)");

@@ -11,6 +11,7 @@
 #include "hal/cia402/socket_can.hpp"
 #include "hal/evdev/evdev_hand.hpp"
 #include "hal/gpiod/gpiod_devices.hpp"
+#include "hal/zaber/zaber_positioner.hpp"
 
 namespace punctum::tools {
 namespace {
@@ -81,6 +82,13 @@ std::unique_ptr<hal::Device> make_evdev(const Surroundings& around, const Roles&
   return std::make_unique<evdev::EvdevHand>(around.scene.evdev.value_or(evdev::EvdevParams{}), around.clock);
 }
 
+// Nobody moves it while a run goes on: it is held so that nobody can.
+std::unique_ptr<hal::Device> make_zaber(const Surroundings& around, const Roles&) {
+  const zaber::ZaberParams& params = around.scene.zaber.value();
+  return std::make_unique<zaber::ZaberPositioner>(params, around.clock,
+                                                  std::make_unique<zaber::SerialLine>(params.port));
+}
+
 }  // namespace
 
 std::span<const Backend> backends() {
@@ -93,6 +101,7 @@ std::span<const Backend> backends() {
       Backend{kGpiod, {Role::estop, Role::injector}, make_gpiod},
       Backend{kCia402, {Role::stage, Role::force_sensor}, make_cia402},
       Backend{kEvdev, {Role::haptic}, make_evdev},
+      Backend{kZaber, {Role::positioner}, make_zaber},
   };
   return table;
 }

@@ -84,6 +84,8 @@ constexpr Saving kSavings[] = {
     {"forbidden.holder", "nothing keeps the needle from the holding pipette"},
     {"sim.dish", "the simulated dish has no floor"},
     {"cia402", "no CAN bus"},
+    {"positioner", "no slow manipulator is held"},
+    {"zaber", "no serial line"},
     {"evdev", "no input device is taken from the desktop"},
 };
 

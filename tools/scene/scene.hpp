@@ -16,6 +16,7 @@
 #include "hal/gpiod/config.hpp"
 #include "hal/parameters.hpp"
 #include "hal/sim/config.hpp"
+#include "hal/zaber/config.hpp"
 #include "rt/control/config.hpp"
 #include "vision/config.hpp"
 
@@ -45,6 +46,7 @@ inline constexpr std::string_view kRecorded = "recorded";
 inline constexpr std::string_view kGpiod = "gpiod";
 inline constexpr std::string_view kCia402 = "cia402";
 inline constexpr std::string_view kEvdev = "evdev";
+inline constexpr std::string_view kZaber = "zaber";
 
 struct Scene {
   std::string name;    // of the file without folder and suffix, or the built-in name
@@ -67,6 +69,7 @@ struct Scene {
   std::optional<cia402::CanStageParams> cia402;  // stage = drives on a CAN bus
   std::optional<gpiod::GpiodParams> gpiod;       // lines of e-stop chain and injector
   std::optional<evdev::EvdevParams> evdev;       // the hand is an input device of Linux
+  std::optional<zaber::ZaberParams> zaber;       // positioner = devices on a serial line
   std::optional<vision::VisionConfig> vision;    // absent: no vision process
 
   [[nodiscard]] bool simulated_camera() const noexcept { return sim && sim->microscope.has_value(); }

@@ -152,6 +152,45 @@ Found check_evdev(const Scene& s) {
   return std::nullopt;
 }
 
+// A positioner on a serial line.
+Found check_zaber(const Scene& s) {
+  const bool positioner = s.devices.positioner == kZaber;
+  if (!positioner && s.zaber) {
+    return Problem{
+        "zaber", "no positioner uses it, allowed: with device = \"zaber\" in [positioner], or leave it out"};
+  }
+  if (!positioner) {
+    return std::nullopt;
+  }
+  if (!s.zaber) {
+    return Problem{"positioner.device",
+                   "\"zaber\" needs to know its axes, allowed: with [zaber] and three [[zaber.axis]]"};
+  }
+  if (!s.zaber->port.starts_with('/')) {
+    return Problem{"zaber.port", "is no path, allowed: the path of a serial line, such as \"/dev/ttyUSB0\""};
+  }
+  if (s.zaber->axis_count != zaber::kAxes) {
+    return Problem{"zaber.axis",
+                   fmt::format("{} of them, allowed: three [[zaber.axis]], x, y and z in this order",
+                               s.zaber->axis_count)};
+  }
+  const auto& axes = s.zaber->axes;
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    if (axes[i].microstep_m == 0) {
+      return Problem{fmt::format("zaber.axis[{}].microstep_um", i),
+                     "moves nothing, allowed: the way of one microstep, not 0"};
+    }
+    for (std::size_t k = 0; k < i; ++k) {
+      if (axes[k].device == axes[i].device && axes[k].axis == axes[i].axis) {
+        return Problem{fmt::format("zaber.axis[{}].axis", i),
+                       fmt::format("device {} axis {} is zaber.axis[{}] already, allowed: an axis of its own",
+                                   axes[i].device, axes[i].axis, k)};
+      }
+    }
+  }
+  return std::nullopt;
+}
+
 Found check_backends(const Scene& s) {
   if (s.vision && s.vision->method == vision::Method::truth && !s.simulated_camera()) {
     return Problem{"vision.method", "\"truth\" is known of a simulated camera only, allowed: \"paper\""};
@@ -853,8 +892,9 @@ Found check_failures(const Scene& s) {
 }  // namespace
 
 std::optional<Problem> check_together(const Scene& scene) {
-  for (const auto check : {check_needs, check_gpiod, check_evdev, check_backends, check_can_stage,
-                           check_plant, check_core, check_camera, check_vision, check_failures}) {
+  for (const auto check :
+       {check_needs, check_gpiod, check_evdev, check_zaber, check_backends, check_can_stage, check_plant,
+        check_core, check_camera, check_vision, check_failures}) {
     if (auto p = check(scene)) {
       return p;
     }

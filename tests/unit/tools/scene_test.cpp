@@ -57,7 +57,8 @@ std::string many_failures(int n) {
 const std::vector<Broken>& broken() {
   static const std::string cone_keys = "method, K_N_m, d0_um, r0_um, alpha_rad, eps_um, ramp_s, reach_um";
   static const std::string all_tables =
-      "scene, servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, cia402, evdev, "
+      "scene, servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, positioner, gpiod, "
+      "cia402, evdev, zaber, "
       "velocity, "
       "mapping, "
       "limits, "
@@ -77,8 +78,8 @@ const std::vector<Broken>& broken() {
        "b.toml:1:1: haptic: the table is missing, allowed: [haptic] with device, or with any of its keys"},
       {"no stage", "[haptic]\n[sim.operator]\n",
        "b.toml:1:1: stage: the table is missing, allowed: [stage] with device, or with any of its keys"},
-      {"a table nobody knows", kLeast + "[laser]\npower = 1\n",
-       "b.toml:5:2: laser: unknown table, allowed: " + all_tables},
+      {"a table nobody knows", kLeast + "[magnet]\npower = 1\n",
+       "b.toml:5:2: magnet: unknown table, allowed: " + all_tables},
       {"a table misspelt", kLeast + "[vacum]\n",
        "b.toml:5:2: vacum: unknown table (did you mean vacuum?), allowed: " + all_tables},
       {"a table of the simulation misspelt", kLeast + "[sim.holdr]\n",
@@ -167,6 +168,23 @@ const std::vector<Broken>& broken() {
       {"a real chain in virtual time",
        "[scene]\nclock = \"virtual\"\n" + gpiod_scene + "contact_b = 2\nheartbeat = 4\n",
        "b.toml:2:9: scene.clock: \"virtual\" cannot wait for estop.device = \"gpiod\", allowed: \"real\""},
+      {"devices on a serial line without their axes", kLeast + "[positioner]\ndevice = \"zaber\"\n",
+       "b.toml:6:10: positioner.device: \"zaber\" needs to know its axes, allowed: with [zaber] and three "
+       "[[zaber.axis]]"},
+      {"a serial line that nobody uses", kLeast + "[zaber]\n",
+       "b.toml:5:2: zaber: no positioner uses it, allowed: with device = \"zaber\" in [positioner], or leave "
+       "it "
+       "out"},
+      {"two axes of three",
+       kLeast + "[positioner]\ndevice = \"zaber\"\n[zaber]\n[[zaber.axis]]\ndevice = "
+                "1\n[[zaber.axis]]\ndevice = 2\n",
+       "b.toml:7:2: zaber.axis: 2 of them, allowed: three [[zaber.axis]], x, y and z in this order"},
+      {"an axis named twice",
+       kLeast + "[positioner]\ndevice = \"zaber\"\n[zaber]\n[[zaber.axis]]\ndevice = "
+                "1\n[[zaber.axis]]\ndevice = 1\naxis "
+                "= 2\n[[zaber.axis]]\ndevice = 1\naxis = 1\n",
+       "b.toml:15:8: zaber.axis[2].axis: device 1 axis 1 is zaber.axis[0] already, allowed: an axis of its "
+       "own"},
       {"a hand of Linux without its table", "[haptic]\ndevice = \"evdev\"\nforce_max_N = 0\n" + needle,
        "b.toml:2:10: haptic.device: \"evdev\" needs [evdev] (it says which device), allowed: add [evdev]"},
       {"a hand of Linux that nobody uses", kLeast + "[evdev]\n",
@@ -445,7 +463,8 @@ TEST(Scene, a_table_that_is_absent_is_a_thing_that_is_not_there) {
 // stands in a table of keys of the same file, behind the struct.
 TEST(Scene, every_member_of_the_parameters_has_a_key) {
   std::vector<fs::path> files = {"hal/gpiod/config.hpp", "hal/cia402/config.hpp", "hal/evdev/config.hpp",
-                                 "hal/sim/config.hpp",   "vision/config.hpp",     "tools/scene/scene.hpp"};
+                                 "hal/zaber/config.hpp", "hal/sim/config.hpp",    "vision/config.hpp",
+                                 "tools/scene/scene.hpp"};
   for (const char* room : {"rt/control", "rt/forces"}) {
     for (const auto& entry : fs::directory_iterator(fs::path(PUNCTUM_SOURCE_DIR) / room)) {
       if (entry.path().extension() == ".hpp") {
@@ -476,6 +495,7 @@ TEST(Scene, every_member_of_the_parameters_has_a_key) {
                                          "SimConfig::failure_count",
                                          "SimConfig::estop_event_count",
                                          "CanStageParams::axis_count",
+                                         "ZaberParams::axis_count",
                                          "CellParams::inner",
                                          "Scene::name",
                                          "Scene::source"};
@@ -615,7 +635,8 @@ TEST(Scene, overrides_are_read_and_checked_as_the_file_is) {
       {"sim.operator=off", "--set: sim.operator: cannot be left out, allowed: on"},
       {"operator.depth_um=25",
        "--set: operator.depth_um: unknown key (did you mean sim.operator.depth_um?), allowed: tables scene, "
-       "servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, cia402, evdev, velocity, "
+       "servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, positioner, gpiod, cia402, "
+       "evdev, zaber, velocity, "
        "mapping, "
        "limits, "
        "vision, "
@@ -624,7 +645,8 @@ TEST(Scene, overrides_are_read_and_checked_as_the_file_is) {
        "sim"},
       {"cell.inner.gap_um=4",
        "--set: cell.inner.gap_um: unknown key (did you mean sim.cell.inner.gap_um?), allowed: tables scene, "
-       "servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, cia402, evdev, velocity, "
+       "servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, positioner, gpiod, cia402, "
+       "evdev, zaber, velocity, "
        "mapping, "
        "limits, "
        "vision, "
@@ -633,7 +655,8 @@ TEST(Scene, overrides_are_read_and_checked_as_the_file_is) {
        "sim"},
       {"cell=off",
        "--set: cell: unknown table (did you mean sim.cell?), allowed: scene, servo, haptic, stage, estop, "
-       "vacuum, injector, force_sensor, camera, gpiod, cia402, evdev, velocity, mapping, limits, vision, "
+       "vacuum, injector, force_sensor, camera, positioner, gpiod, cia402, evdev, zaber, velocity, mapping, "
+       "limits, vision, "
        "phases, "
        "local_model, "
        "membrane, "

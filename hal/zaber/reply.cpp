@@ -75,8 +75,9 @@ std::optional<Reply> parse_reply(std::string_view line) {
 
 std::optional<std::int64_t> number_of(std::string_view data) {
   std::int64_t value = 0;
-  const char* const end_of_data = data.data() + data.size();
-  const auto [end, error] = std::from_chars(data.data(), end_of_data, value);
+  const char* const begin = data.data();
+  const char* const end_of_data = begin + data.size();
+  const auto [end, error] = std::from_chars(begin, end_of_data, value);
   if (error != std::errc{} || (end != end_of_data && *end != '.')) {
     return std::nullopt;
   }

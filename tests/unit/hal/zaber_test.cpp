@@ -355,6 +355,13 @@ TEST_F(ZaberTest, garbage_and_lines_of_others_are_passed_over) {
   EXPECT_LT((read().position_m - truth_m()).norm(), 1e-12);
 }
 
+TEST_F(ZaberTest, an_answer_of_another_axis_or_device_counts_for_nothing) {
+  open();  // commands 1 to 9
+  line.come += "@01 2 10 OK IDLE FS 5\r\n@02 1 10 OK IDLE FS 5\r\n@01 0 10 OK IDLE FS 5\r\n";
+  EXPECT_FALSE(read().fault);
+  EXPECT_LT((read().position_m - truth_m()).norm(), 1e-12);
+}
+
 TEST_F(ZaberTest, an_answer_that_comes_late_is_not_taken_for_the_next_one) {
   open();
   ASSERT_TRUE(positioner->move_to(Vec3(20e-3, 20e-3, 20e-3)));

@@ -185,7 +185,9 @@ void DeviceInputs::take_hand(const hal::HandState& read, const LastOutput& last)
       (inject_.pressed() ? hal::kButtonInject : 0U) | (next_cell_.pressed() ? hal::kButtonNextCell : 0U);
   readings_.hand_seen = true;
   readings_.hand_age_s = hand_clock_.age_s();
-  hand_watch_.step(read.position_m, last.hand_force_N, readings_.between_hand_s);
+  // A handle without force is moved by none.
+  const hal::Vec3 felt_N = config_.device.force_max_N > 0 ? last.hand_force_N : hal::Vec3(hal::Vec3::Zero());
+  hand_watch_.step(read.position_m, felt_N, readings_.between_hand_s);
   readings_.hand_stuck = hand_watch_.stuck();
   if (readings_.hand_stuck) {
     readings_.alarms |= alarm_sensor;

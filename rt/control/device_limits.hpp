@@ -19,14 +19,14 @@ struct HandDevice {
   double mass_kg = 0.075;
   double damping_Ns_m = 0.1;
   double encoder_step_m = 0.03e-3;
-  double force_max_N = 8.5;
-  int delay_ticks = 0;  // 0 .. 5: a force acts this many ticks after it is written
+  double force_max_N = 8.5;  // 0: it renders no force; effects are summed and shown, nobody feels them
+  int delay_ticks = 0;       // 0 .. 5: a force acts this many ticks after it is written
 };
 constexpr auto keys_of(const HandDevice*) {
   return hal::keys(hal::real("mass_kg", &HandDevice::mass_kg, 0.01, 2),
                    hal::real("damping_Ns_m", &HandDevice::damping_Ns_m, 0, 20),
                    hal::milli("encoder_step_mm", &HandDevice::encoder_step_m, 1e-5, 1),
-                   hal::real("force_max_N", &HandDevice::force_max_N, 0.1, 40),
+                   hal::real("force_max_N", &HandDevice::force_max_N, 0, 40),
                    hal::whole("delay_ticks", &HandDevice::delay_ticks, 0, 5));
 }
 

@@ -153,6 +153,9 @@ std::optional<NotRenderable> find_stiffness(const ServoConfig& config) NONBLOCKI
 }  // namespace
 
 std::optional<NotRenderable> find_not_renderable(const ServoConfig& config) NONBLOCKING {
+  if (!(config.device.force_max_N > 0)) {
+    return std::nullopt;
+  }
   if (const auto found = find_damping(config)) {
     return found;
   }

@@ -37,7 +37,8 @@ struct NotRenderable {
   Spring::Of stiffest{};
 };
 
-// The first limit that is passed; none: the device can render every effect of the configuration.
+// The first limit that is passed; none: the device can render every effect of the configuration, or it is
+// one without force.
 [[nodiscard]] std::optional<NotRenderable> find_not_renderable(const ServoConfig& config) NONBLOCKING;
 
 // One step of the stage under the stiffest part of the membrane law, at the hand.

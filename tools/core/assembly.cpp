@@ -14,7 +14,9 @@
 #include "hal/falcon/falcon_handle.hpp"
 #include "hal/falcon/libusb_link.hpp"
 #endif
+#include "hal/evdev/evdev_hand.hpp"
 #include "hal/gpiod/gpiod_devices.hpp"
+#include "hal/zaber/zaber_positioner.hpp"
 
 namespace punctum::tools {
 namespace {
@@ -93,6 +95,16 @@ std::unique_ptr<hal::Device> make_falcon(const Surroundings&, const Roles&) {
   throw std::runtime_error("this punctum was built without libusb: install libusb-1.0-0-dev and build again");
 }
 #endif
+std::unique_ptr<hal::Device> make_evdev(const Surroundings& around, const Roles&) {
+  return std::make_unique<evdev::EvdevHand>(around.scene.evdev.value_or(evdev::EvdevParams{}), around.clock);
+}
+
+// Nobody moves it while a run goes on: it is held so that nobody can.
+std::unique_ptr<hal::Device> make_zaber(const Surroundings& around, const Roles&) {
+  const zaber::ZaberParams& params = around.scene.zaber.value();
+  return std::make_unique<zaber::ZaberPositioner>(params, around.clock,
+                                                  std::make_unique<zaber::SerialLine>(params.port));
+}
 
 }  // namespace
 
@@ -106,6 +118,8 @@ std::span<const Backend> backends() {
       Backend{kGpiod, {Role::estop, Role::injector}, make_gpiod},
       Backend{kCia402, {Role::stage, Role::force_sensor}, make_cia402},
       Backend{kFalcon, {Role::haptic}, make_falcon},
+      Backend{kEvdev, {Role::haptic}, make_evdev},
+      Backend{kZaber, {Role::positioner}, make_zaber},
   };
   return table;
 }

@@ -98,6 +98,9 @@ constexpr Saving kSavings[] = {
     {"v4l2", "no camera of the kernel's is opened"},
     {"aravis", "no GenICam camera is looked for, and its library is not loaded"},
     {"falcon", "no firmware is loaded into a USB handle"},
+    {"positioner", "no slow manipulator is held"},
+    {"zaber", "no serial line"},
+    {"evdev", "no input device is taken from the desktop"},
 };
 
 // An effect in one phrase; by its name alone where there is nothing more to say.
@@ -240,7 +243,9 @@ std::string tick_text(const Scene& s) {
       "  stage set-point       every {} tick ({:g} Hz), hand / {:g}, tremor filter {}", servo.stage_divisor,
       rate / servo.stage_divisor, servo.mapping.position_scale,
       servo.mapping.tremor_cutoff_Hz > 0 ? fmt::format("{:g} Hz", servo.mapping.tremor_cutoff_Hz) : "off"));
-  line(std::string("  write devices         force to the hand, stage, heartbeat") +
+  line(std::string("  write devices         ") +
+       (s.hand_feels() ? "force to the hand" : "no force (the hand is a device without; it is shown)") +
+       ", stage, heartbeat" +
        (servo.injector ? fmt::format(", injector gate (at most {:g} s)", servo.injector->max_open_s) : ""));
   line("  telemetry             one sample, no system call");
   return out;
@@ -393,7 +398,7 @@ int check(const Scene& s, std::string& text) {
     good = row(!path.empty(), program, path.empty() ? "not found beside this program nor in PATH" : path) &&
            good;
   }
-  row(true, "devices", s.servo.real_actuators ? backends(s) : "all simulated: no actuator is there to touch");
+  row(true, "devices", backends(s) + (s.servo.real_actuators ? "" : ": no actuator is there to touch"));
   if (s.recorded || s.v4l2 || (s.vision && s.vision->holder && !s.vision->holder->template_path.empty())) {
     const auto files = files_of(s);
     good = row(files.has_value(), "files", files ? *files : files.error()) && good;

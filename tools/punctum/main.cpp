@@ -4,12 +4,14 @@
 #include <CLI/CLI.hpp>
 #include <cstdlib>
 #include <exception>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "tools/punctum/explain.hpp"
 #include "tools/punctum/lab_report.hpp"
+#include "tools/punctum/positioning.hpp"
 #include "tools/punctum/supervisor.hpp"
 #include "tools/punctum/terminal.hpp"
 #include "tools/scene/scene.hpp"
@@ -93,6 +95,18 @@ int main_or_throw(int argc, char** argv) {
       app.add_subcommand("check", "validate a scene, devices and permissions; touches no actuator");
   common(checking);
 
+  CLI::App* moving = app.add_subcommand(
+      "move", "move the slow manipulator of a scene to a point, or park it; not while a run goes on");
+  common(moving);
+  std::vector<double> to_um;
+  bool parks = false;
+  auto* const to = moving->add_option("--to", to_um, "in micrometres, in the manipulator's own frame")
+                       ->type_name("X,Y,Z")
+                       ->delimiter(',')
+                       ->expected(3);
+  auto* const park = moving->add_flag("--park", parks, "to zaber.park_um of the scene");
+  to->excludes(park);
+
   CLI::App* reporting = app.add_subcommand(
       "report", "make report.html again, after a crash report.json too; of several runs also compare them");
   std::vector<std::string> folders;
@@ -111,6 +125,12 @@ int main_or_throw(int argc, char** argv) {
   checking->footer(
       help_footer({{"punctum check my.toml", "before the first run on a machine"}},
                   {{exit_done, "it can run"}, {exit_bad_input, "it cannot; the text says why"}}));
+  moving->footer(help_footer({{"punctum move my.toml --to 1000,2500,-300", "it says when it is there"},
+                              {"punctum move my.toml --park", "out of the way"}},
+                             {{exit_done, "it is there"},
+                              {exit_not_done, "stopped on the way, by control-C"},
+                              {exit_bad_input, "bad input: nothing has moved"},
+                              {exit_fault, "the manipulator has a fault"}}));
   reporting->footer(
       help_footer({{"punctum report reports/icsi-20260101-120000", "after a crash, or from an older version"},
                    {"punctum report reports/icsi-*", "all of them, compared in a table with figures"}},
@@ -160,6 +180,15 @@ int main_or_throw(int argc, char** argv) {
     const int code = check(*scene, text);
     Terminal().print(text);
     return code == exit_done && !all_was_said() ? exit_not_done : code;
+  }
+  if (*moving) {
+    if (to_um.empty() && !parks) {
+      return bad("punctum move: where to? Allowed: --to X,Y,Z or --park");
+    }
+    return move_positioner(*scene, to_um.empty()
+                                       ? std::nullopt
+                                       : std::optional<punctum::hal::Vec3>(
+                                             punctum::hal::Vec3(to_um[0], to_um[1], to_um[2]) * 1e-6));
   }
   if (const auto files = files_of(*scene); !files) {
     return bad(files.error());

@@ -85,6 +85,32 @@ Part vision_part(const Scene& scene, const rt::TelemetrySample& newest) {
   return part(scene.vision ? "vision ok" : "", 3, Colour::good);
 }
 
+// For somebody who does it for the first time: what to do now. Empty where the hand is simulated.
+const char* next_step(const Scene& scene, const rt::TelemetrySample& newest) {
+  if (scene.devices.haptic == kSimulated || !scene.servo.phases || newest.stop != rt::StopStage::running) {
+    return "";
+  }
+  if ((newest.alarms & rt::alarm_not_enabled) != 0) {
+    return "hold enable";
+  }
+  switch (newest.phase) {
+    case rt::Phase::free:
+    case rt::Phase::contact:
+      return "to the cell";
+    case rt::Phase::indentation:
+      return "push on";
+    case rt::Phase::puncture:
+      return (newest.alarms & rt::alarm_injection_refused) != 0 ? "deeper" : "press inject";
+    case rt::Phase::injection:
+      return newest.injector_open != 0 ? "hold inject" : "draw back";
+    case rt::Phase::withdrawal:
+      return "draw back";
+    case rt::Phase::clear:
+      break;
+  }
+  return "";
+}
+
 // Columns on a terminal: colours take none, a letter of UTF-8 takes one.
 std::size_t width_of(std::string_view text) {
   std::size_t width = 0;
@@ -211,6 +237,9 @@ std::string progress_line(const Scene& scene, const rt::TelemetrySample& newest,
   parts.push_back(part(fmt::format("{:<11}", rt::name(newest.phase)), 10));
   parts.push_back(bar(most_N > 0 ? hand_N / most_N : 0, style.blocks));
   parts.push_back(part(fmt::format("{:4.2f} N", hand_N), 8));
+  if (const char* const next = next_step(scene, newest); *next != '\0') {
+    parts.push_back(part(fmt::format("> {:<15}", next), 9, Colour::good));
+  }
   if (scene.servo.membrane) {
     parts.push_back(part(fmt::format("depth {:5.1f} um", newest.wd_m * 1e6), 7));
     parts.push_back(part(fmt::format("needle {:5.1f} uN", newest.tip_force_N * 1e6), 2));

@@ -412,8 +412,8 @@ std::vector<SceneCost> measure_scenes(const Job& job) {
     if (!scene) {
       throw std::runtime_error(scene.error());
     }
-    if (scene->vision && !vision_is_there()) {
-      continue;  // built without OpenCV
+    if (scene->needs_hardware() || (scene->vision && !vision_is_there())) {
+      continue;  // not in virtual time; built without OpenCV
     }
     costs.push_back({.scene = std::move(*scene)});
   }

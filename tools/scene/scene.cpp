@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cctype>
 #include <filesystem>
 #include <fstream>
@@ -52,7 +53,8 @@ tl::expected<void, std::string> read_overrides(SceneReader& reader,
 // Numbers that only follow from others.
 void settle(Scene& s) {
   const auto real = [](const std::string& backend) { return !backend.empty() && backend != kSimulated; };
-  s.servo.real_actuators = real(s.devices.haptic) || real(s.devices.stage) || real(s.devices.injector);
+  s.servo.real_actuators =
+      (real(s.devices.haptic) && s.hand_feels()) || real(s.devices.stage) || real(s.devices.injector);
   s.servo.vision = s.vision.has_value();
   if (s.sim) {
     s.sim->seed = s.seed;
@@ -156,6 +158,14 @@ tl::expected<Scene, std::string> parse_scene(std::string_view text, std::string_
   scene.name = fs::path(source).stem().string();
   scene.source = source;
   return read_all(std::move(scene), text, printable(source, 200), overrides, fs::path(folder), backends);
+}
+
+bool Scene::needs_hardware() const {
+  const auto& all = scene_devices();
+  return std::any_of(all.begin(), all.end(), [this](const NamedDevice& d) {
+    const std::string& backend = devices.*d.backend;
+    return !backend.empty() && backend != kSimulated && backend != kRecorded;
+  });
 }
 
 tl::expected<Scene, std::string> load_scene(std::string_view name_or_path,

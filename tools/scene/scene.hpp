@@ -13,12 +13,14 @@
 
 #include "hal/aravis/config.hpp"
 #include "hal/cia402/config.hpp"
+#include "hal/evdev/config.hpp"
 #include "hal/falcon/config.hpp"
 #include "hal/gpiod/config.hpp"
 #include "hal/live_camera.hpp"
 #include "hal/parameters.hpp"
 #include "hal/sim/config.hpp"
 #include "hal/v4l2/config.hpp"
+#include "hal/zaber/config.hpp"
 #include "rt/control/config.hpp"
 #include "vision/config.hpp"
 
@@ -60,6 +62,8 @@ inline constexpr std::string_view kCia402 = "cia402";
 inline constexpr std::string_view kV4l2 = "v4l2";
 inline constexpr std::string_view kAravis = "aravis";
 inline constexpr std::string_view kFalcon = "falcon";
+inline constexpr std::string_view kEvdev = "evdev";
+inline constexpr std::string_view kZaber = "zaber";
 
 struct Scene {
   std::string name;    // of the file without folder and suffix, or the built-in name
@@ -86,9 +90,15 @@ struct Scene {
   std::optional<v4l2::V4l2Params> v4l2;
   std::optional<aravis::AravisParams> aravis;
   std::optional<falcon::FalconParams> falcon;  // haptic = a Novint Falcon
+  std::optional<evdev::EvdevParams> evdev;     // the hand is an input device of Linux
+  std::optional<zaber::ZaberParams> zaber;     // positioner = devices on a serial line
   std::optional<vision::VisionConfig> vision;  // absent: no vision process
 
   [[nodiscard]] bool simulated_camera() const noexcept { return sim && sim->microscope.has_value(); }
+  // A device that is neither simulated nor recorded.
+  [[nodiscard]] bool needs_hardware() const;
+  // By the core's own account; the effects are summed and shown all the same.
+  [[nodiscard]] bool hand_feels() const noexcept { return servo.device.force_max_N > 0; }
   // A task that ends by itself: cells to inject. Otherwise the run is open-ended and a time limit ends it
   // well.
   [[nodiscard]] bool has_task() const noexcept { return servo.phases.has_value() && servo.cells > 0; }

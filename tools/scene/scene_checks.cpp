@@ -172,6 +172,67 @@ Found check_falcon(const Scene& s) {
   return std::nullopt;
 }
 
+// A hand without force.
+Found check_evdev(const Scene& s) {
+  const bool hand = s.devices.haptic == kEvdev;
+  if (!hand && s.evdev) {
+    return Problem{"evdev", "no hand uses it, allowed: with device = \"evdev\" in [haptic], or leave it out"};
+  }
+  if (hand && !s.evdev) {
+    return Problem{"haptic.device", "\"evdev\" needs [evdev] (it says which device), allowed: add [evdev]"};
+  }
+  if (hand && s.hand_feels()) {
+    return Problem{"haptic.force_max_N",
+                   fmt::format("{:g}, but mice, gamepads and knobs render no force, allowed: 0 with "
+                               "haptic.device = \"evdev\"",
+                               s.servo.device.force_max_N)};
+  }
+  if (hand && !s.evdev->path.empty() && !s.evdev->path.starts_with('/')) {
+    return Problem{"evdev.path",
+                   "is no path, allowed: an input device, such as \"/dev/input/event5\", or empty"};
+  }
+  return std::nullopt;
+}
+
+// A positioner on a serial line.
+Found check_zaber(const Scene& s) {
+  const bool positioner = s.devices.positioner == kZaber;
+  if (!positioner && s.zaber) {
+    return Problem{
+        "zaber", "no positioner uses it, allowed: with device = \"zaber\" in [positioner], or leave it out"};
+  }
+  if (!positioner) {
+    return std::nullopt;
+  }
+  if (!s.zaber) {
+    return Problem{"positioner.device",
+                   "\"zaber\" needs to know its axes, allowed: with [zaber] and three [[zaber.axis]]"};
+  }
+  if (!s.zaber->port.starts_with('/')) {
+    return Problem{"zaber.port", "is no path, allowed: the path of a serial line, such as \"/dev/ttyUSB0\""};
+  }
+  if (s.zaber->axis_count != zaber::kAxes) {
+    return Problem{"zaber.axis",
+                   fmt::format("{} of them, allowed: three [[zaber.axis]], x, y and z in this order",
+                               s.zaber->axis_count)};
+  }
+  const auto& axes = s.zaber->axes;
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    if (axes[i].microstep_m == 0) {
+      return Problem{fmt::format("zaber.axis[{}].microstep_um", i),
+                     "moves nothing, allowed: the way of one microstep, not 0"};
+    }
+    for (std::size_t k = 0; k < i; ++k) {
+      if (axes[k].device == axes[i].device && axes[k].axis == axes[i].axis) {
+        return Problem{fmt::format("zaber.axis[{}].axis", i),
+                       fmt::format("device {} axis {} is zaber.axis[{}] already, allowed: an axis of its own",
+                                   axes[i].device, axes[i].axis, k)};
+      }
+    }
+  }
+  return std::nullopt;
+}
+
 Found check_backends(const Scene& s) {
   if (s.vision && s.vision->method == vision::Method::truth && !s.simulated_camera()) {
     return Problem{"vision.method", "\"truth\" is known of a simulated camera only, allowed: \"paper\""};
@@ -541,7 +602,7 @@ Found check_limits(const rt::ServoConfig& servo) {
                    fmt::format("is not below the hard limit, allowed: below tip_force_hard_uN = {:g}",
                                um(limits.tip_force_hard_N))};
   }
-  if (limits.hand_force_N > servo.device.force_max_N) {
+  if (servo.device.force_max_N > 0 && limits.hand_force_N > servo.device.force_max_N) {
     return Problem{"limits.hand_force_N", fmt::format("is more than the device can do, allowed: at most "
                                                       "haptic.force_max_N = {:g}",
                                                       servo.device.force_max_N)};
@@ -878,7 +939,7 @@ Found check_failures(const Scene& s) {
 std::optional<Problem> check_together(const Scene& scene) {
   for (const auto check :
        {check_needs, check_live_camera, check_gpiod, check_backends, check_can_stage, check_falcon,
-        check_plant, check_core, check_camera, check_vision, check_failures}) {
+        check_evdev, check_zaber, check_plant, check_core, check_camera, check_vision, check_failures}) {
     if (auto p = check(scene)) {
       return p;
     }

@@ -219,6 +219,9 @@ void add_devices(std::vector<Table>& t) {
                : s.simulated_camera() ? bound(*s.sim->microscope, sim::kCameraKeys)
                                       : KeyList{};
       }));
+  t.push_back(device(
+      "positioner", Kind::thing, &DeviceNames::positioner, [](Scene&, bool) {},
+      [](Scene&) { return KeyList{}; }));
 }
 
 void add_backends(std::vector<Table>& t) {
@@ -226,6 +229,10 @@ void add_backends(std::vector<Table>& t) {
   t.push_back(thing(
       "cia402", [](Scene& s) -> auto& { return s.cia402; },
       [](Scene& s) { return bound(*s.cia402, cia402::kCia402Keys); }));
+  t.push_back(thing("evdev", [](Scene& s) -> auto& { return s.evdev; }));
+  t.push_back(thing(
+      "zaber", [](Scene& s) -> auto& { return s.zaber; },
+      [](Scene& s) { return bound(*s.zaber, zaber::kZaberKeys); }));
   t.push_back(thing("falcon", [](Scene& s) -> auto& { return s.falcon; }));
   t.push_back(thing("v4l2", [](Scene& s) -> auto& { return s.v4l2; }));
   t.push_back(thing("aravis", [](Scene& s) -> auto& { return s.aravis; }));
@@ -365,7 +372,13 @@ std::vector<List> make_lists() {
            [](Scene& s) -> int& { return s.cia402->axis_count; },
            [](Scene& s, int i) { return bound(s.cia402->axes[static_cast<std::size_t>(i)]); },
            {},
-           [](const Scene& s) { return s.cia402.has_value(); }}};
+           [](const Scene& s) { return s.cia402.has_value(); }},
+          {"zaber.axis",
+           zaber::kAxes,
+           [](Scene& s) -> int& { return s.zaber->axis_count; },
+           [](Scene& s, int i) { return bound(s.zaber->axes[static_cast<std::size_t>(i)]); },
+           {},
+           [](const Scene& s) { return s.zaber.has_value(); }}};
 }
 
 std::string words(std::vector<std::string> names, bool quoted) {
@@ -396,6 +409,8 @@ const Backends& known_backends() {
     b["stage"].emplace_back(kCia402);
     b["force_sensor"].emplace_back(kCia402);
     b["haptic"].emplace_back(kFalcon);
+    b["haptic"].emplace_back(kEvdev);
+    b["positioner"].emplace_back(kZaber);
     return b;
   }();
   return known;
@@ -406,7 +421,7 @@ const std::vector<NamedDevice>& scene_devices() {
       {"haptic", &DeviceNames::haptic}, {"stage", &DeviceNames::stage},
       {"estop", &DeviceNames::estop},   {"injector", &DeviceNames::injector},
       {"vacuum", &DeviceNames::vacuum}, {"force_sensor", &DeviceNames::force_sensor},
-      {"camera", &DeviceNames::camera}};
+      {"camera", &DeviceNames::camera}, {"positioner", &DeviceNames::positioner}};
   return list;
 }
 

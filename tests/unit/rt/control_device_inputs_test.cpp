@@ -65,6 +65,20 @@ TEST(DeviceInputs, passes_good_values_on_without_fault_or_alarm) {
   EXPECT_NEAR(r.vacuum_Pa, 600, 0.1 + 1e-9);
 }
 
+TEST(DeviceInputs, a_hand_that_rests_under_a_changing_force_hangs_unless_it_feels_none) {
+  for (const double force_max_N : {8.5, 0.0}) {
+    ServoConfig config = Inputs::all_devices();
+    config.device.force_max_N = force_max_N;
+    Inputs in(config);
+    in.settle();
+    for (int k = 0; k < 300; ++k) {
+      in.last.hand_force_N = Vec3(0.01 * k, 0, 0);
+      (void)in.read();
+    }
+    EXPECT_EQ(in.inputs.readings().hand_stuck, force_max_N > 0);
+  }
+}
+
 TEST(DeviceInputs, keeps_the_last_good_value_of_a_silent_device_until_its_time_is_over) {
   Inputs in;
   in.hand.x = Vec3(0.03, 0, 0);

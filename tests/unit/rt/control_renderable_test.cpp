@@ -31,6 +31,15 @@ NotRenderable refused(const ServoConfig& config, What what, double asked) {
 
 TEST(Renderable, a_bare_handle_can_render_nothing_wrong) { EXPECT_FALSE(find_not_renderable(bare())); }
 
+TEST(Renderable, a_handle_without_force_is_asked_for_nothing) {
+  ServoConfig config = bare();
+  config.damping = DampingParams{.B1_Ns_m = 18, .B2_Ns_m = 18};
+  config.friction = FrictionParams{.F_c_N = 0.1, .K_N_m = 1e5};
+  ASSERT_TRUE(find_not_renderable(config));
+  config.device.force_max_N = 0;
+  EXPECT_FALSE(find_not_renderable(config));
+}
+
 TEST(Renderable, damping_above_the_stable_limit_is_found_with_the_limit) {
   ServoConfig config = bare();
   config.damping = DampingParams{.B1_Ns_m = 17.3, .B2_Ns_m = 17.3};

@@ -492,6 +492,28 @@ TEST_F(LiveLine, says_phase_force_depth_vision_and_what_time_is_left) {
   EXPECT_FALSE(contains(s, "\033")) << s;
 }
 
+TEST_F(LiveLine, tells_a_persons_own_hand_what_to_do_next) {
+  EXPECT_FALSE(contains(line({}), ">")) << line({});
+  scene = *load_scene("hands-on");
+  const auto says = [this](rt::Phase phase, std::uint32_t alarms, const std::string& next) {
+    sample.phase = phase;
+    sample.alarms = alarms;
+    EXPECT_TRUE(contains(line({}), "> " + next)) << line({});
+    EXPECT_TRUE(contains(line({.columns = 80}), "> " + next)) << line({.columns = 80});
+  };
+  says(rt::Phase::free, rt::alarm_not_enabled, "hold enable");
+  says(rt::Phase::free, 0, "to the cell");
+  says(rt::Phase::indentation, 0, "push on");
+  says(rt::Phase::puncture, 0, "press inject");
+  says(rt::Phase::puncture, rt::alarm_injection_refused, "deeper");
+  says(rt::Phase::injection, 0, "draw back");
+  sample.injector_open = 1;
+  says(rt::Phase::injection, 0, "hold inject");
+  says(rt::Phase::withdrawal, 0, "draw back");
+  sample.stop = rt::StopStage::stopped;
+  EXPECT_FALSE(contains(line({}), ">")) << line({});
+}
+
 TEST_F(LiveLine, a_fault_and_stale_vision_stand_out_and_survive_a_narrow_terminal) {
   sample.fault = rt::Fault::tip_force;
   sample.alarms = rt::alarm_vision_stale;

@@ -56,13 +56,14 @@ std::string many_failures(int n) {
 
 // As a message lists them.
 const std::string kTables =
-    "scene, servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, gpiod, cia402, falcon, "
-    "v4l2, aravis, watchdog, "
+    "scene, servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, positioner, gpiod, cia402, "
+    "evdev, zaber, falcon, v4l2, aravis, watchdog, "
     "velocity, mapping, limits, vision, phases, local_model, membrane, cone, axis, damping, repulsive, "
     "friction, vibration, forbidden, guard, enabling, sim";
 
 const std::vector<Broken>& broken() {
   static const std::string cone_keys = "method, K_N_m, d0_um, r0_um, alpha_rad, eps_um, ramp_s, reach_um";
+  static const std::string needle = "[stage]\n[sim.needle]\nradius_um = 3.8\n";
   static const std::string gpiod_scene =
       kLeast + "[estop]\ndevice = \"gpiod\"\n[gpiod]\ncontact_a = 1\nreset = 3\n";
   static const std::string sim_tables =
@@ -74,8 +75,8 @@ const std::vector<Broken>& broken() {
        "b.toml:1:1: haptic: the table is missing, allowed: [haptic] with device, or with any of its keys"},
       {"no stage", "[haptic]\n[sim.operator]\n",
        "b.toml:1:1: stage: the table is missing, allowed: [stage] with device, or with any of its keys"},
-      {"a table nobody knows", kLeast + "[laser]\npower = 1\n",
-       "b.toml:5:2: laser: unknown table, allowed: " + kTables},
+      {"a table nobody knows", kLeast + "[magnet]\npower = 1\n",
+       "b.toml:5:2: magnet: unknown table, allowed: " + kTables},
       {"a table misspelt", kLeast + "[vacum]\n",
        "b.toml:5:2: vacum: unknown table (did you mean vacuum?), allowed: " + kTables},
       {"a table of the simulation misspelt", kLeast + "[sim.holdr]\n",
@@ -134,8 +135,8 @@ const std::vector<Broken>& broken() {
       {"a method that is none", kLeast + "[cone]\nmethod = \"funnel\"\n",
        "b.toml:6:10: cone.method: \"funnel\" is not one of the choices, allowed: \"potential\" or \"paper\""},
       {"a device that does not exist", "[haptic]\ndevice = \"phantom\"\n",
-       "b.toml:2:10: haptic.device: \"phantom\" is not one of the choices, allowed: \"simulated\" or "
-       "\"falcon\""},
+       "b.toml:2:10: haptic.device: \"phantom\" is not one of the choices, allowed: \"simulated\", "
+       "\"falcon\" or \"evdev\""},
       {"a Falcon that nobody holds", kLeast + "[falcon]\nfirmware = \"a.bin\"\n",
        "b.toml:5:2: falcon: no handle uses it, allowed: with device = \"falcon\" in [haptic], or leave it "
        "out"},
@@ -170,6 +171,37 @@ const std::vector<Broken>& broken() {
       {"a real chain in virtual time",
        "[scene]\nclock = \"virtual\"\n" + gpiod_scene + "contact_b = 2\nheartbeat = 4\n",
        "b.toml:2:9: scene.clock: \"virtual\" cannot wait for estop.device = \"gpiod\", allowed: \"real\""},
+      {"devices on a serial line without their axes", kLeast + "[positioner]\ndevice = \"zaber\"\n",
+       "b.toml:6:10: positioner.device: \"zaber\" needs to know its axes, allowed: with [zaber] and three "
+       "[[zaber.axis]]"},
+      {"a serial line that nobody uses", kLeast + "[zaber]\n",
+       "b.toml:5:2: zaber: no positioner uses it, allowed: with device = \"zaber\" in [positioner], or leave "
+       "it "
+       "out"},
+      {"two axes of three",
+       kLeast + "[positioner]\ndevice = \"zaber\"\n[zaber]\n[[zaber.axis]]\ndevice = "
+                "1\n[[zaber.axis]]\ndevice = 2\n",
+       "b.toml:7:2: zaber.axis: 2 of them, allowed: three [[zaber.axis]], x, y and z in this order"},
+      {"an axis named twice",
+       kLeast + "[positioner]\ndevice = \"zaber\"\n[zaber]\n[[zaber.axis]]\ndevice = "
+                "1\n[[zaber.axis]]\ndevice = 1\naxis "
+                "= 2\n[[zaber.axis]]\ndevice = 1\naxis = 1\n",
+       "b.toml:15:8: zaber.axis[2].axis: device 1 axis 1 is zaber.axis[0] already, allowed: an axis of its "
+       "own"},
+      {"a hand of Linux without its table", "[haptic]\ndevice = \"evdev\"\nforce_max_N = 0\n" + needle,
+       "b.toml:2:10: haptic.device: \"evdev\" needs [evdev] (it says which device), allowed: add [evdev]"},
+      {"a hand of Linux that nobody uses", kLeast + "[evdev]\n",
+       "b.toml:5:2: evdev: no hand uses it, allowed: with device = \"evdev\" in [haptic], or leave it out"},
+      {"a mouse with force", "[haptic]\ndevice = \"evdev\"\n[evdev]\n" + needle,
+       "b.toml:1:2: haptic.force_max_N: 8.5, but mice, gamepads and knobs render no force, allowed: 0 with "
+       "haptic.device = \"evdev\""},
+      {"a hand of Linux without a path",
+       "[haptic]\ndevice = \"evdev\"\nforce_max_N = 0\n[evdev]\npath = \"event5\"\n" + needle,
+       "b.toml:5:8: evdev.path: is no path, allowed: an input device, such as \"/dev/input/event5\", or "
+       "empty"},
+      {"a mouse in virtual time",
+       "[scene]\nclock = \"virtual\"\n[haptic]\ndevice = \"evdev\"\nforce_max_N = 0\n[evdev]\n" + needle,
+       "b.toml:2:9: scene.clock: \"virtual\" cannot wait for haptic.device = \"evdev\", allowed: \"real\""},
       {"two numbers for three", "[haptic]\n[stage]\n[sim.stage]\nstart_um = [90, 6]\n",
        "b.toml:4:12: sim.stage.start_um: a list is not a list of three numbers, allowed: [x, y, z], each a "
        "number "
@@ -388,7 +420,8 @@ TEST(Scene, each_broken_file_is_told_in_one_line) {
 
 TEST(Scene, every_built_in_scene_reads_back_to_the_same_numbers) {
   const auto names = builtin_names();
-  for (const char* wanted : {"icsi", "zebrafish", "outer-only", "no-holder", "free", "recorded"}) {
+  for (const char* wanted :
+       {"icsi", "zebrafish", "outer-only", "no-holder", "free", "recorded", "hands-on"}) {
     EXPECT_NE(std::find(names.begin(), names.end(), wanted), names.end()) << wanted;
   }
   for (const auto name : names) {
@@ -451,7 +484,8 @@ TEST(Scene, a_table_that_is_absent_is_a_thing_that_is_not_there) {
 TEST(Scene, every_member_of_the_parameters_has_a_key) {
   std::vector<fs::path> files = {"hal/live_camera.hpp",  "hal/v4l2/config.hpp",   "hal/aravis/config.hpp",
                                  "hal/gpiod/config.hpp", "hal/falcon/config.hpp", "hal/cia402/config.hpp",
-                                 "hal/sim/config.hpp",   "vision/config.hpp",     "tools/scene/scene.hpp"};
+                                 "hal/evdev/config.hpp", "hal/zaber/config.hpp",  "hal/sim/config.hpp",
+                                 "vision/config.hpp",    "tools/scene/scene.hpp"};
   for (const char* room : {"rt/control", "rt/forces"}) {
     for (const auto& entry : fs::directory_iterator(fs::path(PUNCTUM_SOURCE_DIR) / room)) {
       if (entry.path().extension() == ".hpp") {
@@ -482,6 +516,7 @@ TEST(Scene, every_member_of_the_parameters_has_a_key) {
                                          "SimConfig::failure_count",
                                          "SimConfig::estop_event_count",
                                          "CanStageParams::axis_count",
+                                         "ZaberParams::axis_count",
                                          "CellParams::inner",
                                          "Scene::name",
                                          "Scene::source"};
@@ -768,6 +803,9 @@ TEST(Scene, the_handle_of_the_core_is_not_the_simulated_one) {
   for (const auto name : builtin_names()) {
     const auto scene = load_scene(name);
     ASSERT_TRUE(scene);
+    if (scene->devices.haptic != kSimulated) {
+      continue;
+    }
     const rt::HandDevice& believed = scene->servo.device;
     const sim::HandParams& handle = scene->sim->hand;
     EXPECT_EQ(believed.mass_kg, handle.mass_kg) << name;
@@ -902,10 +940,12 @@ class SceneFiles : public testing::Test {
 
 TEST_F(SceneFiles, what_is_no_scene_file_is_refused_in_one_line) {
   EXPECT_EQ(load_scene("icis").error(),
-            "icis: unknown scene (did you mean icsi?), allowed: free, icsi, no-holder, outer-only, recorded, "
+            "icis: unknown scene (did you mean icsi?), allowed: free, hands-on, icsi, no-holder, outer-only, "
+            "recorded, "
             "zebrafish, or a path");
   EXPECT_EQ(load_scene("/nowhere/a.toml").error(),
-            "/nowhere/a.toml: no such file, allowed: a path, or free, icsi, no-holder, outer-only, recorded, "
+            "/nowhere/a.toml: no such file, allowed: a path, or free, hands-on, icsi, no-holder, outer-only, "
+            "recorded, "
             "zebrafish");
   EXPECT_EQ(load_scene(folder_.string()).error(),
             folder_.string() + ": not a file, allowed: a scene file (TOML)");

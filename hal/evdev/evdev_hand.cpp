@@ -1,0 +1,268 @@
+#include "hal/evdev/evdev_hand.hpp"
+
+#include <dirent.h>
+#include <fcntl.h>
+#include <grp.h>
+#include <sys/ioctl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <ctime>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#if defined(__has_feature)
+#if __has_feature(realtime_sanitizer)
+#include <sanitizer/rtsan_interface.h>
+#define PUNCTUM_REVIEWED const __rtsan::ScopedDisabler reviewed
+#endif
+#endif
+#ifndef PUNCTUM_REVIEWED
+#define PUNCTUM_REVIEWED static_cast<void>(0)
+#endif
+
+namespace punctum::evdev {
+namespace {
+
+using hal::Status;
+using Unexpected = tl::unexpected<std::string>;
+
+constexpr const char* kFolder = "/dev/input";
+constexpr int kRounds = 4;  // of kAtOnce events in one reading; more wait for the next
+
+// The system calls of the tick. A descriptor with O_NONBLOCK never waits for events. The two ioctls, after
+// events were lost, take the device's mutex, which the kernel holds for no longer than such an ioctl.
+#if defined(__clang__)
+#pragma clang diagnostic push
+#pragma clang diagnostic ignored "-Wunknown-warning-option"
+#pragma clang diagnostic ignored "-Wfunction-effects"
+#endif
+ssize_t read_now(int file, input_event* events, std::size_t count) NONBLOCKING {
+  PUNCTUM_REVIEWED;
+  return ::read(file, events, count * sizeof(input_event));
+}
+bool ask_for_keys(int file, Keys& held) NONBLOCKING {
+  PUNCTUM_REVIEWED;
+  return ioctl(file, EVIOCGKEY(sizeof(held.bits)), held.bits.data()) >= 0;
+}
+bool ask_for_axis(int file, std::uint16_t code, input_absinfo& info) NONBLOCKING {
+  PUNCTUM_REVIEWED;
+  return ioctl(file, EVIOCGABS(code), &info) >= 0;
+}
+int why() NONBLOCKING { return errno; }
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#endif
+
+Status status_of(int error) NONBLOCKING { return error == ENODEV ? Status::disconnected : Status::fault; }
+
+std::string text_of(int error) { return std::generic_category().message(error); }
+
+// What an opened device is.
+struct Identity {
+  std::string name;
+  const Layout* layout = nullptr;  // null: none that can be a hand
+};
+
+Identity identify(int file) {
+  Identity found;
+  std::array<char, 256> name{};
+  if (ioctl(file, EVIOCGNAME(name.size() - 1), name.data()) >= 0) {
+    found.name = name.data();
+  }
+  Abilities abilities;
+  const auto fill = [file](unsigned type, auto& codes) {
+    return ioctl(file, EVIOCGBIT(type, sizeof(codes.bits)), codes.bits.data()) >= 0;
+  };
+  if (fill(EV_KEY, abilities.keys) && fill(EV_REL, abilities.relative) && fill(EV_ABS, abilities.absolute)) {
+    found.layout = layout_of(abilities);
+  }
+  return found;
+}
+
+int open_file(const std::string& path) { return ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC); }
+
+// What a user who may not open it has to do.
+std::string not_allowed(const std::string& path) {
+  struct stat info{};
+  const group* owner = stat(path.c_str(), &info) == 0 ? getgrgid(info.st_gid) : nullptr;
+  const std::string name = owner != nullptr && info.st_gid != 0 ? owner->gr_name : "input";
+  return path + ": this user may not read it: sudo usermod -aG " + name + " $USER, and log in again";
+}
+
+std::string refusal(const std::string& path, int error) {
+  if (error == EACCES || error == EPERM) {
+    return not_allowed(path);
+  }
+  return path + ": " + text_of(error) +
+         ", allowed for evdev.path: an input device (/proc/bus/input/devices lists them)";
+}
+
+std::vector<std::string> input_devices() {
+  std::vector<std::string> paths;
+  if (DIR* folder = opendir(kFolder)) {
+    while (const dirent* entry = readdir(folder)) {
+      if (const std::string name = entry->d_name; name.starts_with("event")) {
+        paths.push_back(std::string(kFolder) + "/" + name);
+      }
+    }
+    closedir(folder);
+  }
+  // event2 before event10
+  std::sort(paths.begin(), paths.end(), [](const std::string& a, const std::string& b) {
+    return std::pair(a.size(), a) < std::pair(b.size(), b);
+  });
+  return paths;
+}
+
+// The only device that can be a hand, and whose name has the part asked for.
+tl::expected<std::string, std::string> find_by_name(const std::string& part) {
+  std::vector<std::string> found;
+  std::string list, refused;
+  for (const std::string& path : input_devices()) {
+    const int file = open_file(path);
+    if (file < 0) {
+      refused = why() == EACCES && refused.empty() ? not_allowed(path) : refused;
+      continue;
+    }
+    const Identity is = identify(file);
+    ::close(file);
+    if (is.layout != nullptr && is.name.find(part) != std::string::npos) {
+      found.push_back(path);
+      list += (list.empty() ? "" : ", ") + path + " (" + is.name + ")";
+    }
+  }
+  if (found.size() == 1) {
+    return found.front();
+  }
+  if (!found.empty()) {
+    return Unexpected("several devices can be the hand: " + list + ", allowed: one of them as evdev.path");
+  }
+  if (!refused.empty()) {
+    return Unexpected(refused);
+  }
+  return Unexpected("no mouse, gamepad or SpaceMouse" + (part.empty() ? "" : " called \"" + part + "\"") +
+                    " in " + kFolder + ", allowed: plug one in, or say which in evdev.path");
+}
+
+}  // namespace
+
+tl::expected<void, std::string> EvdevHand::open() {
+  std::string path = params_.path;
+  if (path.empty()) {
+    auto found = find_by_name(params_.name);
+    if (!found) {
+      return Unexpected(found.error());
+    }
+    path = std::move(*found);
+  }
+  const auto refuse = [this](std::string text) {
+    close();
+    return Unexpected(std::move(text));
+  };
+  file_ = open_file(path);
+  if (file_ < 0) {
+    return refuse(refusal(path, why()));
+  }
+  if (int version = 0; ioctl(file_, EVIOCGVERSION, &version) != 0) {
+    return refuse(refusal(path, why()));
+  }
+  const Identity is = identify(file_);
+  layout_ = is.layout;
+  if (layout_ == nullptr) {
+    return refuse(path + ": \"" + is.name + "\" is neither a mouse, a gamepad nor a SpaceMouse");
+  }
+  std::array<Range, 3> ranges;
+  for (std::size_t i = 0; layout_->counts == Counts::positions && i < ranges.size(); ++i) {
+    input_absinfo info{};
+    if (!ask_for_axis(file_, layout_->axes[i].code, info) || info.minimum >= info.maximum) {
+      return refuse(path + ": axis " + std::to_string(layout_->axes[i].code) + " of \"" + is.name +
+                    "\" has no range");
+    }
+    ranges[i] = {info.minimum, info.maximum};
+  }
+  const int clock = CLOCK_MONOTONIC;
+  if (ioctl(file_, EVIOCSCLOCKID, &clock) != 0) {
+    return refuse(refusal(path, why()));
+  }
+  if (ioctl(file_, EVIOCGRAB, 1) != 0) {
+    return refuse(path + ": \"" + is.name + "\" is taken by another program that keeps it to itself");
+  }
+  motion_.emplace(params_, *layout_, ranges);
+  gone_ = Status::ok;
+  return {};
+}
+
+hal::Served EvdevHand::served() noexcept {
+  hal::Served served;
+  served.haptic = this;
+  return served;
+}
+
+// What is held from the beginning is no press.
+tl::expected<void, std::string> EvdevHand::start(std::int64_t /*first_tick_ns*/) {
+  return ask() == Status::ok ? tl::expected<void, std::string>{}
+                             : Unexpected("the device is gone: " + text_of(why()));
+}
+
+void EvdevHand::close() noexcept {
+  if (file_ >= 0) {
+    ::close(file_);
+  }
+  file_ = -1;
+  motion_.reset();
+}
+
+Status EvdevHand::drain(std::int64_t now_ns) NONBLOCKING {
+  for (int round = 0; round < kRounds; ++round) {
+    const ssize_t size = read_now(file_, events_.data(), events_.size());
+    if (size < 0) {
+      const int error = why();
+      return error == EAGAIN || error == EINTR ? Status::ok : status_of(error);
+    }
+    const std::size_t count = static_cast<std::size_t>(size) / sizeof(input_event);
+    if (count == 0) {
+      return Status::disconnected;
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      motion_->take(events_[i], now_ns);
+    }
+  }
+  return Status::ok;
+}
+
+Status EvdevHand::ask() NONBLOCKING {
+  Keys held;
+  std::array<int, 3> positions{};
+  if (!ask_for_keys(file_, held)) {
+    return status_of(why());
+  }
+  for (std::size_t i = 0; layout_->counts == Counts::positions && i < positions.size(); ++i) {
+    input_absinfo info{};
+    if (!ask_for_axis(file_, layout_->axes[i].code, info)) {
+      return status_of(why());
+    }
+    positions[i] = info.value;
+  }
+  motion_->is(held, positions);
+  return Status::ok;
+}
+
+Status EvdevHand::read(hal::HandState& out) NONBLOCKING {
+  if (gone_ == Status::ok) {
+    const std::int64_t now_ns = clock_.now_ns();
+    gone_ = drain(now_ns);
+    if (gone_ == Status::ok && motion_->wants_state()) {
+      gone_ = ask();
+    }
+    if (gone_ == Status::ok) {
+      out = motion_->at(now_ns);
+    }
+  }
+  return gone_;
+}
+
+}  // namespace punctum::evdev

@@ -1,0 +1,117 @@
+// From the events of a mouse, a gamepad or a SpaceMouse to a hand: pure, so that it can be tested without a
+// device.
+//
+// The counts of a mouse are ways, the deflection of a stick or a knob is a speed. Either moves a point that
+// the hand follows with a lag of kLag_s and never faster than params.speed_m_s. The point is never further
+// ahead than the hand goes in kAhead_s at that speed; what is beyond is forgotten. So the position is
+// continuous whatever the device says, and at rest a tenth of a second after the fingers are.
+#pragma once
+
+#include <linux/input.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "hal/devices.hpp"
+#include "hal/evdev/config.hpp"
+#include "hal/realtime.hpp"
+
+namespace punctum::evdev {
+
+// A set of codes of one type, as the kernel's ioctls fill it.
+template <std::size_t Count>
+struct Codes {
+  std::array<std::uint8_t, (Count + 7) / 8> bits{};
+  [[nodiscard]] bool has(std::size_t code) const NONBLOCKING {
+    return code < Count && (bits[code / 8] >> (code % 8) & 1U) != 0;
+  }
+  void add(std::size_t code) NONBLOCKING {
+    bits[code / 8] = static_cast<std::uint8_t>(bits[code / 8] | 1U << (code % 8));
+  }
+};
+using Keys = Codes<KEY_CNT>;
+
+// What a device says that it can do.
+struct Abilities {
+  Keys keys;
+  Codes<REL_CNT> relative;
+  Codes<ABS_CNT> absolute;
+};
+
+struct AxisOf {
+  std::uint16_t code;
+  double sign;  // in the hand's frame: x right, y up, z towards the operator
+};
+struct ButtonOf {
+  std::uint16_t code;
+  std::uint32_t button;  // hal::kButton...
+};
+
+enum class Counts : std::uint8_t {
+  ways,         // EV_REL: how far it went since the last event
+  deflections,  // EV_REL: how far it is from its middle, told again and again while it is
+  positions,    // EV_ABS: how far it is from its middle, told when it changes
+};
+
+// One kind of device: which of its axes and buttons are which of the hand's.
+struct Layout {
+  const char* name;
+  Counts counts;
+  std::array<AxisOf, 3> axes;
+  std::array<ButtonOf, 4> buttons;
+};
+
+// The kind of a device, null: none that can be a hand.
+[[nodiscard]] const Layout* layout_of(const Abilities& abilities);
+
+// Of an absolute axis.
+struct Range {
+  int min = -1;
+  int max = 1;
+};
+
+class HandMotion {
+ public:
+  static constexpr double kLag_s = 0.02;
+  static constexpr double kAhead_s =
+      0.04;  // more than comes at once from a device that reports 50 times a second
+  // A movement that waited for longer is not made late: the program was held up, and the hand is elsewhere.
+  static constexpr std::int64_t kStale_ns = 50'000'000;
+  static constexpr double kReach_m = 1;  // from the origin
+  // A knob that tells its deflection as counts: as many are full deflection, so often.
+  static constexpr double kFullCounts = 350, kReports_1_s = 100;
+
+  HandMotion(const EvdevParams& params, const Layout& layout, const std::array<Range, 3>& ranges)
+      : params_(params), layout_(layout), ranges_(ranges) {}
+
+  // now_ns: on the clock of the event's own time.
+  void take(const input_event& event, std::int64_t now_ns) NONBLOCKING;
+
+  // Events were lost: what is held and deflected has to be asked for, and told by is().
+  [[nodiscard]] bool wants_state() const NONBLOCKING { return wants_state_; }
+  void is(const Keys& held, const std::array<int, 3>& positions) NONBLOCKING;
+
+  // Where the hand is now; times go forward.
+  [[nodiscard]] hal::HandState at(std::int64_t now_ns) NONBLOCKING;
+
+ private:
+  void take_key(std::uint16_t code, bool held) NONBLOCKING;
+  void take_relative(std::uint16_t code, int value) NONBLOCKING;
+  void deflect(std::size_t axis, int value) NONBLOCKING;
+  [[nodiscard]] double beyond_dead_zone(double deflection) const NONBLOCKING;
+
+  const EvdevParams params_;
+  const Layout& layout_;
+  const std::array<Range, 3> ranges_;
+  hal::Vec3 ahead_m_ = hal::Vec3::Zero();  // where the hand is going
+  hal::Vec3 at_m_ = hal::Vec3::Zero();
+  hal::Vec3 speed_m_s_ = hal::Vec3::Zero();  // of `ahead_m_`, by deflections
+  std::uint32_t buttons_ = 0;
+  std::int64_t at_ns_ = 0;
+  bool begun_ = false;
+  bool losing_ = false;  // until the next report
+  bool wants_state_ = false;
+};
+
+}  // namespace punctum::evdev

@@ -1,0 +1,83 @@
+#include "tools/punctum/positioning.hpp"
+
+#include <fmt/format.h>
+#include <signal.h>
+
+#include <chrono>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "hal/zaber/zaber_positioner.hpp"
+#include "rt/executive/monotonic_clock.hpp"
+#include "tools/punctum/terminal.hpp"
+#include "tools/shared/exit_codes.hpp"
+#include "tools/shared/stop_signal.hpp"
+
+namespace punctum::tools {
+namespace {
+
+constexpr auto kLook = std::chrono::milliseconds(50);
+
+std::string um(const hal::Vec3& v) {
+  return fmt::format("[{:.2f}, {:.2f}, {:.2f}] um", v.x() * 1e6, v.y() * 1e6, v.z() * 1e6);
+}
+
+// Until it rests, or somebody interrupts.
+int wait_for_rest(zaber::ZaberPositioner& positioner, Terminal& terminal) {
+  bool stopped = false;
+  for (hal::PositionerState state;; std::this_thread::sleep_for(kLook)) {
+    if (stop_signal::count() > 0 && !stopped) {
+      positioner.stop();
+      stopped = true;
+    }
+    if (positioner.read(state) != hal::Status::ok || state.fault) {
+      terminal.complain(fmt::format("positioner: {}", positioner.why()));
+      return exit_fault;
+    }
+    if (!state.moving) {
+      terminal.say("{} at {}", stopped ? "stopped" : "there,", um(state.position_m));
+      return stopped ? exit_not_done : exit_done;
+    }
+    if (terminal.line_style().columns > 0) {
+      terminal.progress(um(state.position_m));
+    }
+  }
+}
+
+}  // namespace
+
+int move_positioner(const Scene& scene, const std::optional<hal::Vec3>& target_m) {
+  Terminal terminal;
+  const auto refuse = [&terminal](const std::string& why) {
+    terminal.complain(why);
+    return exit_bad_input;
+  };
+  if (scene.devices.positioner != kZaber) {
+    return refuse(
+        fmt::format("{}: there is no positioner to move, allowed: a scene with [positioner] device = \"{}\"",
+                    scene.name, kZaber));
+  }
+  stop_signal::watch({SIGINT, SIGTERM, SIGHUP, SIGQUIT});
+  const rt::MonotonicClock clock;
+  zaber::ZaberPositioner positioner(*scene.zaber, clock,
+                                    std::make_unique<zaber::SerialLine>(scene.zaber->port));
+  if (const auto opened = positioner.open(); !opened) {
+    return refuse(opened.error());
+  }
+  const hal::Vec3 wanted_m = target_m.value_or(scene.zaber->park_m);
+  int code = exit_bad_input;
+  if (positioner.move_to(wanted_m)) {
+    code = wait_for_rest(positioner, terminal);
+  } else if (!positioner.why().empty()) {
+    terminal.complain(fmt::format("positioner: {}", positioner.why()));
+    code = exit_fault;
+  } else {
+    terminal.complain(fmt::format("{} is outside, allowed: from {} to {}", um(wanted_m),
+                                  um(positioner.least_m()), um(positioner.most_m())));
+  }
+  positioner.close();
+  return code;
+}
+
+}  // namespace punctum::tools

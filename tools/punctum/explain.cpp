@@ -382,7 +382,8 @@ int check(const Scene& s, std::string& text) {
     good = row(!path.empty(), program, path.empty() ? "not found beside this program nor in PATH" : path) &&
            good;
   }
-  row(true, "devices", s.servo.real_actuators ? backends(s) : "all simulated: no actuator is there to touch");
+  row(true, "devices",
+      s.servo.real_actuators || s.camera ? backends(s) : "all simulated: no actuator is there to touch");
   if (s.recorded || s.v4l2 || (s.vision && s.vision->holder && !s.vision->holder->template_path.empty())) {
     const auto files = files_of(s);
     good = row(files.has_value(), "files", files ? *files : files.error()) && good;

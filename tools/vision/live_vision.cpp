@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "hal/ipc/segment.hpp"
+#include "hal/recorded/modules.hpp"
 #include "hal/recorded/picture.hpp"
 #include "hal/recorded/recorded_camera.hpp"
 #include "hal/sim/bench.hpp"
@@ -289,6 +290,8 @@ Opened LiveVision::open_files() {
     overlays_ = !error;
     if (error) {
       go_on_without(rt::ObservationSegment::frames, fmt::format("{}: {}", options_.overlay, error.message()));
+    } else {
+      (void)recorded::load_pictures();  // it takes longer than a frame
     }
   }
   return {};

@@ -21,19 +21,22 @@ using hal::Status;
 constexpr std::int64_t kLong_ns = 2'000'000'000;
 
 TEST(AravisStamps, a_clock_that_is_elsewhere_is_seen_through_the_jitter_of_arrivals) {
-  CameraClock clock;
-  constexpr std::int64_t kApart_ns = 123'456'789'000, kFastest_ns = 2'000'000;
-  std::int64_t worst_ns = 0;
-  for (int i = 0; i < 1000; ++i) {
-    const std::int64_t true_ns = 1'000'000'000 + i * std::int64_t{40'000'000};
-    const std::int64_t stamp_ns = true_ns - kApart_ns + true_ns / 20'000;  // it is fast by 50 ppm
-    const std::int64_t late_ns = kFastest_ns + (i * 7919) % 30 * 1'000'000;
-    const std::int64_t seen_ns = clock.on_station_ns(stamp_ns, true_ns + late_ns);
-    if (i > 30) {
-      worst_ns = std::max(worst_ns, std::abs(seen_ns - true_ns - kFastest_ns));
+  for (const int drift_ppm : {-100, 100}) {
+    CameraClock clock;
+    constexpr std::int64_t kApart_ns = 123'456'789'000, kFastest_ns = 2'000'000;
+    std::int64_t worst_ns = 0;
+    for (int i = 0; i < 1500; ++i) {
+      const std::int64_t run_ns = i * std::int64_t{40'000'000};
+      const std::int64_t true_ns = 1'000'000'000'000 + run_ns;
+      const std::int64_t stamp_ns = true_ns - kApart_ns + run_ns / 1'000'000 * drift_ppm;
+      const std::int64_t late_ns = kFastest_ns + (i * 7919) % 30 * 1'000'000;
+      const std::int64_t seen_ns = clock.on_station_ns(stamp_ns, true_ns + late_ns);
+      if (i > 30) {
+        worst_ns = std::max(worst_ns, std::abs(seen_ns - true_ns - kFastest_ns));
+      }
     }
+    EXPECT_LT(worst_ns, 1'200'000) << drift_ppm << " ppm";
   }
-  EXPECT_LT(worst_ns, 1'000'000);
 }
 
 TEST(AravisStamps, a_clock_that_is_set_anew_is_followed_at_once) {
@@ -67,6 +70,14 @@ class AravisTest : public testing::Test {
     camera.reset(punctum_make_aravis_camera(params, settings, clock));
     const auto done = camera->open();
     return done ? "" : done.error();
+  }
+  // A busy machine may lose packets, or be late for a frame.
+  [[nodiscard]] Status good_frame() {
+    Status status = Status::no_data;
+    for (int i = 0; i < 20 && status != Status::ok && status != Status::disconnected; ++i) {
+      status = camera->next(frame, kLong_ns);
+    }
+    return status;
   }
   [[nodiscard]] bool notes_say(const std::string& what) const {
     for (const std::string& note : camera->notes()) {
@@ -106,28 +117,21 @@ TEST_F(AravisTest, frames_come_counted_and_stamped_on_the_stations_clock) {
   EXPECT_EQ(sequence, 20 + camera->counts().lost + camera->counts().skipped);
 }
 
-// The library draws grey = (x + frame number + y) modulo 255 (arvfakecamera.c, the diagonal ramp).
-TEST_F(AravisTest, the_pixels_are_those_of_the_camera) {
-  ASSERT_EQ(opened(), "");
-  ASSERT_EQ(camera->next(frame, kLong_ns), Status::ok);
-  const int corner = frame.pixels[0];
-  for (int y = 0; y < frame.height; y += 17) {
-    for (int x = 0; x < frame.width; ++x) {
-      ASSERT_EQ(frame.pixels[y * frame.stride + x], (corner + x + y) % 255) << x << ", " << y;
+// The library draws a ramp along the diagonal (arvfakecamera.c): (x + frame number + y) modulo 255, in 16-bit
+// formats in the upper byte.
+TEST_F(AravisTest, the_pixels_are_those_of_the_camera_and_of_16_bits_the_upper_eight) {
+  for (const auto format : {AravisParams::Format::mono8, AravisParams::Format::mono16}) {
+    params.format = format;
+    ASSERT_EQ(opened(), "");
+    ASSERT_EQ(camera->next(frame, kLong_ns), Status::ok) << camera->last_error();
+    ASSERT_EQ(frame.stride, 320);
+    const int corner = frame.pixels[0];
+    for (int y = 0; y < frame.height; ++y) {
+      for (int x = 0; x < frame.width; ++x) {
+        ASSERT_EQ(frame.pixels[y * frame.stride + x] % 255, (corner + x + y) % 255) << x << ", " << y;
+      }
     }
   }
-}
-
-TEST_F(AravisTest, sixteen_bits_become_their_upper_eight) {
-  params.format = AravisParams::Format::mono16;
-  ASSERT_EQ(opened(), "");
-  ASSERT_EQ(camera->next(frame, kLong_ns), Status::ok) << camera->last_error();
-  EXPECT_EQ(frame.stride, 320);
-  int brightest = 0;
-  for (int x = 0; x < frame.width; ++x) {
-    brightest = std::max<int>(brightest, frame.pixels[x]);
-  }
-  EXPECT_GT(brightest, 100);
 }
 
 TEST_F(AravisTest, who_comes_late_gets_the_newest_frame) {
@@ -187,8 +191,14 @@ TEST_F(AravisTest, a_camera_on_the_network_is_lost_when_it_goes_and_can_be_opene
   settings.fps = 25;
   ASSERT_EQ(opened(), "");
   for (int i = 0; i < 5; ++i) {
-    ASSERT_EQ(camera->next(frame, kLong_ns), Status::ok) << camera->last_error();
+    ASSERT_EQ(good_frame(), Status::ok) << camera->last_error();
   }
+  std::this_thread::sleep_for(std::chrono::milliseconds(600));  // 15 frames, and 6 buffers
+  ASSERT_EQ(good_frame(), Status::ok) << camera->last_error();
+  ASSERT_EQ(good_frame(), Status::ok) << camera->last_error();
+  const hal::CameraCounts& n = camera->counts();
+  EXPECT_GT(n.lost, 3U);
+  EXPECT_EQ(frame.sequence, n.delivered + n.skipped + n.lost + n.unusable);
   const auto before = frame;
   there.reset();
   Status status = Status::ok;
@@ -204,9 +214,10 @@ TEST_F(AravisTest, a_camera_on_the_network_is_lost_when_it_goes_and_can_be_opene
   there = plugged_in();
   const auto back = camera->open();
   ASSERT_TRUE(back) << back.error();
-  ASSERT_EQ(camera->next(frame, kLong_ns), Status::ok) << camera->last_error();
+  ASSERT_EQ(good_frame(), Status::ok) << camera->last_error();
   EXPECT_GT(frame.sequence, before.sequence);
   EXPECT_GT(frame.exposure_ns, before.exposure_ns);
+  camera.reset();  // before it is unplugged: the library would wait for its answer
 }
 
 }  // namespace

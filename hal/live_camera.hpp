@@ -1,5 +1,5 @@
-// A camera that is plugged in: what a scene asks of any, and how it is opened and closed. Set-up code, but
-// next() and release(); one thread of the vision program calls all of it.
+// A camera that is plugged in: what a scene asks of any, and how it is opened and closed. The vision program
+// calls all of it, never two at a time.
 #pragma once
 
 #include <cstdint>
@@ -22,13 +22,18 @@ struct CameraSettings {
   double fps = 0;             // 0: whatever the camera is set to
   double exposure_s = 0;      // 0: likewise
   double gain = kAsItIs;      // in the camera's own unit
+  // From the end of the exposure until the frame is stamped, where the stamp is not of its beginning; 0: not
+  // known.
+  double readout_s = 0;
 };
 constexpr auto keys_of(const CameraSettings*) {
-  return keys(
-      whole("width", &CameraSettings::width, 16, 16384), whole("height", &CameraSettings::height, 16, 16384),
-      micro("pixel_um", &CameraSettings::pixel_m, 0.01, 50), real("fps", &CameraSettings::fps, 0, 1000),
-      milli("exposure_ms", &CameraSettings::exposure_s, 0, 10000),
-      real("gain", &CameraSettings::gain, kAsItIs, 1e6));
+  return keys(whole("width_px", &CameraSettings::width, 16, 16384),
+              whole("height_px", &CameraSettings::height, 16, 16384),
+              micro("pixel_um", &CameraSettings::pixel_m, 0.01, 50),
+              real("fps", &CameraSettings::fps, 0, 1000),
+              milli("exposure_ms", &CameraSettings::exposure_s, 0, 10000),
+              real("gain", &CameraSettings::gain, kAsItIs, 1e6),
+              milli("readout_ms", &CameraSettings::readout_s, 0, 1000));
 }
 
 // Since the camera was opened for the first time.
@@ -43,6 +48,8 @@ class LiveCamera : public Camera {
  public:
   virtual ~LiveCamera() = default;
 
+  // Both may take seconds where a network does not answer.
+  //
   // Claims the camera, sets it up, and lets it stream. The error is one line: what is wrong, what to do; the
   // camera is then closed. After `disconnected` it may be called again: the camera may be back.
   [[nodiscard]] virtual tl::expected<void, std::string> open() = 0;

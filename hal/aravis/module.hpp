@@ -9,8 +9,12 @@ namespace punctum::aravis {
 inline constexpr const char* kModule = "punctum_aravis.so";
 inline constexpr const char* kMakeCamera = "punctum_make_aravis_camera";
 
-// The caller owns it. clock: the station's, CLOCK_MONOTONIC.
+// The caller owns what it makes. clock: the station's, CLOCK_MONOTONIC.
 using MakeCamera = hal::LiveCamera* (*)(const AravisParams& params, const hal::CameraSettings& settings,
                                         const hal::Clock& clock);
 
 }  // namespace punctum::aravis
+
+extern "C" punctum::hal::LiveCamera* punctum_make_aravis_camera(const punctum::aravis::AravisParams& params,
+                                                                const punctum::hal::CameraSettings& settings,
+                                                                const punctum::hal::Clock& clock);

@@ -11,10 +11,10 @@
 #include <new>
 #include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <utility>
 
+#include "hal/recorded/modules.hpp"
 #include "hal/recorded/picture_check.hpp"
 
 namespace punctum::recorded {
@@ -62,11 +62,15 @@ tl::expected<Picture, std::string> decode(Bytes file, int bits) {
   if (!good) {
     return tl::unexpected(good.error());
   }
+  const auto pictures = load_pictures();
+  if (!pictures) {
+    return tl::unexpected(pictures.error());
+  }
   cv::Mat picture;
   try {
     const NoErrorOutput silenced;
     const cv::Mat bytes(1, static_cast<int>(file.size()), CV_8UC1, const_cast<std::uint8_t*>(file.data()));
-    picture = cv::imdecode(bytes, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
+    picture = pictures->decode(bytes);
   } catch (const std::bad_alloc&) {
     return wrong("not enough memory for the picture");
   } catch (const std::exception&) {

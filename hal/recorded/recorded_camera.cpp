@@ -12,11 +12,11 @@
 #include <filesystem>
 #include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
-#include <opencv2/videoio.hpp>
 #include <system_error>
 #include <utility>
 #include <vector>
 
+#include "hal/recorded/modules.hpp"
 #include "hal/recorded/picture.hpp"
 
 namespace punctum::recorded {
@@ -140,7 +140,7 @@ bool natural_less(std::string_view a, std::string_view b) noexcept {
 
 struct Camera::Impl {
   std::vector<std::string> files;  // empty: a video
-  cv::VideoCapture video;
+  std::unique_ptr<Video> video;
   std::string source;
   std::int64_t count = -1;
   double fps = kDefaultFps;
@@ -176,7 +176,7 @@ struct Camera::Impl {
     name = source + ":" + std::to_string(position);
     cv::Mat raw;
     try {
-      if (!video.read(raw) || raw.empty()) {
+      if (!video->read(raw) || raw.empty()) {
         if (count > 0 && position < count) {
           error = source + ": ends after " + std::to_string(position) + " of " + std::to_string(count) +
                   " pictures";
@@ -220,32 +220,28 @@ struct Camera::Impl {
     const std::string path = fs::absolute(source, error_code).string();
     cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
     ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);  // silent: an error is returned as a value
-    for (const int backend : {cv::CAP_FFMPEG, cv::CAP_GSTREAMER, cv::CAP_OPENCV_MJPEG}) {
-      try {
-        if (video.open(path, backend)) {
-          break;
-        }
-      } catch (const std::exception&) {
-        continue;
-      }
+    auto loaded = load_video();
+    if (!loaded) {
+      return tl::unexpected(source + ": " + loaded.error());
     }
-    if (!video.isOpened()) {
+    video = std::move(*loaded);
+    if (!video->open(path)) {
       return tl::unexpected(
           source + ": neither a picture nor a video that this program can read; pictures: " + kPictures);
     }
-    const double w = video.get(cv::CAP_PROP_FRAME_WIDTH);
-    const double h = video.get(cv::CAP_PROP_FRAME_HEIGHT);
+    const double w = video->width();
+    const double h = video->height();
     if (w > static_cast<double>(kMaxSide) || h > static_cast<double>(kMaxSide) ||
         w * h > static_cast<double>(kMaxPixels)) {
       return tl::unexpected(source + ": its pictures are too large; allowed: sides of at most " +
                             std::to_string(kMaxSide) + " px and at most " + std::to_string(kMaxPixels) +
                             " px in all");
     }
-    const double frames = video.get(cv::CAP_PROP_FRAME_COUNT);
+    const double frames = video->frame_count();
     if (frames >= 1 && frames < 1e9) {
       count = static_cast<std::int64_t>(frames);
     }
-    const double own_fps = video.get(cv::CAP_PROP_FPS);
+    const double own_fps = video->frame_rate();
     if (wanted_fps <= 0 && own_fps > 0 && own_fps <= kMaxFps) {
       fps = own_fps;
     }

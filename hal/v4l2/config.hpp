@@ -17,14 +17,12 @@ struct V4l2Params {
 
   std::string path = "/dev/video0";  // /dev/v4l/by-id/... stays the same camera after a replug
   Format format = Format::grey;
-  int bits = 16;         // of y16: grey = value / 2^(bits - 8), at most 255
-  double readout_s = 0;  // from the end of the exposure to the end of the frame; 0: not known
+  int bits = 16;  // of y16: grey = value / 2^(bits - 8), at most 255
 };
 constexpr auto keys_of(const V4l2Params*) {
   return hal::keys(hal::text("path", &V4l2Params::path),
                    hal::choice("format", &V4l2Params::format, "grey", "y16", "yuyv"),
-                   hal::whole("bits", &V4l2Params::bits, 8, 16),
-                   hal::milli("readout_ms", &V4l2Params::readout_s, 0, 1000));
+                   hal::whole("bits", &V4l2Params::bits, 8, 16));
 }
 
 }  // namespace punctum::v4l2

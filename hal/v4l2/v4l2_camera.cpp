@@ -337,18 +337,18 @@ V4l2Camera::Done V4l2Camera::check_stamps(std::uint32_t flags) {
         "its driver does not stamp frames with the monotonic clock: when one was taken is not known");
   }
   stamped_at_end_ = (flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK) != V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
-  stamp_to_exposure_ns_ = stamped_at_end_ ? -std::llround((exposure_s_ + params_.readout_s) * 1e9) : 0;
+  stamp_to_exposure_ns_ = stamped_at_end_ ? -std::llround((exposure_s_ + settings_.readout_s) * 1e9) : 0;
   return {};
 }
 
 V4l2Camera::Done V4l2Camera::start_streaming() {
-  if (stamped_at_end_ && (exposure_s_ == 0 || params_.readout_s == 0)) {
+  if (stamped_at_end_ && (exposure_s_ == 0 || settings_.readout_s == 0)) {
     notes_.push_back(params_.path +
                      ": frames are stamped at their end; when they were taken is late by the " +
-                     (exposure_s_ != 0         ? ""
-                      : params_.readout_s != 0 ? "exposure"
-                                               : "exposure and the ") +
-                     (params_.readout_s != 0 ? "" : "readout (v4l2.readout_ms)"));
+                     (exposure_s_ != 0           ? ""
+                      : settings_.readout_s != 0 ? "exposure"
+                                                 : "exposure and the ") +
+                     (settings_.readout_s != 0 ? "" : "readout (camera.readout_ms)"));
   }
   give_back();
   if (std::any_of(buffers_.begin(), buffers_.end(), [](const Buffer& b) { return !b.queued; })) {

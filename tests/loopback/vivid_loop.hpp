@@ -73,6 +73,7 @@ class VividNode {
     return ::ioctl(fd_, request, &argument) == 0;
   }
 
+  [[nodiscard]] bool has(const std::string& name) const { return find(name) != 0; }
   void set(const std::string& name, int value) const {
     v4l2_control control{id_of(name), value};
     EXPECT_TRUE(call(VIDIOC_S_CTRL, control)) << name << ": " << std::strerror(errno);
@@ -108,6 +109,11 @@ class VividNode {
 
  private:
   [[nodiscard]] std::uint32_t id_of(const std::string& name) const {
+    const std::uint32_t id = find(name);
+    EXPECT_NE(id, 0U) << path_ << " has no control " << name;
+    return id;
+  }
+  [[nodiscard]] std::uint32_t find(const std::string& name) const {
     v4l2_queryctrl control{};
     control.id = V4L2_CTRL_FLAG_NEXT_CTRL;
     while (call(VIDIOC_QUERYCTRL, control)) {
@@ -116,7 +122,6 @@ class VividNode {
       }
       control.id |= V4L2_CTRL_FLAG_NEXT_CTRL;
     }
-    ADD_FAILURE() << path_ << " has no control " << name;
     return 0;
   }
 
@@ -133,7 +138,7 @@ class VividLoop {
     output_.set("Enable Output Scaler", 0);
     set_up(camera_, V4L2_BUF_TYPE_VIDEO_CAPTURE, fps);
     set_up(output_, V4L2_BUF_TYPE_VIDEO_OUTPUT, fps);
-    camera_.set("Loop Video", 1);
+    loop(true);
     camera_.set("OSD Text Mode", 2);  // none: it would be written into the picture
 
     v4l2_requestbuffers wanted{};
@@ -158,7 +163,7 @@ class VividLoop {
       ::munmap(memory, bytes_);
     }
     output_.close();  // its buffers keep the format
-    camera_.set("Loop Video", 0);
+    loop(false);
     camera_.set("OSD Text Mode", 0);
     camera_.set("Enable Capture Scaler", 1);
     camera_.use_input("Webcam");
@@ -194,6 +199,15 @@ class VividLoop {
  private:
   static constexpr std::uint32_t kBuffers = 3;
 
+  // Newer kernels have a menu: the test picture, nothing, and the first output of HDMI.
+  void loop(bool on) const {
+    const std::string menu = "HDMI 000-0 Is Connected To";
+    if (camera_.has(menu)) {
+      camera_.set(menu, on ? 2 : 0);
+    } else {
+      camera_.set("Loop Video", on ? 1 : 0);
+    }
+  }
   static v4l2_buffer about(std::uint32_t index) {
     v4l2_buffer buffer{};
     buffer.index = index;

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "hal/recorded/picture.hpp"
 #include "hal/recorded/recorded_camera.hpp"
 #include "vision/tracker.hpp"
 
@@ -41,11 +41,20 @@ double intersection_over_union(const vision::Contour& contour, const cv::Mat& la
   return static_cast<double>(cv::countNonZero(seen & wanted)) / cv::countNonZero(seen | wanted);
 }
 
+// Empty: it cannot be read.
+cv::Mat read_grey(const std::string& path) {
+  const auto picture = recorded::read_picture(path);
+  return picture ? cv::Mat(picture->height, picture->width, CV_8U,
+                           const_cast<std::uint8_t*>(picture->pixels.data()))
+                       .clone()
+                 : cv::Mat();
+}
+
 void see_oocytes(const fs::path& folder, Table& table) {
   for (const char* number : {"00", "01", "03", "06"}) {
     const std::string stem = (folder / "icsi_").string() + number;
-    const cv::Mat picture = cv::imread(stem + "_img.png", cv::IMREAD_GRAYSCALE);
-    const cv::Mat label = cv::imread(stem + "_label.png", cv::IMREAD_GRAYSCALE);
+    const cv::Mat picture = read_grey(stem + "_img.png");
+    const cv::Mat label = read_grey(stem + "_label.png");
     if (picture.empty() || label.size() != picture.size()) {
       continue;
     }

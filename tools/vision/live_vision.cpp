@@ -6,7 +6,9 @@
 #include <sys/resource.h>
 
 #include <atomic>
+#include <chrono>
 #include <filesystem>
+#include <future>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
@@ -15,6 +17,7 @@
 #include <utility>
 
 #include "hal/ipc/segment.hpp"
+#include "hal/recorded/modules.hpp"
 #include "hal/recorded/picture.hpp"
 #include "hal/recorded/recorded_camera.hpp"
 #include "hal/sim/bench.hpp"
@@ -287,6 +290,8 @@ Opened LiveVision::open_files() {
     overlays_ = !error;
     if (error) {
       go_on_without(rt::ObservationSegment::frames, fmt::format("{}: {}", options_.overlay, error.message()));
+    } else {
+      (void)recorded::load_pictures();  // it takes longer than a frame
     }
   }
   return {};
@@ -354,13 +359,15 @@ void LiveVision::wait_until(std::int64_t t_ns) {
 // Until it is back, or the run has ended. Meanwhile observations age, as the core expects of a lost camera.
 void LiveVision::look_for_camera() {
   complain(live_->last_error() + "; looking for it");
-  live_->close();
   const std::int64_t gone_ns = clock().now_ns();
   std::string why;
   while (stop_signal::count() == 0 && !plant_has_stopped()) {
-    wait_until(clock().now_ns() + kLookAgain_ns);
-    go_round();
-    const Opened opened = live_->open();
+    // It closes what is left of it first. Either may take seconds, and nobody shall believe that this hangs.
+    auto opening = std::async(std::launch::async, [this] { return live_->open(); });
+    while (opening.wait_for(std::chrono::nanoseconds(kFrameTimeout_ns)) != std::future_status::ready) {
+      go_round();
+    }
+    const Opened opened = opening.get();
     if (opened) {
       complain(fmt::format("the camera is back after {:.1f} s",
                            static_cast<double>(clock().now_ns() - gone_ns) * 1e-9));
@@ -370,6 +377,8 @@ void LiveVision::look_for_camera() {
       why = opened.error();
       complain(why);
     }
+    wait_until(clock().now_ns() + kLookAgain_ns);
+    go_round();
   }
 }
 

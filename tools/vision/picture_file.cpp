@@ -1,17 +1,21 @@
 #include "tools/vision/picture_file.hpp"
 
 #include <filesystem>
-#include <opencv2/imgcodecs.hpp>
 #include <vector>
 
+#include "hal/recorded/modules.hpp"
 #include "tools/shared/whole_file.hpp"
 
 namespace punctum::tools {
 
 tl::expected<void, std::string> write_picture(const std::string& path, const cv::Mat& picture) {
+  const auto pictures = recorded::load_pictures();
+  if (!pictures) {
+    return tl::unexpected(path + ": " + pictures.error());
+  }
   std::vector<unsigned char> bytes;
   try {
-    if (!cv::imencode(std::filesystem::path(path).extension().string(), picture, bytes)) {
+    if (!pictures->encode(std::filesystem::path(path).extension().string(), picture, bytes)) {
       return tl::unexpected(path + ": cannot be written: not a format of pictures");
     }
   } catch (const cv::Exception&) {

@@ -235,19 +235,19 @@ TEST_F(V4l2Test, a_stamp_of_the_frames_end_is_led_back_by_exposure_and_readout) 
   video.buffer_flags = V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC | V4L2_BUF_FLAG_TSTAMP_SRC_EOF;
   video.controls[V4L2_CID_EXPOSURE_ABSOLUTE] = {1, 1000, 1, 50};
   settings.exposure_s = 10e-3;
-  params.readout_s = 7e-3;
+  settings.readout_s = 7e-3;
   ASSERT_EQ(opened(), "");
   EXPECT_FALSE(notes_say("stamped at their end"));
   arrives(1);
   ASSERT_EQ(next(), Status::ok);
   EXPECT_EQ(frame.exposure_ns, clock.now - 5'000'000 - 17'000'000);
-  params.readout_s = 0;
+  settings.readout_s = 0;
   ASSERT_EQ(opened(), "");
-  EXPECT_TRUE(notes_say("late by the readout (v4l2.readout_ms)"));
+  EXPECT_TRUE(notes_say("late by the readout (camera.readout_ms)"));
   video.controls.clear();
   settings.exposure_s = 0;
   ASSERT_EQ(opened(), "");
-  EXPECT_TRUE(notes_say("late by the exposure and the readout (v4l2.readout_ms)"));
+  EXPECT_TRUE(notes_say("late by the exposure and the readout (camera.readout_ms)"));
 }
 
 TEST_F(V4l2Test, stamps_of_another_clock_are_refused) {

@@ -673,11 +673,12 @@ TEST(Scene, overrides_are_read_and_checked_as_the_file_is) {
 }
 
 TEST(Scene, a_plugged_camera_is_read_and_written_again) {
-  const auto scene = parse_scene(kLeast +
-                                     "[camera]\ndevice = \"v4l2\"\nwidth = 727\nheight = 485\nfps = 25\n"
-                                     "pixel_um = 0.5\nexposure_ms = 12.5\ngain = 3\n[vision]\n"
-                                     "[v4l2]\npath = \"/dev/video2\"\nformat = \"y16\"\nbits = 12\n",
-                                 "c.toml");
+  const auto scene =
+      parse_scene(kLeast +
+                      "[camera]\ndevice = \"v4l2\"\nwidth_px = 727\nheight_px = 485\nfps = 25\n"
+                      "pixel_um = 0.5\nexposure_ms = 12.5\ngain = 3\n[vision]\n"
+                      "[v4l2]\npath = \"/dev/video2\"\nformat = \"y16\"\nbits = 12\n",
+                  "c.toml");
   ASSERT_TRUE(scene) << scene.error();
   ASSERT_TRUE(scene->camera && scene->v4l2);
   EXPECT_FALSE(scene->aravis || scene->recorded || scene->simulated_camera());

@@ -230,8 +230,9 @@ Done AravisCamera::set_region() {
   arv_camera_get_region(camera_.get(), nullptr, nullptr, &width, &height, failure);
   const bool fits = settings_.width <= sensor_width && settings_.height <= sensor_height;
   if (!fits || refused || failure.happened() || width != settings_.width || height != settings_.height) {
-    return wrong("camera.width and height: it does not give " + size_text(settings_.width, settings_.height) +
-                 " px, allowed: up to " + size_text(sensor_width, sensor_height) + " in steps of " +
+    return wrong("camera.width_px and height_px: it does not give " +
+                 size_text(settings_.width, settings_.height) + " px, allowed: up to " +
+                 size_text(sensor_width, sensor_height) + " in steps of " +
                  size_text(arv_camera_get_width_increment(camera_.get(), failure),
                            arv_camera_get_height_increment(camera_.get(), failure)));
   }

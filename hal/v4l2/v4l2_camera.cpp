@@ -149,7 +149,7 @@ V4l2Camera::Done V4l2Camera::set_format() {
   if (got.width != static_cast<std::uint32_t>(settings_.width) ||
       got.height != static_cast<std::uint32_t>(settings_.height)) {
     return wrong(
-        "camera.width and height: it does not give " +
+        "camera.width_px and height_px: it does not give " +
         size_text(static_cast<std::uint32_t>(settings_.width), static_cast<std::uint32_t>(settings_.height)) +
         " px, nearest: " + size_text(got.width, got.height));
   }

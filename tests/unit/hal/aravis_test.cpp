@@ -171,9 +171,10 @@ TEST_F(AravisTest, what_it_cannot_do_is_one_line) {
   EXPECT_EQ(opened().find("Fake_1: aravis.format: it does not give Mono12, it offers: "), 0U);
   params.format = AravisParams::Format::mono8;
   settings.width = 4000;
-  EXPECT_EQ(opened().find("Fake_1: camera.width and height: it does not give 4000 x 240 px, allowed: up to "
-                          "2048 x 2048"),
-            0U);
+  EXPECT_EQ(
+      opened().find("Fake_1: camera.width_px and height_px: it does not give 4000 x 240 px, allowed: up to "
+                    "2048 x 2048"),
+      0U);
   settings.width = 320;
   params.name = "Fake_7";
   EXPECT_EQ(opened().find("Fake_7: no such camera is found ("), 0U);

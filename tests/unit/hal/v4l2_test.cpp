@@ -409,7 +409,8 @@ TEST_F(V4l2Test, what_it_cannot_do_is_one_line) {
   params.format = Format::yuyv;
   EXPECT_EQ(opened(), "");
   settings.width = 8;
-  EXPECT_EQ(opened(), "/dev/video0: camera.width and height: it does not give 8 x 3 px, nearest: 4 x 3");
+  EXPECT_EQ(opened(),
+            "/dev/video0: camera.width_px and height_px: it does not give 8 x 3 px, nearest: 4 x 3");
   settings.width = 4;
   settings.height = 4;
   EXPECT_NE(opened().find("it does not give 4 x 4 px"), std::string::npos);

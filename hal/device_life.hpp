@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <string>
 #include <tl/expected.hpp>
+#include <vector>
 
 #include "hal/devices.hpp"
 
@@ -24,6 +25,20 @@ struct Served {
   ForceSensor* force_sensor = nullptr;
   QueuedPositioner* positioner = nullptr;
 };
+
+// What can be seen of a device while nothing of it is claimed, set, or sent anything: one line each. A
+// backend has a function look(...) that returns them, for `punctum check`; it may run beside a core that uses
+// the device.
+struct Finding {
+  enum class Is : std::uint8_t {
+    found,
+    note,     // it can run, but somebody should know
+    missing,  // it cannot; the line says what to do
+  };
+  Is is = Is::found;
+  std::string line;
+};
+using Findings = std::vector<Finding>;
 
 class Device {
  public:

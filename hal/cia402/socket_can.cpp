@@ -14,6 +14,8 @@
 #include <system_error>
 #include <vector>
 
+#include "hal/cia402/look.hpp"
+
 #if defined(__has_feature)
 #if __has_feature(realtime_sanitizer)
 #include <sanitizer/rtsan_interface.h>
@@ -28,10 +30,6 @@ namespace punctum::cia402 {
 namespace {
 
 using Unexpected = tl::unexpected<std::string>;
-
-// Frames that wait when the tick is late: more than a cycle's answers, or ENOBUFS comes in ordinary
-// operation.
-constexpr int kShortestQueue = 64;
 
 // The two system calls of the tick. A datagram socket with MSG_DONTWAIT returns at once, EAGAIN or ENOBUFS if
 // it must; the kernel copies one frame of 16 bytes, and takes the socket's spin lock.

@@ -6,6 +6,70 @@ namespace punctum::gpiod {
 
 using hal::Status;
 
+namespace {
+
+std::string no_chip(const GpiodParams& params, const std::string& why) {
+  return params.chip + ": " + why +
+         ", allowed for gpiod.chip: the path of a GPIO chip that this user may use (gpiodetect lists them)";
+}
+
+std::string title(const char* key, int offset) {
+  return std::string("gpiod.") + key + " = " + std::to_string(offset) + ": ";
+}
+
+// Empty where the chip has it.
+std::string no_line(const GpiodParams& params, const char* key, int offset, unsigned lines) {
+  return offset >= 0 && static_cast<unsigned>(offset) < lines
+             ? ""
+             : title(key, offset) + "no line of " + params.chip + ", allowed: 0 to " +
+                   std::to_string(static_cast<int>(lines) - 1);
+}
+
+}  // namespace
+
+std::array<WiredLine, 6> wired_lines(const GpiodParams& params, GpiodParts parts) {
+  return {{{parts.estop, "heartbeat", params.heartbeat, Use::output},
+           {parts.injector, "gate", params.gate, Use::output},
+           {parts.estop, "contact_a", params.contact_a, Use::watched_input},
+           {parts.estop, "contact_b", params.contact_b, Use::watched_input},
+           {parts.estop, "reset", params.reset, Use::input},
+           {parts.injector && params.valve_contact != kNotWired, "valve_contact", params.valve_contact,
+            Use::input}}};
+}
+
+hal::Findings look(const GpiodParams& params, GpiodParts parts, const OpenChip& open_chip_at) {
+  using Is = hal::Finding::Is;
+  const auto chip = open_chip_at(params.chip);
+  if (!chip) {
+    return {{Is::missing, no_chip(params, chip.error())}};
+  }
+  const unsigned count = (*chip)->line_count();
+  std::string found = params.chip + " (" + (*chip)->label() + ", " + std::to_string(count) + " lines)";
+  hal::Findings findings{{Is::found, ""}};
+  for (const WiredLine& line : wired_lines(params, parts)) {
+    if (!line.there) {
+      continue;
+    }
+    if (std::string error = no_line(params, line.key, line.offset, count); !error.empty()) {
+      findings.push_back({Is::missing, std::move(error)});
+      continue;
+    }
+    const LineFacts facts = (*chip)->facts(static_cast<unsigned>(line.offset));
+    if (facts.used) {
+      findings.push_back({Is::missing, title(line.key, line.offset) + "is used by " +
+                                           (facts.user.empty() ? "somebody" : facts.user) +
+                                           ", allowed: a line that nothing else uses (gpioinfo lists them)"});
+      continue;
+    }
+    found.append(", ").append(line.key).append(" ").append(std::to_string(line.offset));
+    if (!facts.name.empty()) {
+      found.append(" \"").append(facts.name).append("\"");
+    }
+  }
+  findings.front().line = std::move(found);
+  return findings;
+}
+
 // The level first, then the changes: one that comes in between is in this reading, not lost.
 Status GpiodEstop::read_contact(Contact& contact, bool& closed, bool& pulse) NONBLOCKING {
   if (const Status read = contact.line->read(closed); read != Status::ok) {
@@ -69,10 +133,7 @@ GpiodDevices::GpiodDevices(GpiodParams params, GpiodParts parts, const hal::Cloc
 tl::expected<void, std::string> GpiodDevices::open() {
   auto chip = open_chip_at_(params_.chip);
   if (!chip) {
-    return tl::unexpected(
-        params_.chip + ": " + chip.error() +
-        ", allowed for gpiod.chip: the path of a GPIO chip that this user may use (gpiodetect "
-        "lists them)");
+    return tl::unexpected(no_chip(params_, chip.error()));
   }
   chip_ = std::move(*chip);
   auto claimed = claim_all();
@@ -83,27 +144,16 @@ tl::expected<void, std::string> GpiodDevices::open() {
 }
 
 tl::expected<void, std::string> GpiodDevices::claim_all() {
-  struct Wanted {
-    bool there;
-    const char* key;
-    int offset;
-    Use use;
-    std::unique_ptr<Line>& into;
-  };
-  // Outputs first: they are in their safe state before anything else.
-  for (const Wanted& wanted : {
-           Wanted{parts_.estop, "heartbeat", params_.heartbeat, Use::output, estop_.heartbeat_},
-           Wanted{parts_.injector, "gate", params_.gate, Use::output, injector_.gate_},
-           Wanted{parts_.estop, "contact_a", params_.contact_a, Use::watched_input, estop_.a_.line},
-           Wanted{parts_.estop, "contact_b", params_.contact_b, Use::watched_input, estop_.b_.line},
-           Wanted{parts_.estop, "reset", params_.reset, Use::input, estop_.reset_},
-           Wanted{parts_.injector && params_.valve_contact != kNotWired, "valve_contact",
-                  params_.valve_contact, Use::input, injector_.valve_},
-       }) {
-    if (!wanted.there) {
+  const std::array<std::unique_ptr<Line>*, 6> into = {&estop_.heartbeat_, &injector_.gate_,
+                                                      &estop_.a_.line,    &estop_.b_.line,
+                                                      &estop_.reset_,     &injector_.valve_};
+  const auto lines = wired_lines(params_, parts_);
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const WiredLine& line = lines[i];
+    if (!line.there) {
       continue;
     }
-    if (std::string error = claim(wanted.key, wanted.offset, wanted.use, wanted.into); !error.empty()) {
+    if (std::string error = claim(line.key, line.offset, line.use, *into[i]); !error.empty()) {
       return tl::unexpected(std::move(error));
     }
   }
@@ -112,11 +162,8 @@ tl::expected<void, std::string> GpiodDevices::claim_all() {
 
 // Empty, or the line that says why not.
 std::string GpiodDevices::claim(const char* key, int offset, Use use, std::unique_ptr<Line>& into) {
-  const std::string title = std::string("gpiod.") + key + " = " + std::to_string(offset) + ": ";
-  const unsigned lines = chip_->line_count();
-  if (offset < 0 || static_cast<unsigned>(offset) >= lines) {
-    return title + "no line of " + params_.chip + ", allowed: 0 to " +
-           std::to_string(static_cast<int>(lines) - 1);
+  if (std::string error = no_line(params_, key, offset, chip_->line_count()); !error.empty()) {
+    return error;
   }
   const bool closed_low = params_.contacts_closed == GpiodParams::Closed::low;
   LineRequest request{static_cast<unsigned>(offset), use};
@@ -130,7 +177,7 @@ std::string GpiodDevices::claim(const char* key, int offset, Use use, std::uniqu
   }
   auto line = chip_->claim(request);
   if (!line) {
-    return title + line.error() + ", allowed: a line of " + params_.chip +
+    return title(key, offset) + line.error() + ", allowed: a line of " + params_.chip +
            " that nothing else uses and that can do this (gpioinfo lists them)";
   }
   into = std::move(*line);

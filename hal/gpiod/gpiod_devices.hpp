@@ -1,7 +1,7 @@
 // The e-stop chain and the injector on the GPIO lines of one chip. Wiring: README.md.
 #pragma once
 
-#include <functional>
+#include <array>
 #include <memory>
 #include <string>
 #include <tl/expected.hpp>
@@ -58,10 +58,21 @@ struct GpiodParts {
   bool injector = false;
 };
 
+// The lines that these parts use, outputs first: they are to be in their safe state before anything else.
+struct WiredLine {
+  bool there;
+  const char* key;
+  int offset;
+  Use use;
+};
+[[nodiscard]] std::array<WiredLine, 6> wired_lines(const GpiodParams& params, GpiodParts parts);
+
+// Chip, lines, their names and users; claims none.
+[[nodiscard]] hal::Findings look(const GpiodParams& params, GpiodParts parts,
+                                 const OpenChip& open_chip_at = open_chip);
+
 class GpiodDevices final : public hal::Device {
  public:
-  using OpenChip = std::function<tl::expected<std::unique_ptr<Chip>, std::string>(const std::string& path)>;
-
   // clock: the station's, on which samples are dated.
   GpiodDevices(GpiodParams params, GpiodParts parts, const hal::Clock& clock,
                OpenChip open_chip_at = open_chip);

@@ -4,6 +4,7 @@
 
 #include <cerrno>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <tl/expected.hpp>
@@ -43,6 +44,13 @@ class Line {
   [[nodiscard]] virtual hal::Status take_changes(int& changes) NONBLOCKING = 0;
 };
 
+// What the chip says of a line, whoever uses it.
+struct LineFacts {
+  std::string name;  // empty: it has none
+  bool used = false;
+  std::string user;
+};
+
 class Chip {
  public:
   Chip() = default;
@@ -51,6 +59,8 @@ class Chip {
   Chip& operator=(const Chip&) = delete;
 
   [[nodiscard]] virtual unsigned line_count() const = 0;
+  [[nodiscard]] virtual std::string label() const = 0;
+  [[nodiscard]] virtual LineFacts facts(unsigned offset) const = 0;
   // The error says why not, in a few words.
   [[nodiscard]] virtual tl::expected<std::unique_ptr<Line>, std::string> claim(
       const LineRequest& request) = 0;
@@ -58,6 +68,7 @@ class Chip {
 
 // A chip by the path of its device. The error says why not, in a few words.
 [[nodiscard]] tl::expected<std::unique_ptr<Chip>, std::string> open_chip(const std::string& path);
+using OpenChip = std::function<tl::expected<std::unique_ptr<Chip>, std::string>(const std::string& path)>;
 
 // What the kernel's answer says of the device.
 [[nodiscard]] inline hal::Status status_of(int error) NONBLOCKING {

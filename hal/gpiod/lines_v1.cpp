@@ -65,12 +65,21 @@ int type_of(Use use) {
   return GPIOD_LINE_REQUEST_DIRECTION_OUTPUT;
 }
 
+std::string words(const char* text) { return text == nullptr ? "" : text; }
+
 class ChipV1 final : public Chip {
  public:
   explicit ChipV1(gpiod_chip* chip) : chip_(chip) {}
   ~ChipV1() override { gpiod_chip_close(chip_); }
 
   [[nodiscard]] unsigned line_count() const override { return gpiod_chip_num_lines(chip_); }
+  [[nodiscard]] std::string label() const override { return gpiod_chip_label(chip_); }
+  [[nodiscard]] LineFacts facts(unsigned offset) const override {
+    gpiod_line* line = gpiod_chip_get_line(chip_, offset);
+    return line == nullptr ? LineFacts{}
+                           : LineFacts{words(gpiod_line_name(line)), gpiod_line_is_used(line),
+                                       words(gpiod_line_consumer(line))};
+  }
   [[nodiscard]] tl::expected<std::unique_ptr<Line>, std::string> claim(const LineRequest& request) override {
     gpiod_line* line = gpiod_chip_get_line(chip_, request.offset);
     const gpiod_line_request_config config{"punctum", type_of(request.use), flags_of(request)};

@@ -53,6 +53,8 @@ class LineV2 final : public Line {
   unsigned offset_;
 };
 
+std::string words(const char* text) { return text == nullptr ? "" : text; }
+
 class ChipV2 final : public Chip {
  public:
   explicit ChipV2(gpiod_chip* chip) : chip_(chip) {}
@@ -61,6 +63,17 @@ class ChipV2 final : public Chip {
   [[nodiscard]] unsigned line_count() const override {
     const std::unique_ptr<gpiod_chip_info, Freed<gpiod_chip_info_free>> info(gpiod_chip_get_info(chip_));
     return info ? static_cast<unsigned>(gpiod_chip_info_get_num_lines(info.get())) : 0;
+  }
+  [[nodiscard]] std::string label() const override {
+    const std::unique_ptr<gpiod_chip_info, Freed<gpiod_chip_info_free>> info(gpiod_chip_get_info(chip_));
+    return info ? words(gpiod_chip_info_get_label(info.get())) : "";
+  }
+  [[nodiscard]] LineFacts facts(unsigned offset) const override {
+    const std::unique_ptr<gpiod_line_info, Freed<gpiod_line_info_free>> info(
+        gpiod_chip_get_line_info(chip_, offset));
+    return info ? LineFacts{words(gpiod_line_info_get_name(info.get())), gpiod_line_info_is_used(info.get()),
+                            words(gpiod_line_info_get_consumer(info.get()))}
+                : LineFacts{};
   }
   [[nodiscard]] tl::expected<std::unique_ptr<Line>, std::string> claim(const LineRequest& wanted) override {
     const std::unique_ptr<gpiod_line_settings, Freed<gpiod_line_settings_free>> settings(

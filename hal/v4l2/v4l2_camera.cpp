@@ -102,11 +102,37 @@ V4l2Camera::Done V4l2Camera::open() {
   return {};
 }
 
+hal::Findings V4l2Camera::look() {
+  using Is = hal::Finding::Is;
+  close();
+  const Answer opened = kernel_.open(params_.path.c_str());
+  if (opened.value < 0) {
+    return {{Is::missing, params_.path + ": " + reason(opened.error)}};
+  }
+  fd_ = opened.value;
+  Done done = check_capability();
+  if (done) {
+    done = ask_format(VIDIOC_TRY_FMT);
+  }
+  kernel_.close(std::exchange(fd_, -1));  // not close(): it would end a stream
+  if (!done) {
+    return {{Is::missing, params_.path + ": " + done.error()}};
+  }
+  std::string found = params_.path;
+  found.append(" (").append(name_).append("), ").append(fourcc_text(fourcc_of(params_.format))).append(" ");
+  found.append(
+      size_text(static_cast<std::uint32_t>(settings_.width), static_cast<std::uint32_t>(settings_.height)));
+  return {{Is::found, found.append(" px")}};
+}
+
 V4l2Camera::Done V4l2Camera::check_capability() {
   v4l2_capability about{};
   if (const Answer a = call(VIDIOC_QUERYCAP, &about); a.value < 0) {
     return wrong(a.error == ENOTTY || a.error == EINVAL ? "is no video device" : reason(a.error));
   }
+  // Of a driver that ends it by no zero, as much as there is room for.
+  const auto* card = reinterpret_cast<const char*>(about.card);
+  name_.assign(card, strnlen(card, sizeof about.card));
   const std::uint32_t can =
       (about.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? about.device_caps : about.capabilities;
   if ((can & V4L2_CAP_VIDEO_CAPTURE) == 0) {
@@ -130,14 +156,16 @@ std::string V4l2Camera::offered_formats() {
   return names.empty() ? "none" : names;
 }
 
-V4l2Camera::Done V4l2Camera::set_format() {
+V4l2Camera::Done V4l2Camera::set_format() { return ask_format(VIDIOC_S_FMT); }
+
+V4l2Camera::Done V4l2Camera::ask_format(unsigned long request) {
   v4l2_format format{};
   format.type = kCapture;
   format.fmt.pix.width = static_cast<std::uint32_t>(settings_.width);
   format.fmt.pix.height = static_cast<std::uint32_t>(settings_.height);
   format.fmt.pix.pixelformat = fourcc_of(params_.format);
   format.fmt.pix.field = V4L2_FIELD_NONE;
-  const Answer a = call(VIDIOC_S_FMT, &format);
+  const Answer a = call(request, &format);
   const v4l2_pix_format& got = format.fmt.pix;
   if (a.value < 0 && a.error != EINVAL) {
     return wrong(reason(a.error));

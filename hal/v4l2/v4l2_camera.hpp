@@ -10,6 +10,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "hal/device_life.hpp"
 #include "hal/live_camera.hpp"
 #include "hal/v4l2/config.hpp"
 #include "hal/v4l2/grey.hpp"
@@ -28,6 +29,8 @@ class V4l2Camera final : public hal::LiveCamera {
 
   [[nodiscard]] tl::expected<void, std::string> open() override;
   void close() noexcept override;
+  // Whether it is there and gives this picture; sets nothing, so that another program may stream meanwhile.
+  [[nodiscard]] hal::Findings look();
   // The newest picture that the kernel holds; older ones go back to it unseen. `fault`: there were only
   // damaged ones; sequence and time are of the last of them. `disconnected`: until it is opened again.
   [[nodiscard]] hal::Status next(hal::Frame& out, std::int64_t timeout_ns) override;
@@ -52,7 +55,8 @@ class V4l2Camera final : public hal::LiveCamera {
     const char* damage = nullptr;  // why it cannot be used
   };
 
-  [[nodiscard]] Done check_capability();
+  [[nodiscard]] Done check_capability();                 // and its name
+  [[nodiscard]] Done ask_format(unsigned long request);  // VIDIOC_S_FMT sets it, VIDIOC_TRY_FMT asks only
   [[nodiscard]] Done set_format();
   [[nodiscard]] Done set_interval();
   [[nodiscard]] Done lock_exposure();
@@ -77,6 +81,7 @@ class V4l2Camera final : public hal::LiveCamera {
   Kernel& kernel_;
 
   int fd_ = -1;
+  std::string name_;
   Layout layout_;
   std::vector<Buffer> buffers_;
   std::vector<std::uint8_t> grey_;  // of formats that must be converted

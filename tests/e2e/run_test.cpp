@@ -335,6 +335,21 @@ TEST_F(Programs, explain_says_what_runs_and_what_is_left_out) {
   EXPECT_NE(said_.find("a number from"), std::string::npos);
 }
 
+TEST_F(Programs, check_says_of_each_device_whether_it_is_there_and_devices_lists_those_that_are) {
+  EXPECT_EQ(punctum({"check", "icsi"}), 0) << said_;
+  EXPECT_NE(said_.find("ok   stage              simulated"), std::string::npos) << said_;
+  // No machine has this chip.
+  EXPECT_EQ(punctum({"check", "free", "--set", "gpiod=on", "--set", "estop.device=\"gpiod\"", "--set",
+                     "gpiod.chip=\"/dev/none\"", "--set", "gpiod.contact_a=0", "--set", "gpiod.contact_b=1",
+                     "--set", "gpiod.reset=2", "--set", "gpiod.heartbeat=3"}),
+            2)
+      << said_;
+  EXPECT_NE(said_.find("FAIL estop              gpiod: /dev/none: "), std::string::npos) << said_;
+  EXPECT_NE(said_.find("cannot run"), std::string::npos) << said_;
+  EXPECT_EQ(punctum({"devices"}), 0) << said_;
+  EXPECT_NE(said_.find("GPIO chips"), std::string::npos) << said_;
+}
+
 TEST_F(Programs, check_finds_frames_that_are_not_there) {
   EXPECT_EQ(punctum({"check", "free"}), 0) << said_;
   EXPECT_EQ(punctum({"check", "recorded", "--set", "camera.frames=/nowhere"}), 2);

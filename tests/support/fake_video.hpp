@@ -45,8 +45,8 @@ class FakeVideo final : public v4l2::Kernel {
   short events = 0;  // besides that a picture is there
 
   // What happened to it.
-  bool is_open = false, streams = false;
-  int mapped = 0, refusals_of_qbuf = 0, polled_ms = -1;
+  bool is_open = false, streams = false, was_set = false;
+  int stream_offs = 0, mapped = 0, refusals_of_qbuf = 0, polled_ms = -1;
   std::vector<std::vector<std::uint8_t>> memory;
   std::deque<std::uint32_t> queued;  // the driver's, in this order
   std::deque<v4l2_buffer> filled;    // and to be dequeued
@@ -119,6 +119,7 @@ class FakeVideo final : public v4l2::Kernel {
       case VIDIOC_QUERYCAP:
         static_cast<v4l2_capability*>(argument)->capabilities = capabilities | V4L2_CAP_DEVICE_CAPS;
         static_cast<v4l2_capability*>(argument)->device_caps = capabilities;
+        std::memcpy(static_cast<v4l2_capability*>(argument)->card, "a microscope camera", 20);
         return 0;
       case VIDIOC_ENUM_FMT: {
         auto& format = *static_cast<v4l2_fmtdesc*>(argument);
@@ -128,7 +129,9 @@ class FakeVideo final : public v4l2::Kernel {
         format.pixelformat = formats[format.index];
         return 0;
       }
+      case VIDIOC_TRY_FMT:
       case VIDIOC_S_FMT: {
+        was_set = was_set || request == VIDIOC_S_FMT;
         auto& pix = static_cast<v4l2_format*>(argument)->fmt.pix;
         if (std::find(formats.begin(), formats.end(), pix.pixelformat) == formats.end()) {
           pix.pixelformat = formats.empty() ? 0 : formats.front();
@@ -214,6 +217,7 @@ class FakeVideo final : public v4l2::Kernel {
         streams = true;
         return 0;
       case VIDIOC_STREAMOFF:
+        ++stream_offs;
         streams = false;
         return 0;
       default:

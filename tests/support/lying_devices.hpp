@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <new>
@@ -304,6 +305,13 @@ class LyingStation {
   };
   Truth truth;
 
+  // What these devices tell in place of their readings, for faults that no lie above is.
+  std::function<hal::Status(hal::EstopState&)> tell_estop;
+  std::function<hal::Status(hal::InjectorState&)> tell_injector;
+  std::function<hal::Status(hal::VacuumState&)> tell_vacuum;
+  std::function<hal::Status(hal::ForceState&)> tell_sensor;
+  int frame_divisor = 1;  // only every so many pictures is seen
+
   static constexpr double kR_m = 60e-6, kPuncture_m = 14e-6;
   const Vec3 registration{3e-6, -2e-6, 0};
 
@@ -496,7 +504,7 @@ class LyingStation {
 
   void look() {
     Truth& w = truth;
-    if (static_cast<std::int64_t>(w.tick) % frame_ticks_ != 0 || on(Lie::vision_gone)) {
+    if (static_cast<std::int64_t>(w.tick) % (frame_ticks_ * frame_divisor) != 0 || on(Lie::vision_gone)) {
       return;
     }
     Observation o;
@@ -757,16 +765,19 @@ class LyingStation {
     explicit Estop(LyingStation& s) : at(s) {}
     LyingStation& at;
     hal::Status read(hal::EstopState& out) noexcept override {
-      const hal::Status status = at.on(Lie::estop_gone)      ? hal::Status::disconnected
-                                 : at.on(Lie::estop_no_data) ? hal::Status::no_data
-                                                             : hal::Status::ok;
-      at.seen_.estop_status = status;
+      hal::Status status = at.on(Lie::estop_gone)      ? hal::Status::disconnected
+                           : at.on(Lie::estop_no_data) ? hal::Status::no_data
+                                                       : hal::Status::ok;
       if (status == hal::Status::ok) {
         out.contact_a_closed = !at.on(Lie::contact_a) && !at.on(Lie::contacts);
         out.contact_b_closed = !at.on(Lie::contact_b) && !at.on(Lie::contacts);
         out.reset_pressed = at.on(Lie::reset);
         out.pulse_seen = at.on(Lie::pulse);
         out.sample_ns = at.truth.now;
+        status = at.tell_estop ? at.tell_estop(out) : status;
+      }
+      at.seen_.estop_status = status;
+      if (status == hal::Status::ok) {
         at.seen_.estop = out;
       }
       return status;
@@ -781,7 +792,7 @@ class LyingStation {
     hal::Status read(hal::InjectorState& out) noexcept override {
       out.open = (at.truth.gate || at.on(Lie::injector_stuck_open)) && !at.on(Lie::injector_stuck_shut);
       out.sample_ns = at.truth.now;
-      return hal::Status::ok;
+      return at.tell_injector ? at.tell_injector(out) : hal::Status::ok;
     }
   };
   struct Vacuum final : hal::HoldingVacuum {
@@ -790,7 +801,7 @@ class LyingStation {
     hal::Status read(hal::VacuumState& out) noexcept override {
       out.pressure_Pa = (at.on(Lie::vacuum_lost) ? 50 : 600) + 0.1 * (at.truth.gauge++ % 2);
       out.sample_ns = at.truth.now;
-      return hal::Status::ok;
+      return at.tell_vacuum ? at.tell_vacuum(out) : hal::Status::ok;
     }
   };
 
@@ -801,7 +812,7 @@ class LyingStation {
       out.axial_force_N = at.on(Lie::sensor_nan) ? std::numeric_limits<double>::quiet_NaN()
                                                  : at.value(Lie::sensor_pushed) + 1e-9 * (at.truth.gauge % 2);
       out.sample_ns = at.truth.now;
-      return hal::Status::ok;
+      return at.tell_sensor ? at.tell_sensor(out) : hal::Status::ok;
     }
   };
 

@@ -12,6 +12,7 @@
 #include "rt/control/device_limits.hpp"
 #include "rt/forces/list.hpp"
 #include "rt/platform/real_time_rights.hpp"
+#include "tools/punctum/device_looks.hpp"
 #include "tools/scene/messages.hpp"
 #include "tools/scene/scene_keys.hpp"
 #include "tools/shared/child.hpp"
@@ -20,17 +21,6 @@ namespace punctum::tools {
 namespace {
 
 namespace fs = std::filesystem;
-
-// Every device with its backend: "haptic simulated, stage simulated, ...".
-std::string backends(const Scene& s) {
-  std::string text;
-  for (const NamedDevice& d : scene_devices()) {
-    if (const std::string& backend = s.devices.*d.backend; !backend.empty()) {
-      text += fmt::format("{}{} {}", text.empty() ? "" : ", ", d.table, backend);
-    }
-  }
-  return text;
-}
 
 // Where one frame comes from.
 std::string camera_text(const Scene& s) {
@@ -358,19 +348,6 @@ tl::expected<std::string, std::string> files_of(const Scene& s) {
     }
     found = fmt::format("{}: {} file(s)", f, n);
   }
-  if (s.v4l2) {
-    const std::string& f = s.v4l2->path;
-    std::error_code ec;
-    if (!fs::is_character_file(f, ec)) {
-      return tl::unexpected(fmt::format(
-          "v4l2.path: {}: no camera is there, allowed: one that is plugged in (ls /dev/v4l/by-id)", f));
-    }
-    if (access(f.c_str(), R_OK | W_OK) != 0) {
-      return tl::unexpected(fmt::format(
-          "v4l2.path: {}: may not be opened, add the user to the group of the device (video)", f));
-    }
-    found = f;
-  }
   if (s.vision && s.vision->holder && !s.vision->holder->template_path.empty()) {
     const std::string& f = s.vision->holder->template_path;
     std::error_code ec;
@@ -398,8 +375,16 @@ int check(const Scene& s, std::string& text) {
     good = row(!path.empty(), program, path.empty() ? "not found beside this program nor in PATH" : path) &&
            good;
   }
-  row(true, "devices", backends(s) + (s.servo.real_actuators ? "" : ": no actuator is there to touch"));
-  if (s.recorded || s.v4l2 || (s.vision && s.vision->holder && !s.vision->holder->template_path.empty())) {
+  for (const auto& [device, finding] : look_at_devices(s)) {
+    using Is = hal::Finding::Is;
+    text += fmt::format("  {} {:<18} {}\n",
+                        finding.is == Is::found  ? "ok  "
+                        : finding.is == Is::note ? "note"
+                                                 : "FAIL",
+                        device, finding.line);
+    good = good && finding.is != Is::missing;
+  }
+  if (s.recorded || (s.vision && s.vision->holder && !s.vision->holder->template_path.empty())) {
     const auto files = files_of(s);
     good = row(files.has_value(), "files", files ? *files : files.error()) && good;
   }

@@ -11,6 +11,7 @@
 
 #include "tools/punctum/explain.hpp"
 #include "tools/punctum/lab_report.hpp"
+#include "tools/punctum/plugged_in.hpp"
 #include "tools/punctum/positioning.hpp"
 #include "tools/punctum/supervisor.hpp"
 #include "tools/punctum/terminal.hpp"
@@ -48,6 +49,7 @@ int main_or_throw(int argc, char** argv) {
        {"punctum run icsi --clock virtual --seed 7", "the same, as fast as possible and the same every time"},
        {"punctum run my.toml --set servo.rate_hz=2000", "a scene of your own, one number changed"},
        {"punctum explain zebrafish", "what would run, and what is left out"},
+       {"punctum devices", "what is plugged in, and how a scene names it"},
        {"punctum report reports/a reports/b", "their reports once more, and the two compared"}},
       exit_codes_of_run()));
   std::string scene_name;
@@ -106,6 +108,8 @@ int main_or_throw(int argc, char** argv) {
                        ->expected(3);
   auto* const park = moving->add_flag("--park", parks, "to zaber.park_um of the scene");
   to->excludes(park);
+  CLI::App* listing =
+      app.add_subcommand("devices", "list what is plugged in, and the lines of a scene that would use it");
 
   CLI::App* reporting = app.add_subcommand(
       "report", "make report.html again, after a crash report.json too; of several runs also compare them");
@@ -131,6 +135,8 @@ int main_or_throw(int argc, char** argv) {
                               {exit_not_done, "stopped on the way, by control-C"},
                               {exit_bad_input, "bad input: nothing has moved"},
                               {exit_fault, "the manipulator has a fault"}}));
+  listing->footer(
+      help_footer({{"punctum devices", "what a scene could name on this machine"}}, {{exit_done, "listed"}}));
   reporting->footer(
       help_footer({{"punctum report reports/icsi-20260101-120000", "after a crash, or from an older version"},
                    {"punctum report reports/icsi-*", "all of them, compared in a table with figures"}},
@@ -140,6 +146,10 @@ int main_or_throw(int argc, char** argv) {
 
   if (const auto code = parse_command_line(app, argc, argv)) {
     return *code;
+  }
+  if (*listing) {
+    Terminal().print(plugged_in(Machine{}));
+    return all_was_said() ? exit_done : exit_not_done;
   }
   if (*reporting) {
     return report_folders(folders, comparison);

@@ -24,6 +24,7 @@ struct Wire {
 
 struct Board {
   std::map<unsigned, Wire> wires;
+  std::map<unsigned, LineFacts> facts;
   unsigned lines = 32;
   bool open = false;
   std::string refuses;             // to be opened
@@ -68,6 +69,11 @@ class BoardChip final : public Chip {
   explicit BoardChip(Board& board) : board_(board) { board_.open = true; }
   ~BoardChip() override { board_.open = false; }
   unsigned line_count() const override { return board_.lines; }
+  std::string label() const override { return "a board"; }
+  LineFacts facts(unsigned offset) const override {
+    const auto line = board_.facts.find(offset);
+    return line == board_.facts.end() ? LineFacts{} : line->second;
+  }
   tl::expected<std::unique_ptr<Line>, std::string> claim(const LineRequest& request) override {
     if (static_cast<int>(request.offset) == board_.refused_offset) {
       return tl::unexpected(std::string("Device or resource busy"));

@@ -1,0 +1,146 @@
+#include "tools/punctum/device_looks.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "hal/gpiod/gpiod_devices.hpp"
+#include "hal/v4l2/v4l2_camera.hpp"
+#include "rt/executive/monotonic_clock.hpp"
+#include "tools/scene/messages.hpp"
+#include "tools/scene/scene_keys.hpp"
+
+namespace punctum::tools {
+namespace {
+
+using Is = hal::Finding::Is;
+
+hal::Findings look_at_simulated(const Scene&, const Machine&, std::string_view) { return {{Is::found, ""}}; }
+
+hal::Findings look_at_recorded(const Scene& scene, const Machine&, std::string_view) {
+  return {{Is::found, fmt::format("{:g} per s", scene.recorded->fps)}};
+}
+
+hal::Findings look_at_gpiod(const Scene& scene, const Machine& machine, std::string_view device) {
+  return gpiod::look(*scene.gpiod, {device == "estop", device == "injector"}, machine.open_chip);
+}
+
+hal::Findings look_at_cia402(const Scene& scene, const Machine& machine, std::string_view device) {
+  if (device != "stage") {
+    return {{Is::found, fmt::format("node {}, on the bus of the stage", scene.cia402->force_node)}};
+  }
+  return cia402::look(*scene.cia402, machine.can_link(scene.cia402->interface));
+}
+
+hal::Findings look_at_v4l2(const Scene& scene, const Machine& machine, std::string_view) {
+  const rt::MonotonicClock clock;
+  return v4l2::V4l2Camera(*scene.v4l2, *scene.camera, clock, *machine.video).look();
+}
+
+// The library that speaks to these cameras looks for them in the network, and opens them to know more.
+hal::Findings look_at_aravis(const Scene& scene, const Machine& machine, std::string_view) {
+  const std::string& name = scene.aravis->name;
+  const std::vector<PluggedIn> cameras = usb_vision_cameras(machine);
+  const auto one = std::ranges::find_if(
+      cameras, [&name](const PluggedIn& camera) { return name.empty() || camera.place == name; });
+  if (one == cameras.end()) {
+    return {{Is::note, fmt::format("{}is not on USB; a GigE camera shows when it is opened",
+                                   name.empty() ? "" : name + " ")}};
+  }
+  return {{one->remedy.empty() ? Is::found : Is::missing, one->remedy.empty() ? one->what : one->remedy}};
+}
+
+hal::Findings one_of(const std::vector<PluggedIn>& there, std::string missing) {
+  if (there.empty()) {
+    return {{Is::missing, std::move(missing)}};
+  }
+  const PluggedIn& first = there.front();
+  return {first.remedy.empty() ? hal::Finding{Is::found, fmt::format("{} ({})", first.place, first.what)}
+                               : hal::Finding{Is::missing, first.remedy}};
+}
+
+hal::Findings look_at_falcon(const Scene&, const Machine& machine, std::string_view) {
+  return one_of(falcons(machine), "no Falcon is plugged in (USB 0403:cb48)");
+}
+
+// A device file that is opened when the run begins.
+hal::Findings look_at_file(const Machine& machine, const std::string& path, const char* key) {
+  std::error_code ec;
+  if (!std::filesystem::is_character_file(machine.at(path), ec)) {
+    return {{Is::missing,
+             fmt::format("{}: no such device, allowed for {}: one that `punctum devices` shows", path, key)}};
+  }
+  std::string remedy = remedy_for(machine.at(path), path);
+  return {remedy.empty() ? hal::Finding{Is::found, path} : hal::Finding{Is::missing, std::move(remedy)}};
+}
+
+hal::Findings look_at_evdev(const Scene& scene, const Machine& machine, std::string_view) {
+  if (!scene.evdev->path.empty()) {
+    return look_at_file(machine, scene.evdev->path, "evdev.path");
+  }
+  std::vector<PluggedIn> hands = hand_inputs(machine);
+  std::erase_if(hands, [&scene](const PluggedIn& one) {
+    return one.what.find(scene.evdev->name) == std::string::npos;
+  });
+  return one_of(hands, "no mouse, gamepad or SpaceMouse is plugged in that evdev.name fits");
+}
+
+hal::Findings look_at_zaber(const Scene& scene, const Machine& machine, std::string_view) {
+  return look_at_file(machine, scene.zaber->port, "zaber.port");
+}
+
+hal::Finding look_at_watchdog(const WatchdogParams& params, const Machine& machine) {
+  std::error_code ec;
+  if (!std::filesystem::is_character_file(machine.at(params.path), ec)) {
+    return {Is::missing, params.path +
+                             ": no watchdog is there, allowed for watchdog.path: one that `punctum devices` "
+                             "shows (modprobe softdog gives one without hardware)"};
+  }
+  if (std::string remedy = remedy_for(machine.at(params.path), params.path); !remedy.empty()) {
+    return {Is::missing, std::move(remedy)};
+  }
+  // /dev/watchdog is the first of them.
+  const std::string path = params.path == "/dev/watchdog" ? "/dev/watchdog0" : params.path;
+  for (const PluggedIn& one : watchdogs(machine)) {
+    if (one.place == path) {
+      return {one.remedy.empty() ? Is::found : Is::missing,
+              one.remedy.empty() ? fmt::format("{} ({})", params.path, one.what) : one.remedy};
+    }
+  }
+  return {Is::found, params.path};
+}
+
+}  // namespace
+
+const std::vector<DeviceLook>& device_looks() {
+  static const std::vector<DeviceLook> looks = {
+      {kSimulated, look_at_simulated}, {kRecorded, look_at_recorded}, {kGpiod, look_at_gpiod},
+      {kCia402, look_at_cia402},       {kV4l2, look_at_v4l2},         {kAravis, look_at_aravis},
+      {kFalcon, look_at_falcon},       {kEvdev, look_at_evdev},       {kZaber, look_at_zaber}};
+  return looks;
+}
+
+std::vector<DeviceFinding> look_at_devices(const Scene& scene, const Machine& machine) {
+  std::vector<DeviceFinding> all;
+  for (const NamedDevice& device : scene_devices()) {
+    const std::string& backend = scene.devices.*device.backend;
+    if (backend.empty()) {
+      continue;
+    }
+    const auto look = std::ranges::find(device_looks(), backend, &DeviceLook::backend);
+    const hal::Findings findings = look != device_looks().end()
+                                       ? look->look(scene, machine, device.table)
+                                       : hal::Findings{{Is::note, "shows when it is opened"}};
+    for (const hal::Finding& finding : findings) {
+      all.push_back(
+          {device.table,
+           {finding.is, backend + (finding.line.empty() ? "" : ": ") + printable(finding.line, 1000)}});
+    }
+  }
+  if (scene.watchdog) {
+    all.push_back({"watchdog", look_at_watchdog(*scene.watchdog, machine)});
+  }
+  return all;
+}
+
+}  // namespace punctum::tools

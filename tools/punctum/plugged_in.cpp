@@ -1,0 +1,364 @@
+#include "tools/punctum/plugged_in.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <grp.h>
+#include <linux/input-event-codes.h>
+#include <linux/videodev2.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <set>
+
+#include "tools/scene/messages.hpp"
+#include "tools/scene/scene.hpp"
+
+namespace punctum::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The first line of a file in sysfs; empty where there is none.
+std::string line_of(const fs::path& file) {
+  std::ifstream in(file);
+  std::string line;
+  std::getline(in, line);
+  return printable(line, 100);
+}
+
+// Names in a folder that begin so, video2 before video10.
+std::vector<std::string> names_in(const fs::path& folder, std::string_view begin) {
+  std::vector<std::string> names;
+  std::error_code ec;
+  for (auto it = fs::directory_iterator(folder, ec); !ec && it != fs::directory_iterator();
+       it.increment(ec)) {
+    if (std::string name = it->path().filename().string(); name.starts_with(begin)) {
+      names.push_back(std::move(name));
+    }
+  }
+  std::sort(names.begin(), names.end(), [](const std::string& a, const std::string& b) {
+    return std::pair(a.size(), a) < std::pair(b.size(), b);
+  });
+  return names;
+}
+
+bool is_there(const fs::path& file) {
+  std::error_code ec;
+  return fs::exists(file, ec);
+}
+
+// A bitmap of sysfs: hexadecimal words of the machine's size, the highest first.
+bool has_bit(const std::string& words, unsigned bit) {
+  constexpr unsigned kWord = 8 * sizeof(unsigned long);
+  std::vector<std::string> parts;
+  for (std::size_t at = 0; at < words.size();) {
+    const std::size_t end = std::min(words.find(' ', at), words.size());
+    if (end > at) {
+      parts.push_back(words.substr(at, end - at));
+    }
+    at = end + 1;
+  }
+  if (bit / kWord >= parts.size()) {
+    return false;
+  }
+  const unsigned long word = std::strtoul(parts[parts.size() - 1 - bit / kWord].c_str(), nullptr, 16);
+  return (word >> bit % kWord & 1) != 0;
+}
+
+bool has_bits(const std::string& words, std::initializer_list<unsigned> bits) {
+  return std::all_of(bits.begin(), bits.end(), [&words](unsigned bit) { return has_bit(words, bit); });
+}
+
+// What an input device can be as a hand; null: none.
+const char* hand_kind(const fs::path& abilities) {
+  const std::string keys = line_of(abilities / "key"), relative = line_of(abilities / "rel"),
+                    absolute = line_of(abilities / "abs");
+  if (has_bits(relative, {REL_X, REL_Y, REL_Z, REL_RX, REL_RY, REL_RZ}) ||
+      (has_bits(absolute, {ABS_X, ABS_Y, ABS_Z, ABS_RX, ABS_RY, ABS_RZ}) && !has_bit(keys, BTN_SOUTH))) {
+    return "knob of six axes";
+  }
+  if (has_bits(absolute, {ABS_X, ABS_Y, ABS_RX, ABS_RY}) && has_bit(keys, BTN_SOUTH)) {
+    return "gamepad";
+  }
+  return has_bits(relative, {REL_X, REL_Y}) && has_bit(keys, BTN_LEFT) ? "mouse" : nullptr;
+}
+
+PluggedIn usb_place(const Machine& machine, const UsbDevice& usb, std::string place) {
+  return {std::move(place),
+          fmt::format("{} {} (USB {}:{}{}{})", usb.maker, usb.name, usb.vendor, usb.product,
+                      usb.serial.empty() ? "" : ", serial number ", usb.serial),
+          remedy_for(machine.at(usb.path), usb.path)};
+}
+
+}  // namespace
+
+std::string remedy_for(const fs::path& file, const std::string& shown) {
+  if (faccessat(AT_FDCWD, file.c_str(), R_OK | W_OK, AT_EACCESS) == 0 || errno != EACCES) {
+    return "";
+  }
+  struct stat about{};
+  const group* owner =
+      stat(file.c_str(), &about) == 0 && about.st_gid != 0 ? getgrgid(about.st_gid) : nullptr;
+  return owner != nullptr
+             ? fmt::format("{}: this user may not use it: sudo usermod -aG {} $USER, and log in again", shown,
+                           owner->gr_name)
+             : fmt::format("{}: this user may not use it: give it to a group of yours by a udev rule", shown);
+}
+
+std::vector<PluggedIn> gpio_chips(const Machine& machine) {
+  std::vector<PluggedIn> found;
+  for (const std::string& name : names_in(machine.at("/dev"), "gpiochip")) {
+    const std::string path = "/dev/" + name;
+    const auto chip = machine.open_chip(machine.at(path).string());
+    if (!chip) {
+      const std::string remedy = remedy_for(machine.at(path), path);
+      found.push_back({path, "a GPIO chip", remedy.empty() ? path + ": " + chip.error() : remedy});
+      continue;
+    }
+    const unsigned lines = (*chip)->line_count();
+    std::string what = fmt::format("{}, {} lines", printable((*chip)->label(), 100), lines);
+    for (unsigned i = 0; i < lines; ++i) {
+      const gpiod::LineFacts facts = (*chip)->facts(i);
+      if (!facts.name.empty() || facts.used) {
+        what += fmt::format(", {}{}{}", i,
+                            facts.name.empty() ? "" : fmt::format(" \"{}\"", printable(facts.name, 40)),
+                            facts.used ? fmt::format(" used by {}", printable(facts.user, 40)) : "");
+      }
+    }
+    found.push_back({path, what, ""});
+  }
+  return found;
+}
+
+std::vector<PluggedIn> can_interfaces(const Machine& machine) {
+  std::vector<PluggedIn> found;
+  for (const std::string& name : names_in(machine.at("/sys/class/net"), "")) {
+    const auto link = machine.can_link(name);
+    if (!link || !link->can) {
+      continue;
+    }
+    found.push_back(
+        {name,
+         fmt::format("{}{}{}", link->kind.empty() ? "can" : link->kind, link->up ? ", up" : ", down",
+                     link->bitrate != 0 ? fmt::format(", {} bit/s", link->bitrate) : ""),
+         link->up ? "" : cia402::bring_up(name, cia402::CanStageParams{}.bitrate_kbit)});
+  }
+  return found;
+}
+
+std::vector<PluggedIn> v4l2_cameras(const Machine& machine) {
+  std::vector<PluggedIn> found;
+  for (const std::string& name : names_in(machine.at("/sys/class/video4linux"), "video")) {
+    std::string path = "/dev/" + name;
+    const std::string card = line_of(machine.at("/sys/class/video4linux") / name / "name");
+    const v4l2::Answer opened = machine.video->open(machine.at(path).c_str());
+    if (opened.value < 0) {
+      const std::string remedy = remedy_for(machine.at(path), path);
+      found.push_back({path, card, remedy.empty() ? path + ": " + std::strerror(opened.error) : remedy});
+      continue;
+    }
+    v4l2_capability about{};
+    const bool asked = machine.video->ioctl(opened.value, VIDIOC_QUERYCAP, &about).value >= 0;
+    machine.video->close(opened.value);
+    const std::uint32_t can =
+        (about.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? about.device_caps : about.capabilities;
+    // A camera has nodes of other kinds too.
+    if (!asked || (can & V4L2_CAP_VIDEO_CAPTURE) == 0) {
+      continue;
+    }
+    // A name that stays the same when it is plugged in again.
+    for (const std::string& id : names_in(machine.at("/dev/v4l/by-id"), "")) {
+      std::error_code ec;
+      if (fs::read_symlink(machine.at("/dev/v4l/by-id") / id, ec).filename() == name) {
+        path = "/dev/v4l/by-id/" + id;
+        break;
+      }
+    }
+    found.push_back({path, card, ""});
+  }
+  return found;
+}
+
+std::vector<UsbDevice> usb_devices(const Machine& machine) {
+  std::vector<UsbDevice> found;
+  const fs::path folder = machine.at("/sys/bus/usb/devices");
+  for (const std::string& name : names_in(folder, "")) {
+    const fs::path device = folder / name;
+    if (!is_there(device / "idVendor")) {
+      continue;  // an interface
+    }
+    UsbDevice usb;
+    usb.vendor = line_of(device / "idVendor");
+    usb.product = line_of(device / "idProduct");
+    usb.maker = line_of(device / "manufacturer");
+    usb.name = line_of(device / "product");
+    usb.serial = line_of(device / "serial");
+    usb.path =
+        fmt::format("/dev/bus/usb/{:0>3}/{:0>3}", line_of(device / "busnum"), line_of(device / "devnum"));
+    // Class "miscellaneous", subclass 5: USB3 Vision.
+    for (const std::string& interface : names_in(folder, name + ":")) {
+      usb.vision = usb.vision || (line_of(folder / interface / "bInterfaceClass") == "ef" &&
+                                  line_of(folder / interface / "bInterfaceSubClass") == "05");
+    }
+    found.push_back(std::move(usb));
+  }
+  return found;
+}
+
+std::vector<PluggedIn> usb_vision_cameras(const Machine& machine) {
+  std::vector<PluggedIn> found;
+  for (const UsbDevice& usb : usb_devices(machine)) {
+    if (usb.vision) {
+      found.push_back(usb_place(machine, usb, usb.maker + "-" + usb.serial));
+    }
+  }
+  return found;
+}
+
+std::vector<PluggedIn> falcons(const Machine& machine) {
+  std::vector<PluggedIn> found;
+  for (const UsbDevice& usb : usb_devices(machine)) {
+    if (usb.vendor == "0403" && usb.product == "cb48") {
+      found.push_back(usb_place(machine, usb, usb.path));
+    }
+  }
+  return found;
+}
+
+std::vector<PluggedIn> hand_inputs(const Machine& machine) {
+  std::vector<PluggedIn> found;
+  for (const std::string& name : names_in(machine.at("/sys/class/input"), "event")) {
+    const fs::path device = machine.at("/sys/class/input") / name / "device";
+    const char* kind = hand_kind(device / "capabilities");
+    if (kind == nullptr) {
+      continue;
+    }
+    const std::string path = "/dev/input/" + name;
+    found.push_back(
+        {path, fmt::format("{} ({})", line_of(device / "name"), kind), remedy_for(machine.at(path), path)});
+  }
+  return found;
+}
+
+std::vector<PluggedIn> serial_ports(const Machine& machine) {
+  std::vector<PluggedIn> found;
+  std::set<std::string> named;
+  for (const std::string& id : names_in(machine.at("/dev/serial/by-id"), "")) {
+    const std::string path = "/dev/serial/by-id/" + id;
+    std::error_code ec;
+    const std::string to = fs::read_symlink(machine.at(path), ec).filename().string();
+    named.insert(to);
+    found.push_back({path, "serial port " + to, remedy_for(machine.at(path), path)});
+  }
+  for (const char* begin : {"ttyUSB", "ttyACM"}) {
+    for (const std::string& name : names_in(machine.at("/dev"), begin)) {
+      if (!named.contains(name)) {
+        found.push_back(
+            {"/dev/" + name, "serial port", remedy_for(machine.at("/dev/" + name), "/dev/" + name)});
+      }
+    }
+  }
+  return found;
+}
+
+std::vector<PluggedIn> watchdogs(const Machine& machine) {
+  std::vector<PluggedIn> found;
+  for (const std::string& name : names_in(machine.at("/sys/class/watchdog"), "watchdog")) {
+    const fs::path device = machine.at("/sys/class/watchdog") / name;
+    const std::string path = "/dev/" + name;
+    const std::string identity = line_of(device / "identity");
+    std::string what = identity.empty() ? "watchdog" : identity;
+    if (const std::string timeout = line_of(device / "timeout"); !timeout.empty()) {
+      what += ", " + timeout + " s";
+    }
+    std::string remedy = remedy_for(machine.at(path), path);
+    if (line_of(device / "state") == "active") {
+      remedy = path + ": somebody feeds it already (systemd: RuntimeWatchdogSec)";
+    } else if (line_of(device / "nowayout") == "1") {
+      remedy = path + ": could not be disarmed at the end of a run (its driver's option nowayout)";
+    }
+    found.push_back({path, what, remedy});
+  }
+  return found;
+}
+
+const std::vector<PluggedKind>& plugged_kinds() {
+  static const std::vector<PluggedKind> kinds = {
+      {"GPIO chips", gpio_chips, "estop", "gpiod",
+       "[estop]\n"
+       "device = \"gpiod\"\n"
+       "[gpiod]\n"
+       "chip = \"{}\"\n"
+       "# and the numbers of the lines: contact_a, contact_b, reset, heartbeat; of an injector, gate\n"},
+      {"CAN interfaces", can_interfaces, "stage", "cia402",
+       "[stage]\n"
+       "device = \"cia402\"\n"
+       "[mapping]\n"
+       "max_tilt_rad = 0\n"
+       "[cia402]\n"
+       "interface = \"{}\"\n"
+       "# and a [[cia402.axis]] with node and count_um for each drive\n"},
+      {"V4L2 cameras", v4l2_cameras, "camera", "v4l2",
+       "[camera]\n"
+       "device = \"v4l2\"\n"
+       "[v4l2]\n"
+       "path = \"{}\"\n"},
+      {"USB3 Vision cameras", usb_vision_cameras, "camera", "aravis",
+       "[camera]\n"
+       "device = \"aravis\"\n"
+       "[aravis]\n"
+       "name = \"{}\"\n"},
+      {"Novint Falcons", falcons, "haptic", "falcon",
+       "[haptic]\n"
+       "device = \"falcon\"\n"
+       "[falcon]\n"},
+      {"mice, gamepads, SpaceMice", hand_inputs, "haptic", "evdev",
+       "[haptic]\n"
+       "device = \"evdev\"\n"
+       "[evdev]\n"
+       "path = \"{}\"\n"},
+      {"serial ports", serial_ports, "positioner", "zaber",
+       "[positioner]\n"
+       "device = \"zaber\"\n"
+       "[zaber]\n"
+       "port = \"{}\"\n"},
+      {"watchdogs", watchdogs, "", "",
+       "[watchdog]\n"
+       "path = \"{}\"\n"},
+  };
+  return kinds;
+}
+
+std::string plugged_in(const Machine& machine) {
+  std::string text;
+  for (const PluggedKind& kind : plugged_kinds()) {
+    const std::vector<PluggedIn> found = kind.list(machine);
+    text += fmt::format("{}{}\n", kind.title, found.empty() ? ": none" : "");
+    const auto device = known_backends().find(kind.table);
+    const bool usable =
+        *kind.table == '\0' || (device != known_backends().end() &&
+                                std::ranges::find(device->second, kind.backend) != device->second.end());
+    for (const PluggedIn& one : found) {
+      text += fmt::format("  {}  {}\n", one.place, one.what);
+      if (!one.remedy.empty()) {
+        text += fmt::format("      first: {}\n", one.remedy);
+      }
+      std::string lines = usable ? kind.lines : "# this program cannot use it\n";
+      if (const auto place = lines.find("{}"); place != std::string::npos) {
+        lines.replace(place, 2, one.place);
+      }
+      for (std::size_t at = 0; at < lines.size();) {
+        const std::size_t end = lines.find('\n', at);
+        text += "      " + lines.substr(at, end - at) + "\n";
+        at = end + 1;
+      }
+    }
+  }
+  return text;
+}
+
+}  // namespace punctum::tools

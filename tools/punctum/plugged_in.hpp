@@ -1,0 +1,72 @@
+// What is plugged in to this machine, and the lines of a scene that would use it. Reads, and asks the kernel;
+// opens no watchdog (that would arm it), claims nothing, sends nothing.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "hal/cia402/look.hpp"
+#include "hal/gpiod/lines.hpp"
+#include "hal/v4l2/kernel.hpp"
+
+namespace punctum::tools {
+
+// Where to look; a test puts folders and answers of its own in their place.
+struct Machine {
+  std::filesystem::path root = "/";
+  gpiod::OpenChip open_chip = gpiod::open_chip;
+  std::function<std::optional<cia402::CanLink>(const std::string&)> can_link = cia402::can_link;
+  v4l2::Kernel* video = &v4l2::this_kernel();
+
+  // Of the path on the machine.
+  [[nodiscard]] std::filesystem::path at(const std::filesystem::path& path) const {
+    return root / path.relative_path();
+  }
+};
+
+struct PluggedIn {
+  std::string place;  // path or name, as a scene says it
+  std::string what;
+  std::string remedy;  // what keeps this user from it, and what to do; empty: nothing
+};
+
+struct UsbDevice {
+  std::string vendor, product;  // four hexadecimal digits each
+  std::string maker, name, serial;
+  std::string path;     // /dev/bus/usb/BUS/DEVICE
+  bool vision = false;  // USB3 Vision
+};
+
+[[nodiscard]] std::vector<PluggedIn> gpio_chips(const Machine& machine);
+[[nodiscard]] std::vector<PluggedIn> can_interfaces(const Machine& machine);
+[[nodiscard]] std::vector<PluggedIn> v4l2_cameras(const Machine& machine);
+[[nodiscard]] std::vector<UsbDevice> usb_devices(const Machine& machine);
+[[nodiscard]] std::vector<PluggedIn> usb_vision_cameras(const Machine& machine);
+[[nodiscard]] std::vector<PluggedIn> falcons(const Machine& machine);
+// Mice, gamepads and knobs of six axes: what can be a hand.
+[[nodiscard]] std::vector<PluggedIn> hand_inputs(const Machine& machine);
+[[nodiscard]] std::vector<PluggedIn> serial_ports(const Machine& machine);
+[[nodiscard]] std::vector<PluggedIn> watchdogs(const Machine& machine);
+
+// Empty, or what to do so that this user may read and write it.
+[[nodiscard]] std::string remedy_for(const std::filesystem::path& file, const std::string& shown);
+
+// The text of `punctum devices`.
+[[nodiscard]] std::string plugged_in(const Machine& machine);
+
+// How one kind of device is listed, and used by a scene: {} in the lines is its place. A kind whose backend
+// this program lacks is listed without lines.
+struct PluggedKind {
+  const char* title;
+  std::vector<PluggedIn> (*list)(const Machine&);
+  const char* table;  // of the device; empty: the lines need no backend
+  const char* backend;
+  const char* lines;
+};
+[[nodiscard]] const std::vector<PluggedKind>& plugged_kinds();
+
+}  // namespace punctum::tools

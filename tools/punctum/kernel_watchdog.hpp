@@ -1,6 +1,6 @@
-// The machine's hardware watchdog, through the kernel (Documentation/watchdog/watchdog-api.rst): unless it is fed
-// in time, the machine restarts. It is for what kills the parent or the kernel; of a core that hangs the parent
-// takes care, and the relay of the heartbeat before everybody.
+// The machine's hardware watchdog, through the kernel (Documentation/watchdog/watchdog-api.rst): unless it is
+// fed in time, the machine restarts. It is for what kills the parent or the kernel; of a core that hangs the
+// parent takes care, and the relay of the heartbeat before everybody.
 #pragma once
 
 #include <string>

@@ -37,7 +37,7 @@ struct Held {
 TEST(EnablingDevice, takes_a_new_press_alone_for_an_act) {
   Held h;
   EXPECT_EQ(h.ticks(kButtonEnable, 1000), Fault::none);
-  EXPECT_FALSE(h.device.enabled());  // held from the start
+  EXPECT_FALSE(h.device.enabled());        // held from the start
   EXPECT_EQ(h.ticks(0, 20), Fault::none);  // interference
   EXPECT_EQ(h.ticks(kButtonEnable, 1000), Fault::none);
   EXPECT_FALSE(h.device.enabled());

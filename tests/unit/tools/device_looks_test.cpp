@@ -40,7 +40,7 @@ const std::string kOnTheBus =
     "[[cia402.axis]]\nnode = 1\ncount_um = [0.04, 0, 0]\n[[cia402.axis]]\nnode = 2\ncount_um = [0, 0.04, 0]\n"
     "[[cia402.axis]]\nnode = 3\ncount_um = [0, 0, 0.04]\n";
 const std::string kWatched = kSmallest +
-                             "[camera]\ndevice = \"v4l2\"\nwidth = 640\nheight = 480\n[v4l2]\npath = "
+                             "[camera]\ndevice = \"v4l2\"\nwidth_px = 640\nheight_px = 480\n[v4l2]\npath = "
                              "\"/dev/video0\"\n[vision]\nmethod = \"paper\"\ninner = false\n";
 
 // ---- a message of rtnetlink ----
@@ -300,7 +300,7 @@ TEST_F(DeviceLooks, a_camera_that_another_program_streams_goes_on_streaming) {
 TEST_F(DeviceLooks, a_camera_that_is_not_there_or_gives_another_picture_is_missing) {
   video.width = 320;
   EXPECT_TRUE(says(look(kWatched),
-                   "MISSING v4l2: /dev/video0: camera.width and height: it does not give 640 "
+                   "MISSING v4l2: /dev/video0: camera.width_px and height_px: it does not give 640 "
                    "x 480 px, nearest: 320 x 480"));
   video.formats = {V4L2_PIX_FMT_YUYV};
   EXPECT_TRUE(says(look(kWatched),

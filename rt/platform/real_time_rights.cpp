@@ -123,7 +123,9 @@ void prefault_clock() {
 RightFound memory(bool apply) {
   RightFound right{.name = "locked memory", .required = true};
   const rlim_t limit = raise_limit(RLIMIT_MEMLOCK, apply);
-  if (apply) {
+  // Under a limit the first page beyond it, of stack or heap, would end the process.
+  const bool allowed = has_capability(kCapIpcLock) || limit == RLIM_INFINITY;
+  if (apply && allowed) {
     // Freed memory stays with the process, and no allocation makes a mapping of its own.
     ::mallopt(M_TRIM_THRESHOLD, -1);
     ::mallopt(M_MMAP_MAX, 0);
@@ -132,7 +134,7 @@ RightFound memory(bool apply) {
     right.got = locked && locked_kB() > 0;  // a sanitizer replaces mlockall by a call that locks nothing
     right.detail = right.got ? "all present and future pages" : locked ? "has no effect here" : reason(error);
   } else {
-    right.got = has_capability(kCapIpcLock) || limit == RLIM_INFINITY;
+    right.got = allowed && !apply;
     right.detail = right.got ? "allowed" : "limit " + std::to_string(limit >> 20) + " MiB";
   }
   if (!right.got) {

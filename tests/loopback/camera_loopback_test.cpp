@@ -85,6 +85,7 @@ TEST_F(CameraLoopback, frames_come_at_their_rate_each_stamped_before_it_was_here
   ASSERT_EQ(opened(), "");
   ASSERT_EQ(good_frame(), Status::ok);
   const hal::Frame first = frame;
+  const hal::CameraCounts begun = camera->counts();
   std::int64_t before_ns = first.exposure_ns;
   for (int i = 1; i <= 25; ++i) {
     ASSERT_EQ(camera->next(frame, kLong_ns), Status::ok) << camera->last_error();
@@ -97,9 +98,9 @@ TEST_F(CameraLoopback, frames_come_at_their_rate_each_stamped_before_it_was_here
     camera->release(frame);
   }
   EXPECT_NEAR(static_cast<double>(frame.exposure_ns - first.exposure_ns) * 1e-9, 1.0, 0.04);
-  EXPECT_EQ(camera->counts().lost, 0U);
-  EXPECT_EQ(camera->counts().skipped, 0U);
-  EXPECT_EQ(camera->counts().unusable, 0U);
+  EXPECT_EQ(camera->counts().lost, begun.lost);
+  EXPECT_EQ(camera->counts().skipped, begun.skipped);
+  EXPECT_EQ(camera->counts().unusable, begun.unusable);
 }
 
 TEST_F(CameraLoopback, all_formats_show_the_same_picture) {

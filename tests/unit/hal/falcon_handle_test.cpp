@@ -110,7 +110,7 @@ TEST_F(FalconHandleTest, its_thread_reads_and_pushes_until_the_safe_state) {
   EXPECT_TRUE(soon([&] { return handle->read(state) == Status::ok; }));
   EXPECT_TRUE(soon([&] { return handle->write_force({0, 0, 2}) == Status::ok && pushes(); }));
   handle->safe_state();
-  EXPECT_FALSE(pushes());
+  EXPECT_TRUE(soon([&] { return !pushes(); }));  // a loaded machine may take longer than it waits
   for (int i = 0; i < 50; ++i) {
     EXPECT_EQ(handle->write_force({0, 0, 2}), Status::ok);
     std::this_thread::sleep_for(std::chrono::milliseconds(1));

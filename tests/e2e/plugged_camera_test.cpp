@@ -1,21 +1,14 @@
 // A station whose camera is plugged in: aravis' own, which speaks GigE Vision over the loopback interface.
 // It is unplugged while the station runs, and comes back.
-#include <arv.h>
 #include <gtest/gtest.h>
 
 #include <memory>
 
+#include "tests/support/network_camera.hpp"
 #include "tests/support/programs.hpp"
 
 namespace punctum::e2e {
 namespace {
-
-struct Unplug {
-  void operator()(ArvGvFakeCamera* camera) const { g_object_unref(camera); }
-};
-using NetworkCamera = std::unique_ptr<ArvGvFakeCamera, Unplug>;
-
-NetworkCamera plugged_in() { return NetworkCamera(arv_gv_fake_camera_new("127.0.0.1", "GV01")); }
 
 constexpr const char* kScene = R"([haptic]
 device = "simulated"
@@ -64,14 +57,15 @@ class PluggedCamera : public Programs {
 };
 
 TEST_F(PluggedCamera, one_that_is_unplugged_is_looked_for_and_used_again_when_it_is_back) {
-  NetworkCamera camera = plugged_in();
+  const tests::NetworkCameraLock one_at_a_time;
+  tests::NetworkCamera camera = tests::plug_in_network_camera();
   Running run({"run", scene(), "--set", kPatientRelay, "--report", report(), "--no-figure", "--no-frames"},
               words());
   ASSERT_TRUE(until([&] { return rows() > 5; })) << run.output() << log();
   camera.reset();
   ASSERT_TRUE(until([&] { return log().find("looking for it") != std::string::npos; })) << log();
   const std::size_t before = rows();
-  camera = plugged_in();
+  camera = tests::plug_in_network_camera();
   ASSERT_TRUE(until([&] { return rows() > before + 5; })) << log();
   run.send(SIGINT);
   (void)run.wait();
@@ -88,7 +82,7 @@ TEST_F(PluggedCamera, one_that_is_not_there_ends_the_run_before_anything_moves) 
                      "v4l2=on", "--set", "v4l2.path=/dev/video77"}),
             2)
       << said_;
-  EXPECT_NE(said_.find("v4l2.path: /dev/video77: no camera is there"), std::string::npos) << said_;
+  EXPECT_NE(said_.find("v4l2: /dev/video77: no such camera is plugged in"), std::string::npos) << said_;
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "hal/aravis/module.hpp"
 #include "hal/aravis/stamps.hpp"
 #include "rt/executive/monotonic_clock.hpp"
+#include "tests/support/network_camera.hpp"
 
 namespace punctum::aravis {
 namespace {
@@ -183,19 +184,9 @@ TEST_F(AravisTest, what_it_cannot_do_is_one_line) {
 
 // ---- over the network ----
 
-struct Unref {
-  void operator()(ArvGvFakeCamera* camera) const { g_object_unref(camera); }
-};
-using NetworkCamera = std::unique_ptr<ArvGvFakeCamera, Unref>;
-
-NetworkCamera plugged_in() {
-  NetworkCamera camera(arv_gv_fake_camera_new("127.0.0.1", "GV01"));
-  EXPECT_TRUE(arv_gv_fake_camera_is_running(camera.get()));
-  return camera;
-}
-
 TEST_F(AravisTest, a_camera_on_the_network_is_lost_when_it_goes_and_can_be_opened_when_it_is_back) {
-  NetworkCamera there = plugged_in();
+  const tests::NetworkCameraLock one_at_a_time;
+  tests::NetworkCamera there = tests::plug_in_network_camera();
   params.name = "127.0.0.1";
   settings.fps = 25;
   ASSERT_EQ(opened(), "");
@@ -220,7 +211,7 @@ TEST_F(AravisTest, a_camera_on_the_network_is_lost_when_it_goes_and_can_be_opene
   camera->close();
   EXPECT_EQ(camera->next(frame, 1), Status::disconnected);
   EXPECT_FALSE(camera->open());
-  there = plugged_in();
+  there = tests::plug_in_network_camera();
   const auto back = camera->open();
   ASSERT_TRUE(back) << back.error();
   ASSERT_EQ(good_frame(), Status::ok) << camera->last_error();

@@ -155,7 +155,9 @@ hal::HandState HandMotion::at(std::int64_t now_ns) NONBLOCKING {
   const double dt_s = std::clamp(since_s, 0.0, kLongest_s);
   begun_ = true;
   at_ns_ = now_ns;
-  ahead_m_ = (ahead_m_ + dt_s * speed_m_s_).cwiseMax(-kReach_m).cwiseMin(kReach_m);
+  for (int i = 0; i < 3; ++i) {
+    ahead_m_[i] = std::clamp(ahead_m_[i] + dt_s * speed_m_s_[i], -kReach_m, kReach_m);
+  }
   hal::Vec3 gap_m = ahead_m_ - at_m_;
   const double most_m = params_.speed_m_s * kAhead_s;
   if (const double length_m = gap_m.norm(); length_m > most_m) {

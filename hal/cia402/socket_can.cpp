@@ -15,41 +15,12 @@
 #include <vector>
 
 #include "hal/cia402/look.hpp"
-
-#if defined(__has_feature)
-#if __has_feature(realtime_sanitizer)
-#include <sanitizer/rtsan_interface.h>
-#define PUNCTUM_REVIEWED const __rtsan::ScopedDisabler reviewed
-#endif
-#endif
-#ifndef PUNCTUM_REVIEWED
-#define PUNCTUM_REVIEWED static_cast<void>(0)
-#endif
+#include "hal/kernel_call.hpp"
 
 namespace punctum::cia402 {
 namespace {
 
 using Unexpected = tl::unexpected<std::string>;
-
-// The two system calls of the tick. A datagram socket with MSG_DONTWAIT returns at once, EAGAIN or ENOBUFS if
-// it must; the kernel copies one frame of 16 bytes, and takes the socket's spin lock.
-#if defined(__clang__)
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wunknown-warning-option"
-#pragma clang diagnostic ignored "-Wfunction-effects"
-#endif
-ssize_t send_now(int socket, const can_frame& frame) NONBLOCKING {
-  PUNCTUM_REVIEWED;
-  return ::send(socket, &frame, sizeof(frame), MSG_DONTWAIT | MSG_NOSIGNAL);
-}
-ssize_t receive_now(int socket, can_frame& frame) NONBLOCKING {
-  PUNCTUM_REVIEWED;
-  return ::recv(socket, &frame, sizeof(frame), MSG_DONTWAIT);
-}
-int last_error() NONBLOCKING { return errno; }
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
 
 // What the interface says of itself; the error says what to do.
 tl::expected<int, std::string> check(int socket, const std::string& name) {
@@ -123,26 +94,27 @@ void SocketCan::close() noexcept {
   }
 }
 
+// In the tick: a datagram socket with MSG_DONTWAIT returns at once, EAGAIN or ENOBUFS if it must; the kernel
+// copies one frame of 16 bytes, and takes the socket's spin lock.
 Sent SocketCan::send(const CanFrame& frame) NONBLOCKING {
   can_frame out{};
   out.can_id = frame.id;
   out.can_dlc = frame.size;
   std::memcpy(out.data, frame.data.data(), frame.data.size());
-  if (send_now(socket_, out) == static_cast<ssize_t>(sizeof(out))) {
+  const hal::Answer sent = hal::kernel_call<::send>(socket_, &out, sizeof(out), MSG_DONTWAIT | MSG_NOSIGNAL);
+  if (sent.value == static_cast<int>(sizeof(out))) {
     return Sent::ok;
   }
-  const int error = last_error();
-  return error == ENOBUFS || error == EAGAIN || error == EINTR ? Sent::full : Sent::down;
+  return sent.error == ENOBUFS || sent.error == EAGAIN || sent.error == EINTR ? Sent::full : Sent::down;
 }
 
 Received SocketCan::receive(CanFrame& out) NONBLOCKING {
   can_frame in{};
-  const ssize_t size = receive_now(socket_, in);
-  if (size < 0) {
-    const int error = last_error();
-    return error == EAGAIN || error == EINTR ? Received::nothing : Received::down;
+  const hal::Answer got = hal::kernel_call<::recv>(socket_, &in, sizeof(in), MSG_DONTWAIT);
+  if (got.value < 0) {
+    return got.error == EAGAIN || got.error == EINTR ? Received::nothing : Received::down;
   }
-  if (size != static_cast<ssize_t>(sizeof(in))) {
+  if (got.value != static_cast<int>(sizeof(in))) {
     return Received::error;
   }
   if ((in.can_id & CAN_ERR_FLAG) != 0) {

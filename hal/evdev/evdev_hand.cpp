@@ -14,15 +14,7 @@
 #include <utility>
 #include <vector>
 
-#if defined(__has_feature)
-#if __has_feature(realtime_sanitizer)
-#include <sanitizer/rtsan_interface.h>
-#define PUNCTUM_REVIEWED const __rtsan::ScopedDisabler reviewed
-#endif
-#endif
-#ifndef PUNCTUM_REVIEWED
-#define PUNCTUM_REVIEWED static_cast<void>(0)
-#endif
+#include "hal/kernel_call.hpp"
 
 namespace punctum::evdev {
 namespace {
@@ -32,30 +24,6 @@ using Unexpected = tl::unexpected<std::string>;
 
 constexpr const char* kFolder = "/dev/input";
 constexpr int kRounds = 4;  // of kAtOnce events in one reading; more wait for the next
-
-// The system calls of the tick. A descriptor with O_NONBLOCK never waits for events. The two ioctls, after
-// events were lost, take the device's mutex, which the kernel holds for no longer than such an ioctl.
-#if defined(__clang__)
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wunknown-warning-option"
-#pragma clang diagnostic ignored "-Wfunction-effects"
-#endif
-ssize_t read_now(int file, input_event* events, std::size_t count) NONBLOCKING {
-  PUNCTUM_REVIEWED;
-  return ::read(file, events, count * sizeof(input_event));
-}
-bool ask_for_keys(int file, Keys& held) NONBLOCKING {
-  PUNCTUM_REVIEWED;
-  return ioctl(file, EVIOCGKEY(sizeof(held.bits)), held.bits.data()) >= 0;
-}
-bool ask_for_axis(int file, std::uint16_t code, input_absinfo& info) NONBLOCKING {
-  PUNCTUM_REVIEWED;
-  return ioctl(file, EVIOCGABS(code), &info) >= 0;
-}
-int why() NONBLOCKING { return errno; }
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
 
 Status status_of(int error) NONBLOCKING { return error == ENODEV ? Status::disconnected : Status::fault; }
 
@@ -125,7 +93,7 @@ tl::expected<std::string, std::string> find_by_name(const std::string& part) {
   for (const std::string& path : input_devices()) {
     const int file = open_file(path);
     if (file < 0) {
-      refused = why() == EACCES && refused.empty() ? not_allowed(path) : refused;
+      refused = errno == EACCES && refused.empty() ? not_allowed(path) : refused;
       continue;
     }
     const Identity is = identify(file);
@@ -165,10 +133,10 @@ tl::expected<void, std::string> EvdevHand::open() {
   };
   file_ = open_file(path);
   if (file_ < 0) {
-    return refuse(refusal(path, why()));
+    return refuse(refusal(path, errno));
   }
   if (int version = 0; ioctl(file_, EVIOCGVERSION, &version) != 0) {
-    return refuse(refusal(path, why()));
+    return refuse(refusal(path, errno));
   }
   const Identity is = identify(file_);
   layout_ = is.layout;
@@ -178,7 +146,7 @@ tl::expected<void, std::string> EvdevHand::open() {
   std::array<Range, 3> ranges;
   for (std::size_t i = 0; layout_->counts == Counts::positions && i < ranges.size(); ++i) {
     input_absinfo info{};
-    if (!ask_for_axis(file_, layout_->axes[i].code, info) || info.minimum >= info.maximum) {
+    if (ioctl(file_, EVIOCGABS(layout_->axes[i].code), &info) < 0 || info.minimum >= info.maximum) {
       return refuse(path + ": axis " + std::to_string(layout_->axes[i].code) + " of \"" + is.name +
                     "\" has no range");
     }
@@ -186,7 +154,7 @@ tl::expected<void, std::string> EvdevHand::open() {
   }
   const int clock = CLOCK_MONOTONIC;
   if (ioctl(file_, EVIOCSCLOCKID, &clock) != 0) {
-    return refuse(refusal(path, why()));
+    return refuse(refusal(path, errno));
   }
   if (ioctl(file_, EVIOCGRAB, 1) != 0) {
     return refuse(path + ": \"" + is.name + "\" is taken by another program that keeps it to itself");
@@ -205,7 +173,7 @@ hal::Served EvdevHand::served() noexcept {
 // What is held from the beginning is no press.
 tl::expected<void, std::string> EvdevHand::start(std::int64_t /*first_tick_ns*/) {
   return ask() == Status::ok ? tl::expected<void, std::string>{}
-                             : Unexpected("the device is gone: " + text_of(why()));
+                             : Unexpected("the device is gone: " + text_of(errno));
 }
 
 void EvdevHand::close() noexcept {
@@ -216,14 +184,15 @@ void EvdevHand::close() noexcept {
   motion_.reset();
 }
 
+// A descriptor with O_NONBLOCK never waits for events.
 Status EvdevHand::drain(std::int64_t now_ns) NONBLOCKING {
   for (int round = 0; round < kRounds; ++round) {
-    const ssize_t size = read_now(file_, events_.data(), events_.size());
-    if (size < 0) {
-      const int error = why();
-      return error == EAGAIN || error == EINTR ? Status::ok : status_of(error);
+    const hal::Answer got =
+        hal::kernel_call<::read>(file_, events_.data(), events_.size() * sizeof(input_event));
+    if (got.value < 0) {
+      return got.error == EAGAIN || got.error == EINTR ? Status::ok : status_of(got.error);
     }
-    const std::size_t count = static_cast<std::size_t>(size) / sizeof(input_event);
+    const std::size_t count = static_cast<std::size_t>(got.value) / sizeof(input_event);
     if (count == 0) {
       return Status::disconnected;
     }
@@ -234,16 +203,20 @@ Status EvdevHand::drain(std::int64_t now_ns) NONBLOCKING {
   return Status::ok;
 }
 
+// The ioctls, after events were lost, take the device's mutex, which the kernel holds for no longer than one
+// of them.
 Status EvdevHand::ask() NONBLOCKING {
   Keys held;
   std::array<int, 3> positions{};
-  if (!ask_for_keys(file_, held)) {
-    return status_of(why());
+  const hal::Answer keys = hal::kernel_call<::ioctl>(file_, EVIOCGKEY(sizeof(held.bits)), held.bits.data());
+  if (keys.value < 0) {
+    return status_of(keys.error);
   }
   for (std::size_t i = 0; layout_->counts == Counts::positions && i < positions.size(); ++i) {
     input_absinfo info{};
-    if (!ask_for_axis(file_, layout_->axes[i].code, info)) {
-      return status_of(why());
+    const hal::Answer axis = hal::kernel_call<::ioctl>(file_, EVIOCGABS(layout_->axes[i].code), &info);
+    if (axis.value < 0) {
+      return status_of(axis.error);
     }
     positions[i] = info.value;
   }

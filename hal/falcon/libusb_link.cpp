@@ -8,15 +8,7 @@
 #include <algorithm>
 #include <vector>
 
-#if defined(__has_feature)
-#if __has_feature(realtime_sanitizer)
-#include <sanitizer/rtsan_interface.h>
-#define PUNCTUM_REVIEWED const __rtsan::ScopedDisabler reviewed
-#endif
-#endif
-#ifndef PUNCTUM_REVIEWED
-#define PUNCTUM_REVIEWED static_cast<void>(0)
-#endif
+#include "hal/kernel_call.hpp"
 
 namespace punctum::falcon {
 namespace {
@@ -32,19 +24,10 @@ constexpr int kMostErrors = 50;  // in a row: a cable or a hub that is no more
 
 // The one system call of the tick: it adds 1 to a counter in the kernel, and never waits for one that starts
 // at 0.
-#if defined(__clang__)
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wunknown-warning-option"
-#pragma clang diagnostic ignored "-Wfunction-effects"
-#endif
 void add_one(int counter) NONBLOCKING {
-  PUNCTUM_REVIEWED;
   const std::uint64_t one = 1;
-  [[maybe_unused]] const ssize_t written = ::write(counter, &one, sizeof(one));
+  [[maybe_unused]] const hal::Answer written = hal::kernel_call<::write>(counter, &one, sizeof(one));
 }
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
 
 std::string text_of(int error) { return libusb_strerror(static_cast<libusb_error>(error)); }
 

@@ -5,8 +5,8 @@
 #include <array>
 #include <cstring>
 
-#include "hal/gpiod/kernel_call.hpp"
 #include "hal/gpiod/lines.hpp"
+#include "hal/kernel_call.hpp"
 
 namespace punctum::gpiod {
 namespace {
@@ -19,7 +19,7 @@ class LineV1 final : public Line {
   ~LineV1() override { gpiod_line_release(line_); }
 
   [[nodiscard]] hal::Status read(bool& active) NONBLOCKING override {
-    const Answer answer = kernel_call<gpiod_line_get_value>(line_);
+    const hal::Answer answer = hal::kernel_call<gpiod_line_get_value>(line_);
     if (answer.value < 0) {
       return status_of(answer.error);
     }
@@ -27,12 +27,12 @@ class LineV1 final : public Line {
     return hal::Status::ok;
   }
   [[nodiscard]] hal::Status write(bool active) NONBLOCKING override {
-    const Answer answer = kernel_call<gpiod_line_set_value>(line_, active ? 1 : 0);
+    const hal::Answer answer = hal::kernel_call<gpiod_line_set_value>(line_, active ? 1 : 0);
     return answer.value < 0 ? status_of(answer.error) : hal::Status::ok;
   }
   [[nodiscard]] hal::Status take_changes(int& changes) NONBLOCKING override {
-    const Answer answer =
-        kernel_call<gpiod_line_event_read_fd_multiple>(descriptor_, events_.data(), kAtOnce);
+    const hal::Answer answer =
+        hal::kernel_call<gpiod_line_event_read_fd_multiple>(descriptor_, events_.data(), kAtOnce);
     changes = answer.value > 0 ? answer.value : 0;
     return answer.value < 0 && answer.error != EAGAIN ? status_of(answer.error) : hal::Status::ok;
   }

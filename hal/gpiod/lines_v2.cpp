@@ -4,8 +4,8 @@
 
 #include <cstring>
 
-#include "hal/gpiod/kernel_call.hpp"
 #include "hal/gpiod/lines.hpp"
+#include "hal/kernel_call.hpp"
 
 namespace punctum::gpiod {
 namespace {
@@ -28,7 +28,7 @@ class LineV2 final : public Line {
       : request_(std::move(request)), events_(std::move(events)), offset_(offset) {}
 
   [[nodiscard]] hal::Status read(bool& active) NONBLOCKING override {
-    const Answer answer = kernel_call<gpiod_line_request_get_value>(request_.get(), offset_);
+    const hal::Answer answer = hal::kernel_call<gpiod_line_request_get_value>(request_.get(), offset_);
     if (answer.value < 0) {
       return status_of(answer.error);
     }
@@ -36,13 +36,13 @@ class LineV2 final : public Line {
     return hal::Status::ok;
   }
   [[nodiscard]] hal::Status write(bool active) NONBLOCKING override {
-    const Answer answer = kernel_call<gpiod_line_request_set_value>(
+    const hal::Answer answer = hal::kernel_call<gpiod_line_request_set_value>(
         request_.get(), offset_, active ? GPIOD_LINE_VALUE_ACTIVE : GPIOD_LINE_VALUE_INACTIVE);
     return answer.value < 0 ? status_of(answer.error) : hal::Status::ok;
   }
   [[nodiscard]] hal::Status take_changes(int& changes) NONBLOCKING override {
-    const Answer answer =
-        kernel_call<gpiod_line_request_read_edge_events>(request_.get(), events_.get(), kAtOnce);
+    const hal::Answer answer =
+        hal::kernel_call<gpiod_line_request_read_edge_events>(request_.get(), events_.get(), kAtOnce);
     changes = answer.value > 0 ? answer.value : 0;
     return answer.value < 0 && answer.error != EAGAIN ? status_of(answer.error) : hal::Status::ok;
   }

@@ -1,6 +1,6 @@
-// The one place where a tick method of this backend leaves what the compiler proves: a call of libgpiod that
-// makes one ioctl or one read of a descriptor that never waits. Reviewed in libgpiod 1.6 and 2.2: the
-// functions that pass through here neither allocate nor lock.
+// The one place where a tick method of a backend leaves what the compiler proves: a function that makes one
+// system call which never waits (a read, write or send of a descriptor that does not block, an ioctl that
+// only asks), and neither allocates nor locks. Each backend's README says what passes through here, and why.
 #pragma once
 
 #include <cerrno>
@@ -14,7 +14,7 @@
 #endif
 #endif
 
-namespace punctum::gpiod {
+namespace punctum::hal {
 
 struct Answer {
   int value;
@@ -42,4 +42,4 @@ template <auto Function, class... Argument>
 #pragma clang diagnostic pop
 #endif
 
-}  // namespace punctum::gpiod
+}  // namespace punctum::hal

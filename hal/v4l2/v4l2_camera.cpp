@@ -257,8 +257,9 @@ V4l2Camera::Done V4l2Camera::set_number(std::uint32_t id, double value, double u
     return wrong(std::string(key) + ": is out of range, allowed: from " + number(about.minimum * shown) +
                  " to " + number(about.maximum * shown));
   }
-  const auto steps = std::lround((wanted - about.minimum) / step);
-  return set_control(id, std::min(about.minimum + static_cast<int>(steps) * step, about.maximum), key);
+  const std::int64_t steps = std::llround((wanted - about.minimum) / step);
+  return set_control(
+      id, static_cast<int>(std::min<std::int64_t>(about.minimum + steps * step, about.maximum)), key);
 }
 
 V4l2Camera::Done V4l2Camera::lock_exposure() {

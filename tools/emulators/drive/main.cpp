@@ -14,6 +14,7 @@
 #include "tools/emulators/drive/drive_bus.hpp"
 #include "tools/shared/command_line.hpp"
 #include "tools/shared/exit_codes.hpp"
+#include "tools/shared/input_lines.hpp"
 #include "tools/shared/program_start.hpp"
 #include "tools/shared/say.hpp"
 #include "tools/shared/stop_signal.hpp"
@@ -32,30 +33,8 @@ int bad(const std::string& text) {
   return tools::exit_bad_input;
 }
 
-// Whole lines from a descriptor that does not block.
-class Lines {
- public:
-  // False: there will be no more.
-  bool read_into(std::vector<std::string>& lines) {
-    char text[512];
-    const ssize_t size = ::read(kInput, text, sizeof(text));
-    if (size <= 0) {
-      return size < 0 && errno == EINTR;
-    }
-    rest_.append(text, static_cast<std::size_t>(size));
-    for (std::size_t end = rest_.find('\n'); end != std::string::npos; end = rest_.find('\n')) {
-      lines.push_back(rest_.substr(0, end));
-      rest_.erase(0, end + 1);
-    }
-    return true;
-  }
-
- private:
-  std::string rest_;
-};
-
 int serve(emulator::DriveBus& drives) {
-  Lines input;
+  tools::InputLines input{kInput};
   bool listening = true;
   while (stop_signal::count() == 0) {
     pollfd ready[] = {{drives.socket(), POLLIN, 0}, {listening ? kInput : -1, POLLIN, 0}};

@@ -18,6 +18,7 @@
 #include "tools/emulators/falcon/vhci.hpp"
 #include "tools/shared/command_line.hpp"
 #include "tools/shared/exit_codes.hpp"
+#include "tools/shared/input_lines.hpp"
 #include "tools/shared/program_start.hpp"
 #include "tools/shared/say.hpp"
 #include "tools/shared/stop_signal.hpp"
@@ -58,27 +59,6 @@ class CirclingHand final : public emulator::Hand {
   emulator::Triple force_N_{};
 };
 
-class Lines {
- public:
-  // False: there will be no more.
-  bool read_into(std::vector<std::string>& lines) {
-    char text[512];
-    const ssize_t size = ::read(kInput, text, sizeof(text));
-    if (size <= 0) {
-      return size < 0 && errno == EINTR;
-    }
-    rest_.append(text, static_cast<std::size_t>(size));
-    for (std::size_t end = rest_.find('\n'); end != std::string::npos; end = rest_.find('\n')) {
-      lines.push_back(rest_.substr(0, end));
-      rest_.erase(0, end + 1);
-    }
-    return true;
-  }
-
- private:
-  std::string rest_;
-};
-
 class Station {
  public:
   Station(const emulator::FalconParams& params, CirclingHand& hand) : hand_(hand), falcon_(params, hand) {}
@@ -113,7 +93,7 @@ class Station {
     return {};
   }
   int serve() {
-    Lines input;
+    tools::InputLines input{kInput};
     bool listening = true;
     while (stop_signal::count() == 0) {
       if (port_ &&

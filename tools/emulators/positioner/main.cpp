@@ -18,6 +18,7 @@
 #include "tools/emulators/positioner/positioner.hpp"
 #include "tools/shared/command_line.hpp"
 #include "tools/shared/exit_codes.hpp"
+#include "tools/shared/input_lines.hpp"
 #include "tools/shared/program_start.hpp"
 #include "tools/shared/say.hpp"
 #include "tools/shared/stop_signal.hpp"
@@ -64,19 +65,9 @@ Ends open_ends() {
   return ends;
 }
 
-void tell(emulator::Positioner& positioner, std::string& rest, const char* text, std::size_t size) {
-  rest.append(text, size);
-  for (std::size_t end = rest.find('\n'); end != std::string::npos; end = rest.find('\n')) {
-    if (const std::string problem = positioner.command(rest.substr(0, end)); !problem.empty()) {
-      tools::complain("punctum-positioner: " + problem);
-    }
-    rest.erase(0, end + 1);
-  }
-}
-
 int serve(emulator::Positioner& positioner, int terminal) {
   bool listening = true;
-  std::string rest;
+  tools::InputLines input{kInput};
   while (stop_signal::count() == 0) {
     pollfd ready[] = {{terminal, POLLIN, 0}, {listening ? kInput : -1, POLLIN, 0}};
     if (poll(ready, 2, kStep_ms) < 0 && errno != EINTR) {
@@ -91,9 +82,13 @@ int serve(emulator::Positioner& positioner, int terminal) {
       return bad(std::string("the terminal is gone: ") + std::strerror(errno));
     }
     if ((ready[1].revents & (POLLIN | POLLHUP)) != 0) {
-      const ssize_t size = read(kInput, text, sizeof(text));
-      listening = size > 0 || (size < 0 && errno == EINTR);
-      tell(positioner, rest, text, size > 0 ? static_cast<std::size_t>(size) : 0);
+      std::vector<std::string> lines;
+      listening = input.read_into(lines);
+      for (const std::string& line : lines) {
+        if (const std::string problem = positioner.command(line); !problem.empty()) {
+          tools::complain("punctum-positioner: " + problem);
+        }
+      }
     }
   }
   return tools::exit_done;

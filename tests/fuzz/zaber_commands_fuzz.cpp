@@ -29,7 +29,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   const bool whole = said.empty() || said.ends_with('\n');
   const bool left = text.find("set") == std::string_view::npos &&
-                    !(devices.position(2, 1) >= -100 && devices.position(2, 1) <= 1100);
+                    !(devices.position(2, 1) >= -1 && devices.position(2, 1) <= 1001);
   if (!whole || left || !std::isfinite(devices.position(1, 2))) {
     std::fprintf(stderr, "half a line, or an axis beyond its limits\n");
     std::abort();

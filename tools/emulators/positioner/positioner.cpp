@@ -63,7 +63,8 @@ void Positioner::Axis::step(double dt_s) {
   const double left = target - at;
   const double ahead = left < 0 ? -1 : 1;
   const double change = acceleration * dt_s;
-  const double can_brake = std::sqrt(2 * acceleration * std::abs(left));
+  // Of the way that is left: this step's part at v, and v^2 / 2a to come to rest.
+  const double can_brake = std::sqrt(change * change + 2 * acceleration * std::abs(left)) - change;
   const double wanted = ahead * std::min(top, can_brake);
   speed += std::clamp(wanted - speed, -change, change);
   const double way = speed * dt_s;

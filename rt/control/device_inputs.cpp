@@ -243,14 +243,19 @@ Fault DeviceInputs::read_stage(const TickTime& time, const LastOutput& last) NON
     readings_.alarms |= alarm_sensor;
     return Fault::stage_fault;
   }
-  const SampleIs sample = status == hal::Status::ok && axis_can_be_true(read.axis.normalized(), last)
-                              ? stage_clock_.take(read.sample_ns, time.now_ns)
-                              : SampleIs::untimely;
+  const bool answered = status == hal::Status::ok;
+  const bool believed = answered && axis_can_be_true(read.axis.normalized(), last);
+  const SampleIs sample = believed ? stage_clock_.take(read.sample_ns, time.now_ns) : SampleIs::untimely;
   if (sample == SampleIs::untimely || stage_clock_.timed_out()) {
     readings_.alarms |= alarm_sensor;
   }
   if (sample != SampleIs::fresh) {
-    return stage_clock_.timed_out() ? Fault::stage_lost : not_enabled(time, last);
+    Fault fault = stage_clock_.timed_out() ? Fault::stage_lost : Fault::none;
+    if (answered && !believed && !read.enabled) {  // no power counts, whatever else it tells
+      readings_.stage.enabled = false;
+      fault = first_of(fault, judge_stage(last));
+    }
+    return first_of(fault, not_enabled(time, last));
   }
   readings_.stage = read;
   readings_.stage.axis.normalize();

@@ -375,6 +375,7 @@ class Invariants {
   // The scale may change only while hand and needle are uncoupled; when exactly is not known.
   void watch_scale(const Seen& s, bool running) {
     if (s.position_scale > 0) {
+      scale_ = least_scale_;
       next_scale_ = s.position_scale;
       scale_may_change_ = false;
     }

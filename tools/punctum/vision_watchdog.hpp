@@ -9,10 +9,10 @@ namespace punctum::tools {
 
 class VisionWatchdog {
  public:
-  // A frame takes some 30 ms. A machine on which it takes a hundred times as long is no reason to kill; the
+  // A frame takes some 30 ms. A machine on which it takes 300 times as long is no reason to kill; the
   // core fades the force and accepts only withdrawal long before. In virtual time the core waits for vision,
   // and calls it hung after twice the time.
-  static constexpr double kHung_s = 5, kHungVirtual_s = 15;
+  static constexpr double kHung_s = 10, kHungVirtual_s = 15;
   static constexpr double kStart_s = 30;  // to load its libraries, and a station's tables
   static constexpr double kStep_s = 0.5;  // while this program did not run, nobody has watched
 

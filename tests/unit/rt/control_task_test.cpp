@@ -70,6 +70,26 @@ TEST(Task, is_done_only_if_every_cell_was_injected) {
   }
 }
 
+// A press counts once it has lasted: this one is down before the puncture, and counts after it.
+TEST(Task, does_not_begin_the_injection_on_a_press_that_began_before_the_puncture) {
+  Injection i(with_injector(1));
+  (void)i.at_depth(5e-6);
+  i.readings.inject_down = true;
+  (void)i.at_depth(5e-6);
+  i.cell.puncture_seen = true;
+  EXPECT_EQ(i.at_depth(15e-6).phase, Phase::puncture);
+  i.readings.hand.buttons = hal::kButtonInject;
+  EXPECT_EQ(i.at_depth(15e-6).phase, Phase::puncture);
+  EXPECT_NE(i.task.facts().alarms & alarm_injection_refused, 0U);
+  i.readings.hand.buttons = 0;
+  i.readings.inject_down = false;
+  EXPECT_EQ(i.at_depth(15e-6).phase, Phase::puncture);
+  i.readings.inject_down = true;
+  (void)i.at_depth(15e-6);
+  i.readings.hand.buttons = hal::kButtonInject;
+  EXPECT_EQ(i.at_depth(15e-6).phase, Phase::injection);
+}
+
 TEST(Task, is_done_by_entering_and_leaving_where_there_is_no_injector) {
   Injection i(ServoConfig{});
   i.whole(false);

@@ -37,6 +37,9 @@ const CellFacts& CellObserver::step(const TickTime& time, const Readings& readin
   }
   take_newest_observation(model, last.inside_cell);
 
+  if (last.outside) {
+    model.is_outside();
+  }
   if (last.outside && readings.has_stage) {
     facts_.approach_axis = readings.stage.axis.normalized();
   }

@@ -266,14 +266,22 @@ Fault DeviceInputs::read_stage(const TickTime& time, const LastOutput& last) NON
 }
 
 // Every depth is measured along the needle's axis: one that points elsewhere turns inward and outward round.
+// In a stop a needle may be mounted anew; two samples in a row say so.
 bool DeviceInputs::axis_can_be_true(const hal::Vec3& axis, const LastOutput& last) NONBLOCKING {
+  const auto near = [&axis](const hal::Vec3& other, double turn_rad) {
+    return axis.dot(other) > 1 - 0.5 * turn_rad * turn_rad;
+  };
+  const bool twice = near(last_told_axis_, kTurn_rad);
+  last_told_axis_ = axis;
   if (!last.running || !readings_.stage_seen) {
-    mounted_axis_ = axis;
-    return true;
+    if (twice || !readings_.stage_seen) {
+      mounted_axis_ = axis;
+      return true;
+    }
+    return near(readings_.stage.axis, kTurn_rad);
   }
-  const double tilt_rad = 2 * config_.mapping.max_tilt_rad + kTurn_rad;
-  return axis.dot(readings_.stage.axis) > 1 - 0.5 * kTurn_rad * kTurn_rad &&
-         axis.dot(mounted_axis_) > 1 - 0.5 * tilt_rad * tilt_rad;
+  return near(readings_.stage.axis, kTurn_rad) &&
+         near(mounted_axis_, 2 * config_.mapping.max_tilt_rad + kTurn_rad);
 }
 
 Fault DeviceInputs::judge_stage(const LastOutput& last) NONBLOCKING {

@@ -110,6 +110,7 @@ class DeviceInputs {
   LastingButton inject_, next_cell_;
   SampleClock stage_clock_;
   hal::Vec3 mounted_axis_ = -hal::Vec3::UnitX();  // before the station moved
+  hal::Vec3 last_told_axis_ = hal::Vec3::Zero();  // believed or not; zero before the first
   std::optional<EnablingDevice> enabling_;
   FollowingCheck following_;
   bool stage_was_enabled_ = false;

@@ -84,6 +84,8 @@ class ConfirmedFlag {
       others_ = 0;
     }
   }
+  // One observation that showed it counts no more.
+  void forget_unconfirmed() NONBLOCKING { others_ = value_ ? others_ : 0; }
   [[nodiscard]] bool value() const NONBLOCKING { return value_; }
 
  private:
@@ -108,6 +110,11 @@ class LocalMembraneModel {
   // The needle touches the cell: from here on the undeformed membrane stays where it is, but for disagree_m.
   void touch() NONBLOCKING;
   void let_go() NONBLOCKING { touched_ = false; }
+  // A needle outside has punctured nothing: two observations have to show it anew.
+  void is_outside() NONBLOCKING {
+    punctured_.forget_unconfirmed();
+    inner_punctured_.forget_unconfirmed();
+  }
 
   // A fresh cell: forget the old one; observations exposed before now do not count.
   void restart(std::int64_t now_ns) NONBLOCKING;

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 
 #include "hal/realtime.hpp"
 
@@ -31,6 +32,10 @@ class SampleClock {
   [[nodiscard]] SampleIs take(std::int64_t sample_ns, std::int64_t now_ns) NONBLOCKING {
     if (sample_ns > now_ns + kAhead_ns || sample_ns < now_ns - nanoseconds(timeout_s_)) {
       return SampleIs::untimely;
+    }
+    // A device that has been silent for too long begins anew, but not with the sample that it had.
+    if (sample_ns == newest_ns_) {
+      return SampleIs::repeated;
     }
     if (begun_ && sample_ns < newest_ns_ + kNearest_ns) {
       return sample_ns < newest_ns_ ? SampleIs::untimely : SampleIs::repeated;
@@ -63,7 +68,7 @@ class SampleClock {
   double timeout_s_;
   double silent_s_ = 0;  // since the newest sample arrived
   double age_at_arrival_s_ = 0;
-  std::int64_t newest_ns_ = 0;
+  std::int64_t newest_ns_ = std::numeric_limits<std::int64_t>::min();
   bool begun_ = false;
 };
 

@@ -41,9 +41,10 @@ class StageSetPoint {
   }  // on this tick, by a stop or no power
   [[nodiscard]] const hal::Vec3& hand_point_m() const NONBLOCKING { return mapping_.hand_point(); }
   [[nodiscard]] double position_scale() const NONBLOCKING { return mapping_.position_scale(); }
-  // For the stage; null until hand and needle are coupled.
+  // For the stage; null while hand and needle are not coupled: where the needle is was told once, and that
+  // may be false.
   [[nodiscard]] const hal::StageCommand* command() const NONBLOCKING {
-    return anchored() ? &limits_.set_point() : nullptr;
+    return anchored() && !uncoupled_ ? &limits_.set_point() : nullptr;
   }
   [[nodiscard]] const hal::StageCommand& set_point() const NONBLOCKING { return limits_.set_point(); }
 

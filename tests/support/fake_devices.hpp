@@ -100,6 +100,7 @@ struct FakeStage final : hal::Stage {
   Status status = Status::ok;
   Status command_status = Status::ok;  // its readings may go on while no set-point reaches it
   double extra_error_m = 0;
+  Vec3 false_m = Vec3::Zero();  // is told beside where the tip is
   bool nan = false;
   bool frozen = false;         // the encoders stand still, the drive finds nothing wrong
   bool deaf = false;           // it does not move any more
@@ -136,7 +137,7 @@ struct FakeStage final : hal::Stage {
     }
     if (!repeats || readings.empty()) {
       hal::StageState newest;
-      newest.tip_m = frozen && !readings.empty() ? readings.back().tip_m : Vec3(tip + registration);
+      newest.tip_m = frozen && !readings.empty() ? readings.back().tip_m : Vec3(tip + registration + false_m);
       newest.sample_ns = now_ns;
       readings.push_back(newest);
     }

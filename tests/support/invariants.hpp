@@ -350,7 +350,7 @@ class Invariants {
     const bool held = (buttons_ & hal::kButtonEnable) != 0;
     const bool was_held = (buttons_were_ & hal::kButtonEnable) != 0;
     press_edge_ = !was_running_ && held && (press_edge_ || !was_held);
-    if (s.stage_status == hal::Status::ok && s.stage.sample_ns != stage_sample_ns_) {
+    if (s.stage_status == hal::Status::ok && s.stage.sample_ns > stage_sample_ns_) {
       stage_sample_ns_ = s.stage.sample_ns;
       stage_silent_s_ =
           std::min(stage_silent_s_, std::max(0.0, 1e-9 * static_cast<double>(s.now_ns - s.stage.sample_ns)));

@@ -486,9 +486,10 @@ class LyingStation {
     now.powered = w.on;
     now.at_standstill = w.speed.norm() < 1e-6;
     now.sample_ns = w.now;
-    for (const Lie lie : {Lie::stage_late, Lie::stage_deaf, Lie::stage_ignores_stop,
-                          Lie::stage_ignores_power_off, Lie::stage_sinks, Lie::stage_repeats,
-                          Lie::stage_every, Lie::stage_no_data, Lie::stage_never_enables}) {
+    for (const Lie lie :
+         {Lie::stage_late, Lie::stage_deaf, Lie::stage_ignores_stop, Lie::stage_ignores_power_off,
+          Lie::stage_runs_away, Lie::stage_sinks, Lie::stage_repeats, Lie::stage_every, Lie::stage_no_data,
+          Lie::stage_never_enables}) {
       w.stage_true = w.stage_true && !on(lie);
     }
     const double gap = gap_m();

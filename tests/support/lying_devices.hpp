@@ -272,6 +272,7 @@ class LyingStation {
   // The truth, and what the devices remember. Plain data.
   struct Truth {
     std::int64_t now = 1'000'000'000;
+    std::int64_t latest_start = 0;  // of a tick, as the servo was told
     std::uint64_t tick = 0, missed = 0;
     // The hand: 75 g, an arm that pulls towards an intention.
     Vec3 x = Vec3::Zero(), v = Vec3::Zero(), intention = Vec3::Zero(), force = Vec3::Zero();
@@ -381,6 +382,7 @@ class LyingStation {
     if (on(Lie::period_told)) {
       info.period_s = value(Lie::period_told);
     }
+    truth.latest_start = std::max(truth.latest_start, info.start_ns);
     servo().tick(info);
     ++truth.tick;
     seen_.sample = &sample();
@@ -683,7 +685,8 @@ class LyingStation {
     }
     out = told;
     seen_.hand = told;
-    if (on(Lie::hand_nan) || on(Lie::hand_absurd) || told.sample_ns > truth.now + 1'000'000) {
+    const std::int64_t now = std::max(truth.now, truth.latest_start);
+    if (on(Lie::hand_nan) || on(Lie::hand_absurd) || told.sample_ns > now + 1'000'000) {
       seen_.hand_status = hal::Status::fault;  // no core needs to believe it
     }
     return hal::Status::ok;

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "tools/vision/live_tracker.hpp"
 #include "vision/overlay.hpp"
 #include "vision/tracker.hpp"
 
@@ -105,6 +106,29 @@ double rms_error(const Contour& c, double base, double depth, double share) {
     ss += e * e / static_cast<double>(c.size());
   }
   return std::sqrt(ss);
+}
+
+// The first picture takes a slow machine seconds; before it, a camera may have given black ones.
+TEST(LiveTracker, starts_anew_after_a_second_without_a_picture_but_not_where_it_searched_that_long_itself) {
+  const cv::Mat black(kH, kW, CV_8U, cv::Scalar(0));
+  const cv::Mat cell = draw({});
+  tools::LiveTracker tracker(VisionConfig{}, kW, kH, {});
+  const auto at = [&](const cv::Mat& picture, double t_s) {
+    hal::Frame frame = frame_of(picture);
+    frame.exposure_ns = static_cast<std::int64_t>(t_s * 1e9);
+    return tracker.process(frame).verdict;
+  };
+  (void)at(black, 0);
+  (void)at(black, 0.04);
+  EXPECT_EQ(at(cell, 0.08), "ok");
+  EXPECT_EQ(at(cell, 3), "ok");
+  EXPECT_EQ(tracker.restarts(), 0);
+  EXPECT_EQ(at(cell, 3.9), "ok");
+  EXPECT_EQ(tracker.restarts(), 0);
+  EXPECT_EQ(at(cell, 6), "ok");
+  EXPECT_EQ(tracker.restarts(), 1);
+  EXPECT_EQ(at(cell, 9), "ok");
+  EXPECT_EQ(tracker.restarts(), 1);
 }
 
 TEST(Tracker, follows_a_whole_injection_within_its_errors) {

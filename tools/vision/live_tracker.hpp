@@ -30,24 +30,24 @@ class LiveTracker {
         holder_template_(std::move(holder_template)),
         tracker_(begun()) {}
 
-  // As vision::Tracker::process. A frame that follows none in which anything was found is searched whole,
-  // which takes a slow machine seconds: the next one is followed whenever it comes, or it would never see.
+  // As vision::Tracker::process. The frame on which needle or cell is found first is searched whole, which
+  // takes a slow machine seconds: the next one is followed whenever it comes, or it would never see.
   // Meanwhile the core, without sight, lets the needle only withdraw.
   const vision::Result& process(const hal::Frame& frame) {
     if (last_ns_ != kNever) {
       const std::int64_t interval_ns = frame.exposure_ns - last_ns_;
       const bool gap = interval_ns > kLongestGap_ns && interval_ns / kLongestGap_intervals >= shortest_ns_;
-      if (gap && !searched_whole_) {
+      if (gap && found_ && !just_found_) {
         tracker_ = begun();
         ++restarts_;
-        knows_ = false;
+        found_ = false;
       }
       shortest_ns_ = interval_ns > 0 ? std::min(shortest_ns_, interval_ns) : shortest_ns_;
     }
     last_ns_ = frame.exposure_ns;
-    searched_whole_ = !knows_;
     const vision::Result& result = tracker_.process(frame);
-    knows_ = result.needle.ok || result.outer.ok;
+    just_found_ = !found_ && (result.needle.ok || result.outer.ok);
+    found_ = found_ || just_found_;
     return result;
   }
   [[nodiscard]] int restarts() const noexcept { return restarts_; }
@@ -70,8 +70,8 @@ class LiveTracker {
   std::int64_t last_ns_ = kNever;
   std::int64_t shortest_ns_ = std::numeric_limits<std::int64_t>::max();
   int restarts_ = 0;
-  bool knows_ = false;           // the last frame showed needle or cell
-  bool searched_whole_ = false;  // the last frame
+  bool found_ = false;       // needle or cell, since it began
+  bool just_found_ = false;  // on the last frame for the first time
 };
 
 }  // namespace punctum::tools

@@ -129,6 +129,11 @@ TEST(LiveTracker, starts_anew_after_a_second_without_a_picture_but_not_where_it_
   EXPECT_EQ(tracker.restarts(), 1);
   EXPECT_EQ(at(cell, 9), "ok");
   EXPECT_EQ(tracker.restarts(), 1);
+  // What was found before pictures that show nothing is as old as they are.
+  (void)at(black, 9.04);
+  (void)at(black, 9.08);
+  EXPECT_EQ(at(cell, 12), "ok");
+  EXPECT_EQ(tracker.restarts(), 2);
 }
 
 TEST(Tracker, follows_a_whole_injection_within_its_errors) {

@@ -16,6 +16,7 @@ CellObserver::CellObserver(const ServoConfig& config, Station& station) NONBLOCK
     : station_(station),
       penetration_m_(config.limits.penetration_depth_m),
       far_wall_m_(config.limits.far_wall_m),
+      has_phases_(config.phases.has_value()),
       let_go_m_(config.phases.value_or(PhaseParams{}).clear_m) {
   if (config.vision && config.local_model) {
     const MembraneParams membrane = config.membrane.value_or(MembraneParams{});
@@ -37,7 +38,7 @@ const CellFacts& CellObserver::step(const TickTime& time, const Readings& readin
   }
   take_newest_observation(model, last.inside_cell);
 
-  if (last.outside) {
+  if (last.outside && has_phases_) {  // without them, vision alone knows where the needle is
     model.is_outside();
   }
   if (last.outside && readings.has_stage) {

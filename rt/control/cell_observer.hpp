@@ -67,6 +67,7 @@ class CellObserver {
   Station& station_;
   double penetration_m_;
   double far_wall_m_;
+  bool has_phases_;
   double let_go_m_;  // this far outside the first contact, the next one is the first
   std::optional<LocalMembraneModel> model_;
   CellFacts facts_;

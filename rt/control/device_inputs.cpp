@@ -22,6 +22,10 @@ constexpr double kUnit = 1e-3;       // the axis' length is as near to 1
 // No drive turns a needle further than this between two samples, nor further than the operator may tilt it,
 // once each way, from where it stood when the station began to move: the bound of both is that, and this.
 constexpr double kTurn_rad = 0.1;
+// Nor faster than this, twice the speed at which set-points turn it: a limit along the axis that turned at
+// once would throw the needle aside.
+constexpr double kTurnSpeed_rad_s = 1;
+constexpr double kLongestTurn_s = 0.02;
 // From switched-on to operation: a CiA 402 drive charges its DC link, releases its brake and answers each of
 // three transitions; vendors state up to 2 s.
 constexpr double kEnablesWithin_s = 3;
@@ -251,14 +255,16 @@ Fault DeviceInputs::read_stage(const TickTime& time, const LastOutput& last) NON
   }
   if (sample != SampleIs::fresh) {
     Fault fault = stage_clock_.timed_out() ? Fault::stage_lost : Fault::none;
-    if (answered && !believed && !read.enabled) {  // no power counts, whatever else it tells
+    // No power counts, whatever else it tells; but not what a sample says that is older than the newest one.
+    if (answered && !read.enabled && (!believed || read.sample_ns > readings_.stage.sample_ns)) {
       readings_.stage.enabled = false;
       fault = first_of(fault, judge_stage(last));
     }
     return first_of(fault, not_enabled(time, last));
   }
+  const hal::Vec3 axis = turned(read, last);
   readings_.stage = read;
-  readings_.stage.axis.normalize();
+  readings_.stage.axis = axis;
   readings_.stage_seen = true;
   readings_.stage_fresh = true;
   readings_.stage_age_s = stage_clock_.age_s();
@@ -282,6 +288,18 @@ bool DeviceInputs::axis_can_be_true(const hal::Vec3& axis, const LastOutput& las
   }
   return near(readings_.stage.axis, kTurn_rad) &&
          near(mounted_axis_, 2 * config_.mapping.max_tilt_rad + kTurn_rad);
+}
+
+hal::Vec3 DeviceInputs::turned(const hal::StageState& read, const LastOutput& last) const NONBLOCKING {
+  const hal::Vec3 axis = read.axis.normalized();
+  if (!last.running || !readings_.stage_seen) {
+    return axis;
+  }
+  const double since_s = 1e-9 * static_cast<double>(read.sample_ns - readings_.stage.sample_ns);
+  const double most = kTurnSpeed_rad_s * std::clamp(since_s, 0.0, kLongestTurn_s);
+  const hal::Vec3 turn = axis - readings_.stage.axis;
+  const double length = turn.norm();
+  return length <= most ? axis : hal::Vec3(readings_.stage.axis + turn * (most / length)).normalized();
 }
 
 Fault DeviceInputs::judge_stage(const LastOutput& last) NONBLOCKING {

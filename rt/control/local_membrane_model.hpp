@@ -84,8 +84,6 @@ class ConfirmedFlag {
       others_ = 0;
     }
   }
-  // One observation that showed it counts no more.
-  void forget_unconfirmed() NONBLOCKING { others_ = value_ ? others_ : 0; }
   [[nodiscard]] bool value() const NONBLOCKING { return value_; }
 
  private:
@@ -111,10 +109,7 @@ class LocalMembraneModel {
   void touch() NONBLOCKING;
   void let_go() NONBLOCKING { touched_ = false; }
   // A needle outside has punctured nothing: two observations have to show it anew.
-  void is_outside() NONBLOCKING {
-    punctured_.forget_unconfirmed();
-    inner_punctured_.forget_unconfirmed();
-  }
+  void is_outside() NONBLOCKING { punctured_ = inner_punctured_ = {}; }
 
   // A fresh cell: forget the old one; observations exposed before now do not count.
   void restart(std::int64_t now_ns) NONBLOCKING;

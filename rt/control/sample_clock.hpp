@@ -30,6 +30,11 @@ class SampleClock {
 
   // A fresh sample counts as the newest one from here on.
   [[nodiscard]] SampleIs take(std::int64_t sample_ns, std::int64_t now_ns) NONBLOCKING {
+    const bool is_newest = begun_ && sample_ns == newest_ns_;
+    const double older_s = is_newest ? 1e-9 * static_cast<double>(now_ns - sample_ns) - age_s() : 0;
+    // It arrived when the clock was wrong: two readings in a row say that it is older.
+    age_at_arrival_s_ += std::max(0.0, std::min(older_s, was_older_s_));
+    was_older_s_ = older_s;
     if (sample_ns > now_ns + kAhead_ns || sample_ns < now_ns - nanoseconds(timeout_s_)) {
       return SampleIs::untimely;
     }
@@ -68,6 +73,7 @@ class SampleClock {
   double timeout_s_;
   double silent_s_ = 0;  // since the newest sample arrived
   double age_at_arrival_s_ = 0;
+  double was_older_s_ = 0;  // than it was counted, on the tick before
   std::int64_t newest_ns_ = std::numeric_limits<std::int64_t>::min();
   bool begun_ = false;
 };

@@ -193,9 +193,11 @@ struct Bounds {
   // What one false reading of up to 20 ms may move the needle by, there and again back: less than a pixel.
   double false_motion_m = 0.5e-6;
   double brief_s = 0.02;
-  double filter_s = 0.3;                                // the tremor filter has settled
-  double vision_sum_m = 8.5e-6;                         // from first contact on
-  double truth_m = 3e-6;                                // the core knows the membrane's place to this
+  double filter_s = 0.3;         // the tremor filter has settled
+  double vision_sum_m = 8.5e-6;  // from first contact on
+  double clear_m = c.phases.value_or(PhaseParams{}).clear_m;
+  double clear_known_m = 3e-6;  // nobody outside knows closer when the core takes the needle for clear
+  double truth_m = 3e-6;        // the core knows the membrane's place to this
   double lateral_m = lateral_limit_m(c.limits) + 2e-6;  // the tip follows the set-point late
   double jerk_m_s3 = jerk_limit_m_s3(c.limits);
   double shortest_opening_s = 0.02;
@@ -604,6 +606,7 @@ class Invariants {
       }
       if (!sent_known_) {
         if (stage_known_) {
+          false_start_m_ = std::min((stage_told_.tip_m - s.tip_true_m).norm(), b_.settles_m);
           // Hand and needle are coupled on this tick, or by the reset on the tick before.
           at_most(I::begins_at_the_needle,
                   std::min((p - stage_told_.tip_m).norm(), (p - stage_told_before_m_).norm()), 1e-6);
@@ -688,7 +691,7 @@ class Invariants {
     }
     if (inside && s.stage_true) {
       const Vec3 off = s.tip_true_m - entered_m_;
-      at_most(I::lateral_bounded, (off - off.dot(axis) * axis).norm(), b_.lateral_m);
+      at_most(I::lateral_bounded, (off - off.dot(axis) * axis).norm(), b_.lateral_m + false_start_m_);
     }
     inside_ = inside;
   }
@@ -702,11 +705,23 @@ class Invariants {
       const double dt = s.clock_true ? std::min(s.elapsed_s, 0.02) : 0.02;
       at_most(I::vision_rate, (entry - entry_m_).norm(),
               2 * b_.c.local_model->max_rate_m_s * std::max(dt, b_.nominal_s) * 1.01 + 1e-9);
-      at_most(I::vision_sum, (entry - first_entry_m_).norm(), b_.vision_sum_m);
+      const double this_touch_m = (entry - first_entry_m_).norm();
+      const double all_m = (entry - contact_entry_m_).norm();
+      at_most(I::vision_sum, surely_near_ ? all_m : std::min(this_touch_m, all_m), b_.vision_sum_m);
     }
     if (!in || !entry_known_) {
       first_entry_m_ = entry;
+      contact_entry_m_ = near_contact_ ? contact_entry_m_ : entry;
     }
+    // A needle that leaves the cell by less than clear_um and comes back touches it for the first time no
+    // more.
+    if (in && !near_contact_) {
+      touched_at_m_ = stage_told_.tip_m;
+      surely_near_ = true;
+    }
+    const double out_m = (stage_told_.tip_m - touched_at_m_).x();
+    near_contact_ = in || (near_contact_ && t.cell == cell_ && out_m < b_.clear_m + b_.clear_known_m);
+    surely_near_ = surely_near_ && near_contact_ && (in || out_m < b_.clear_m - b_.clear_known_m);
     entry_known_ = in;
     entry_m_ = entry;
   }
@@ -757,13 +772,19 @@ class Invariants {
 
   // ---- H ----
   void relay(const Seen& s, const TelemetrySample& t, bool running) {
+    // From the first tick on that can know it: in a stall nobody toggles the level either.
+    const auto count = [&s](double& lost_s, bool lost) {
+      lost_s = !lost ? -1 : lost_s < 0 ? 0 : lost_s + s.elapsed_s;
+    };
+    count(stage_lost_s_, stage_known_ && stage_silent_s_ > b_.c.stage_timeout_s);
+    count(estop_lost_s_, estop_silent_s_ > 0.05);
     const bool toggled = known_ && s.level != level_;
     force_lost_s_ = s.force_N == s.asked_N ? 0 : force_lost_s_ + (s.clock_true ? s.elapsed_s : 0);
     if (toggled) {
       at_most(I::relay_hand_obeys, force_lost_s_ - b_.c.hand_timeout_s, b_.relay_s);
       const double stop_takes_s = b_.c.estop.power_off_after_s + b_.relay_s;
-      at_most(I::relay_inputs_fresh, stage_known_ ? stage_silent_s_ - b_.c.stage_timeout_s : 0, stop_takes_s);
-      at_most(I::relay_inputs_fresh, estop_silent_s_ - 0.05, stop_takes_s);
+      at_most(I::relay_inputs_fresh, stage_lost_s_, stop_takes_s);
+      at_most(I::relay_inputs_fresh, estop_lost_s_, stop_takes_s);
       if (t.stop == StopStage::stopped) {  // a reset makes a new beginning
         at_most(I::relay_stage_obeys, powered_s_, 0.1 + b_.relay_s);
         at_most(I::relay_stage_obeys, moves_s_, 0.25 + b_.relay_s);
@@ -876,16 +897,21 @@ class Invariants {
   double blind_way_m_ = 0;
   Vec3 a_m_s2_ = Vec3::Zero();
   bool touched_ = false, inside_ = false;
+  // Where the needle was told to be when its motion began: without power it may have gone there.
+  double false_start_m_ = 0;
   Vec3 first_contact_m_ = Vec3::Zero(), entered_m_ = Vec3::Zero();
 
   bool entry_known_ = false;
+  bool near_contact_ = false, surely_near_ = false;
+  Vec3 contact_entry_m_ = Vec3::Zero(), touched_at_m_ = Vec3::Zero();
   Vec3 entry_m_ = Vec3::Zero(), first_entry_m_ = Vec3::Zero();
 
   bool own_press_ = false;
   int openings_ = 0;
   double open_s_ = 0, open_in_cell_s_ = 0;
   double powered_s_ = 0, moves_s_ = 0, away_s_ = 0;
-  Vec3 left_m_ = Vec3::Zero();  // where the needle was told to be when its power went
+  Vec3 left_m_ = Vec3::Zero();                    // where the needle was told to be when its power went
+  double stage_lost_s_ = -1, estop_lost_s_ = -1;  // < 0: not
   int still_ticks_ = 0;
   int punctured_frames_ = 0;
 };

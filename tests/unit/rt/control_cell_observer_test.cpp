@@ -28,10 +28,10 @@ struct Observed {
     return cell.step(time, readings, Vec3::Zero(), last);
   }
   // A cell of 60 um radius, its undeformed membrane at x = 20 um; seen as it is now.
-  void see() const {
+  void see(std::uint32_t more = 0) const {
     Observation o;
     o.exposure_ns = now_ns;
-    o.flags = Observation::tip_ok | Observation::outer_ok;
+    o.flags = Observation::tip_ok | Observation::outer_ok | more;
     o.tip_m[0] = readings.stage.tip_m.x();
     o.centre_m[0] = -40e-6;
     o.R_m = 60e-6;
@@ -64,6 +64,40 @@ TEST(CellObserver, needs_no_vision_in_a_scene_without_it) {
   EXPECT_TRUE(facts.vision_fresh);
   EXPECT_FALSE(facts.membrane.known);
   EXPECT_EQ(facts.alarms, 0U);
+}
+
+// Two pictures in a row that show it.
+void see_puncture(Observed& o) {
+  o.readings.stage.tip_m.x() = 0;
+  for (int k = 0; k < 2; ++k) {
+    (void)o.tick();
+    o.see(Observation::contact | Observation::punctured);
+    (void)o.tick();
+  }
+}
+
+TEST(CellObserver, forgets_a_puncture_when_the_needle_is_outside_again) {
+  ServoConfig config;
+  config.phases.emplace();
+  Observed o(config);
+  o.last.outside = false;
+  see_puncture(o);
+  EXPECT_TRUE(o.cell.facts().puncture_seen);
+  o.last.outside = true;
+  EXPECT_FALSE(o.tick().puncture_seen);
+  o.last.outside = false;
+  EXPECT_FALSE(o.tick().puncture_seen);
+  see_puncture(o);
+  EXPECT_TRUE(o.cell.facts().puncture_seen);
+}
+
+TEST(CellObserver, believes_a_puncture_in_a_scene_without_phases) {
+  ServoConfig config;
+  config.phases.reset();
+  Observed o(config);
+  o.last.outside = true;  // as the task says without phases
+  see_puncture(o);
+  EXPECT_TRUE(o.cell.facts().puncture_seen);
 }
 
 TEST(CellObserver, follows_the_depth_with_the_needle_between_two_observations) {

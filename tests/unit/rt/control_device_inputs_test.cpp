@@ -546,6 +546,67 @@ TEST(DeviceInputs, calls_power_that_went_away_unasked_a_fault_unless_a_stop_took
   }
 }
 
+TEST(DeviceInputs, believes_a_drive_without_power_whose_clock_is_ahead_and_none_that_tells_of_before) {
+  for (const bool ahead : {true, false}) {
+    Inputs in;
+    in.settle();
+    in.stage.on = false;
+    in.now_ns += 1'000'000;
+    in.hand.now_ns = in.estop.now_ns = in.now_ns;
+    in.stage.now_ns = in.now_ns + (ahead ? 400'000'000 : -15'000'000);
+    const TickTime time{.now_ns = in.now_ns, .elapsed_s = 1e-3, .dt_s = 1e-3};
+    EXPECT_EQ(in.inputs.read(time, in.last).device_faults.first, ahead ? Fault::stage_fault : Fault::none);
+  }
+}
+
+TEST(DeviceInputs, turns_the_needles_axis_no_faster_than_drives_do) {
+  Inputs in;
+  in.settle();
+  const Vec3 before = in.inputs.readings().stage.axis;
+  const auto turned_rad = [&] { return (in.inputs.readings().stage.axis - before).norm(); };
+  in.stage.axis = Vec3(-1, 0.06, 0).normalized();
+  EXPECT_EQ(in.read().device_faults.first, Fault::none);
+  EXPECT_LE(turned_rad(), 1.001e-3) << "by one false sample";
+  EXPECT_GT(turned_rad(), 0.9e-3);
+  in.stage.axis = before;
+  (void)in.read();
+  EXPECT_EQ(turned_rad(), 0);
+  // 0.5 rad/s is as fast as set-points turn it.
+  for (int k = 1; k <= 80; ++k) {
+    in.stage.axis = Vec3(-std::cos(0.5e-3 * k), std::sin(0.5e-3 * k), 0);
+    (void)in.read();
+    EXPECT_LT((in.inputs.readings().stage.axis - in.stage.axis).norm(), 1e-15) << k;
+  }
+  // In a stop a needle may be mounted anew.
+  in.last.running = false;
+  in.stage.axis = Vec3(0, -1, 0);
+  (void)in.read();
+  (void)in.read();
+  EXPECT_EQ(in.inputs.readings().stage.axis, in.stage.axis);
+}
+
+// It arrived while the clock was slow, and seemed to be new.
+TEST(SampleClock, counts_the_age_of_a_sample_by_its_own_time_once_the_clock_has_told_it_twice) {
+  constexpr std::int64_t kMs = 1'000'000;
+  SampleClock clock(0.02);
+  clock.step(1e-3);
+  EXPECT_EQ(clock.take(100 * kMs, 100 * kMs), SampleIs::fresh);
+  EXPECT_EQ(clock.age_s(), 0);
+  clock.step(1e-3);
+  EXPECT_EQ(clock.take(100 * kMs, 105 * kMs), SampleIs::repeated);
+  EXPECT_NEAR(clock.age_s(), 1e-3, 1e-12) << "the clock has said so once";
+  clock.step(1e-3);
+  EXPECT_EQ(clock.take(100 * kMs, 106 * kMs), SampleIs::repeated);
+  EXPECT_NEAR(clock.age_s(), 6e-3, 1e-12);
+  for (int k = 7; k <= 20; ++k) {
+    clock.step(1e-3);
+    (void)clock.take(100 * kMs, (100 + k) * kMs);
+    EXPECT_FALSE(clock.timed_out()) << k;
+  }
+  clock.step(1e-3);
+  EXPECT_TRUE(clock.timed_out());
+}
+
 TEST(DeviceInputs, bears_a_low_vacuum_for_its_window_and_between_cells) {
   Inputs in;
   in.vacuum.pressure = 100;

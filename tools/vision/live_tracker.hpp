@@ -22,22 +22,24 @@ class LiveTracker {
   // A camera may be slow: so many of its own intervals are no gap either.
   static constexpr std::int64_t kLongestGap_intervals = 5;
 
-  // An empty template: it is cut from the first frame.
-  LiveTracker(const vision::VisionConfig& config, int width, int height, cv::Mat holder_template)
+  // An empty template: it is cut from the first frame. The clock is the one that frames are stamped with.
+  LiveTracker(const vision::VisionConfig& config, int width, int height, cv::Mat holder_template,
+              hal::Clock& clock)
       : config_(config),
         width_(width),
         height_(height),
         holder_template_(std::move(holder_template)),
+        clock_(clock),
         tracker_(begun()) {}
 
-  // As vision::Tracker::process. The frame on which needle or cell is found first is searched whole, which
-  // takes a slow machine seconds: the next one is followed whenever it comes, or it would never see.
-  // Meanwhile the core, without sight, lets the needle only withdraw.
+  // As vision::Tracker::process. The search of a whole frame takes a slow machine seconds, in which it can
+  // take no other one: that is no gap, or it would search for ever. Meanwhile the core, without sight, lets
+  // the needle only withdraw.
   const vision::Result& process(const hal::Frame& frame) {
     if (last_ns_ != kNever) {
       const std::int64_t interval_ns = frame.exposure_ns - last_ns_;
-      const bool gap = interval_ns > kLongestGap_ns && interval_ns / kLongestGap_intervals >= shortest_ns_;
-      if (gap && found_ && !just_found_) {
+      const std::int64_t waited_ns = frame.exposure_ns - std::max(last_ns_, ready_ns_);
+      if (waited_ns > kLongestGap_ns && interval_ns / kLongestGap_intervals >= shortest_ns_ && found_) {
         tracker_ = begun();
         ++restarts_;
         found_ = false;
@@ -46,8 +48,8 @@ class LiveTracker {
     }
     last_ns_ = frame.exposure_ns;
     const vision::Result& result = tracker_.process(frame);
-    just_found_ = !found_ && (result.needle.ok || result.outer.ok);
-    found_ = found_ || just_found_;
+    found_ = found_ || result.needle.ok || result.outer.ok;
+    ready_ns_ = clock_.now_ns();
     return result;
   }
   [[nodiscard]] int restarts() const noexcept { return restarts_; }
@@ -66,12 +68,13 @@ class LiveTracker {
   vision::VisionConfig config_;
   int width_, height_;
   cv::Mat holder_template_;
+  hal::Clock& clock_;
   vision::Tracker tracker_;
-  std::int64_t last_ns_ = kNever;
+  std::int64_t last_ns_ = kNever;   // the last frame's exposure
+  std::int64_t ready_ns_ = kNever;  // for the next one
   std::int64_t shortest_ns_ = std::numeric_limits<std::int64_t>::max();
   int restarts_ = 0;
-  bool found_ = false;       // needle or cell, since it began
-  bool just_found_ = false;  // on the last frame for the first time
+  bool found_ = false;  // needle or cell, since it began
 };
 
 }  // namespace punctum::tools

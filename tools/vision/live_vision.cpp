@@ -270,7 +270,7 @@ Opened LiveVision::begin_tracker() {
         cv::Mat(picture->height, picture->width, CV_8U, const_cast<std::uint8_t*>(picture->pixels.data()))
             .clone();
   }
-  tracker_.emplace(config, width_, height_, holder_template);
+  tracker_.emplace(config, width_, height_, holder_template, clock());
   comparison_.emplace(config, width_, height_);
   return {};
 }

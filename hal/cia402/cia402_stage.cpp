@@ -340,8 +340,10 @@ void Cia402Stage::close() noexcept {
   if (!open_) {
     return;
   }
-  // Nobody watches the heartbeat of a master that has gone, and no PDO loads the bus.
+  // Nobody watches the heartbeat of a master that has gone, and no PDO loads the bus. One drive after the
+  // other: what a small receive buffer drops is not told again.
   for (std::size_t i = 0; i < count_; ++i) {
+    clock_.sleep_until_ns(clock_.now_ns() + kMillisecond_ns);
     (void)bus_->send(sdo_download(axes_[i].node(), {0x1016, 1}, 0, 4));
     (void)bus_->send(nmt(Nmt::pre_operational, axes_[i].node()));
   }

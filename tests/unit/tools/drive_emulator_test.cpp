@@ -53,6 +53,16 @@ class DriveTest : public testing::Test {
     }
     return out;
   }
+  // The first three bytes of each.
+  static std::vector<std::string> emergencies(const std::vector<can_frame>& frames) {
+    std::vector<std::string> out;
+    for (const can_frame& frame : frames) {
+      if (frame.can_id == 0x085) {
+        out.push_back(text(frame).substr(0, 8));
+      }
+    }
+    return out;
+  }
   void control(unsigned word) {
     EXPECT_EQ(sdo({0x2B, 0x40, 0x60, 0, word & 0xFF, word >> 8, 0, 0}), "60 40 60 00 00 00 00 00");
   }
@@ -282,9 +292,22 @@ TEST_F(DriveTest, sends_its_heartbeat_and_watches_that_of_its_master) {
   const auto told = pass(20 * kMs);
   EXPECT_EQ(drive.state(), DriveState::quick_stop_active);
   EXPECT_EQ(drive.nmt_state(), 0x7F);
-  EXPECT_TRUE(std::any_of(told.begin(), told.end(), [](const can_frame& f) {
-    return f.can_id == 0x085 && f.data[0] == 0x30 && f.data[1] == 0x81;
-  }));
+  // CiA 301: the code, and the error register with its bits for any error and for communication.
+  EXPECT_EQ(emergencies(told), (std::vector<std::string>{"30 81 11"}));
+  // It is told that the error is over, and stays where it went.
+  EXPECT_EQ(emergencies(send(0x77F, {0x05})), (std::vector<std::string>{"00 00 00"}));
+  EXPECT_EQ(drive.value(0x1001), 0);
+  EXPECT_EQ(drive.state(), DriveState::quick_stop_active);
+}
+
+TEST_F(DriveTest, a_lost_heartbeat_that_is_a_fault_is_told_once) {
+  sdo({0x23, 0x16, 0x10, 1, 50, 0, 0x7F, 0});
+  sdo({0x2B, 0x07, 0x60, 0, 1, 0, 0, 0});
+  operate();
+  send(0x77F, {0x05});
+  EXPECT_EQ(emergencies(pass(70 * kMs)), (std::vector<std::string>{"30 81 11"}));
+  EXPECT_EQ(drive.state(), DriveState::fault);
+  EXPECT_EQ(emergencies(send(0x77F, {0x05})), std::vector<std::string>{}) << "a fault waits for its reset";
 }
 
 TEST_F(DriveTest, misbehaves_when_it_is_told_to) {

@@ -19,6 +19,8 @@ constexpr std::int64_t kInt32Min = std::numeric_limits<std::int32_t>::min();
 constexpr std::int64_t kInt32Max = std::numeric_limits<std::int32_t>::max();
 // Cycles without SYNC after which the drive takes the link for lost.
 constexpr int kSyncsMissed = 10;
+constexpr std::uint16_t kHeartbeatLost = 0x8130, kPdoTooShort = 0x8210, kSyncLost = 0x8700;
+constexpr std::uint8_t kCommunicationError = 0x11;  // of the error register: generic, and communication
 
 std::uint32_t word(const std::uint8_t* data, int bytes) {
   std::uint32_t value = 0;
@@ -235,6 +237,7 @@ void Drive::on_frame(const can_frame& frame, std::int64_t now_ns) {
     const auto master = static_cast<std::uint32_t>(objects_.get(0x1016, 1)) >> 16U;
     if (frame.can_id == 0x700 + master && frame.can_dlc == 1) {
       master_ns_ = now_ns;
+      communication_back(kHeartbeatLost);
     }
   } else if (pdo_is_on(kRpdo) && frame.can_id == (objects_.get(kRpdo.parameter, 1) & 0x7FF)) {
     on_rpdo(frame);
@@ -289,6 +292,7 @@ void Drive::on_rpdo(const can_frame& frame) {
 
 void Drive::on_sync(std::int64_t now_ns) {
   sync_ns_ = now_ns;
+  communication_back(kSyncLost);
   if (nmt_ != kOperational) {
     return;
   }
@@ -317,10 +321,10 @@ void Drive::take_rpdo(const can_frame& frame) {
     bytes += static_cast<int>(objects_.get(kRpdo.mapping, sub) & 0xFF) / 8;
   }
   if (frame.can_dlc < bytes) {
-    constexpr std::uint16_t kPdoTooShort = 0x8210;
-    emergency(kPdoTooShort);
+    communication_error(kPdoTooShort);
     return;
   }
+  communication_back(kPdoTooShort);
   int at = 0;
   std::uint16_t controlword = controlword_;
   for (std::uint8_t sub = 1; sub <= entries; ++sub) {
@@ -615,18 +619,40 @@ void Drive::raise_fault(std::uint16_t code, std::uint8_t error_register) {
   }
 }
 
-void Drive::link_lost(std::uint16_t code) {
-  constexpr std::uint8_t kCommunication = 0x11;
+// CiA 301: the error register goes with its emergency, and back to no error when what it told is over.
+void Drive::communication_error(std::uint16_t code) {
+  communication_error_ = code;
+  objects_.set(0x1001, 0, kCommunicationError);
   emergency(code);
+}
+
+void Drive::communication_back(std::uint16_t code) {
+  if (communication_error_ != code) {
+    return;
+  }
+  communication_error_ = 0;
+  if (objects_.get(0x1001) == kCommunicationError && state_ != DriveState::fault &&
+      state_ != DriveState::fault_reaction) {
+    objects_.set(0x1001, 0, 0);
+    emergency(0);
+  }
+}
+
+void Drive::link_lost(std::uint16_t code) {
+  const bool moves = state_ == DriveState::operation_enabled || state_ == DriveState::switched_on;
+  const bool becomes_fault = moves && objects_.get(0x6007) == 1;
+  if (!becomes_fault) {
+    communication_error(code);
+  }
   if (nmt_ == kOperational && objects_.get(0x1029, 1) == 0) {
     nmt_ = kPreOperational;
   }
-  if (state_ != DriveState::operation_enabled && state_ != DriveState::switched_on) {
+  if (!moves) {
     return;
   }
   switch (objects_.get(0x6007)) {
     case 1:
-      raise_fault(code, kCommunication);
+      raise_fault(code, kCommunicationError);
       break;
     case 2:
       go(DriveState::switch_on_disabled);
@@ -766,13 +792,11 @@ void Drive::watch_time_outs(std::int64_t now_ns) {
   }
   const std::int64_t consumer_ns = (objects_.get(0x1016, 1) & 0xFFFF) * kMillisecond_ns;
   if (consumer_ns > 0 && master_ns_ >= 0 && now_ns - master_ns_ > consumer_ns) {
-    constexpr std::uint16_t kHeartbeatLost = 0x8130;
     master_ns_ = -1;
     link_lost(kHeartbeatLost);
   }
   const std::int64_t cycle_ns = objects_.get(0x1006) * 1000;
   if (cycle_ns > 0 && sync_ns_ >= 0 && now_ns - sync_ns_ > kSyncsMissed * cycle_ns) {
-    constexpr std::uint16_t kSyncLost = 0x8700;
     sync_ns_ = -1;
     if (state_ == DriveState::operation_enabled) {
       link_lost(kSyncLost);

@@ -90,6 +90,8 @@ class Drive {
   void control(std::uint16_t word);
   void raise_fault(std::uint16_t code, std::uint8_t error_register);
   void link_lost(std::uint16_t code);
+  void communication_error(std::uint16_t code);
+  void communication_back(std::uint16_t code);
   void emergency(std::uint16_t code);
   void advance(std::int64_t now_ns);
   void follow_set_point(double dt_s, std::int64_t now_ns);
@@ -127,6 +129,7 @@ class Drive {
 
   // Bad habits.
   bool ignore_quick_stop_ = false, ignore_disable_ = false, ignore_enable_ = false;
+  std::uint16_t communication_error_ = 0;  // that lasts
   bool mute_heartbeat_ = false, mute_pdo_ = false, mute_sdo_ = false, mute_emergency_ = false;
   bool frozen_ = false, stuck_encoder_ = false;
   double stuck_at_ = 0, creep_counts_s_ = 0;

@@ -96,13 +96,18 @@ TEST_F(CanLoopback, three_drives_follow_at_1_kHz_and_every_tick_has_its_answer) 
   enable();
   const Vec3 from_m = state.tip_m;
   int silent = 0;
+  double behind_m = 0;
   std::vector<std::int64_t> age_ns;
   for (int i = 0; i < 1000; ++i) {
     command.tip_m = from_m + Vec3(0.1e-6, -0.05e-6, 0.02e-6) * std::min(i, 500);
     silent += tick() == Status::ok ? 0 : 1;
+    behind_m = std::max(behind_m, state.following_error_m.cwiseAbs().maxCoeff());
     age_ns.push_back(clock.now_ns() - state.sample_ns);
   }
   EXPECT_EQ(silent, 0);
+  std::printf("following error of a drive that goes 2.5 counts in a tick: at most %.1f counts\n",
+              behind_m / kCount_m);
+  EXPECT_LT(behind_m, 2 * kCount_m) << "of the set-point that it has had for a tick";
   EXPECT_LT((state.tip_m - command.tip_m).norm(), 3 * kCount_m);
   EXPECT_EQ(drives.with(0, [](Drive& d) { return d.position(); }), 50e-6 / kCount_m);
   EXPECT_EQ(drives.with(1, [](Drive& d) { return d.position(); }), -25e-6 / kCount_m);
@@ -151,6 +156,38 @@ TEST_F(CanLoopback, a_quick_stop_is_in_the_drive_within_two_ticks_and_nothing_mo
     (void)tick();
   }
   EXPECT_EQ(drives.with(0, [](Drive& d) { return d.position(); }), at);
+}
+
+TEST_F(CanLoopback, drives_that_hear_no_heartbeat_of_their_master_stop_by_themselves) {
+  open();
+  enable();
+  drives.lose(0x700U + static_cast<canid_t>(three_drives().master_node));
+  const auto stopped = [&] {
+    return drives.with(2, [](Drive& d) { return d.state(); }) != DriveState::operation_enabled;
+  };
+  const int after = until(stopped);
+  std::printf("no heartbeat of the master: the drive stops after %d ticks\n", after);
+  EXPECT_GT(after, 0);
+  EXPECT_LE(after, 62);
+}
+
+TEST_F(CanLoopback, a_drive_with_a_fault_of_before_is_opened_without_it) {
+  EXPECT_EQ(drives.with(1, [](Drive& d) { return d.command("fault 0x7300"); }), "");
+  open();
+  enable();
+}
+
+TEST_F(CanLoopback, closed_drives_have_no_power_and_take_no_set_points) {
+  open();
+  enable();
+  stage->safe_state();
+  stage->close();
+  clock.sleep_until_ns(clock.now_ns() + 20'000'000);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(drives.with(i, [](Drive& d) { return d.nmt_state(); }), 0x7F) << i << ": pre-operational";
+    EXPECT_FALSE(drives.with(i, [](Drive& d) { return d.motor_has_power(); }));
+  }
+  stage.reset();
 }
 
 TEST_F(CanLoopback, drives_without_supply_are_lost_within_their_heartbeats_time) {

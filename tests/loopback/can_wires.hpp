@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <linux/can.h>
 #include <linux/can/netlink.h>
+#include <linux/can/raw.h>
 #include <linux/rtnetlink.h>
 #include <net/if.h>
 #include <poll.h>
@@ -143,6 +144,11 @@ class DrivesOnBus {
   auto with(std::size_t i, Function&& function) {
     const std::lock_guard lock(mutex_);
     return function(bus_.drive(i));
+  }
+  // Frames with this identifier reach no drive any more.
+  void lose(canid_t id) {
+    const can_filter all_others{id | CAN_INV_FILTER, CAN_SFF_MASK};
+    EXPECT_EQ(setsockopt(bus_.socket(), SOL_CAN_RAW, CAN_RAW_FILTER, &all_others, sizeof(all_others)), 0);
   }
   void send(const can_frame& frame) {
     EXPECT_EQ(write(bus_.socket(), &frame, sizeof(frame)), static_cast<ssize_t>(sizeof(frame)));

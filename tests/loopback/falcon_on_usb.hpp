@@ -71,6 +71,8 @@ class FalconOnUsb {
     }
     port_.reset();
   }
+  // From here on it answers nothing sooner than after this time.
+  void slow_down(std::chrono::microseconds by) { slower_us_ = by.count(); }
   template <class Function>
   auto with(Function&& function) {
     const std::lock_guard lock(mutex_);
@@ -82,6 +84,9 @@ class FalconOnUsb {
     constexpr std::int64_t kLongest_ns = 1'000'000;
     std::int64_t wait_ns = 0;
     while (!stop_ && port_->wait(std::min(wait_ns, kLongest_ns))) {
+      if (slower_us_ > 0) {
+        std::this_thread::sleep_for(std::chrono::microseconds(slower_us_));
+      }
       const std::lock_guard lock(mutex_);
       if (!port_->talk(*device_)) {
         return;
@@ -98,6 +103,7 @@ class FalconOnUsb {
   std::string problem_;
   std::mutex mutex_;
   std::atomic<bool> stop_{false};
+  std::atomic<std::int64_t> slower_us_{0};
   std::thread thread_;
 };
 

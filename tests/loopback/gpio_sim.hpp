@@ -3,7 +3,9 @@
 // root.
 #pragma once
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cstdio>
 #include <filesystem>
@@ -32,6 +34,29 @@ inline bool put(const fs::path& file, const std::string& text) {
   const bool written = std::fputs(text.c_str(), f) >= 0;
   return std::fclose(f) == 0 && written;
 }
+
+// The level of a line, read again and again without the cost of opening its file; the last one when the chip
+// is gone.
+class Watched {
+ public:
+  explicit Watched(const fs::path& file) : file_(open(file.c_str(), O_RDONLY | O_CLOEXEC)) {
+    EXPECT_GE(file_, 0) << file;
+  }
+  ~Watched() { close(file_); }
+  Watched(const Watched&) = delete;
+  Watched& operator=(const Watched&) = delete;
+  [[nodiscard]] bool level() {
+    char text = 0;
+    if (pread(file_, &text, 1, 0) == 1) {
+      level_ = text == '1';
+    }
+    return level_;
+  }
+
+ private:
+  int file_;
+  bool level_ = false;
+};
 
 class GpioSim {
  public:

@@ -1,8 +1,5 @@
 // The stop chain from wire to wire: a contact opens on a GPIO chip; the heartbeat's line falls silent, and
 // quick stops go out on a CAN bus to three drives. The core between them runs at 1 kHz.
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -31,23 +28,6 @@ void print_histogram(const char* title, std::vector<std::int64_t> delays_ns) {
                 std::string(static_cast<std::size_t>(in_bin), '#').c_str());
   }
 }
-
-// The level of a line, read again and again without the cost of opening its file.
-class Watched {
- public:
-  explicit Watched(const fs::path& file) : file_(open(file.c_str(), O_RDONLY | O_CLOEXEC)) {}
-  ~Watched() { close(file_); }
-  Watched(const Watched&) = delete;
-  Watched& operator=(const Watched&) = delete;
-  [[nodiscard]] bool level() const {
-    char text = 0;
-    EXPECT_EQ(pread(file_, &text, 1, 0), 1);
-    return text == '1';
-  }
-
- private:
-  int file_;
-};
 
 void put_stage_on_can(tools::Scene& scene) {
   scene.devices.stage = tools::kCia402;
@@ -127,7 +107,7 @@ TEST_F(StopChain, the_heartbeat_ends_when_a_drive_neither_stops_nor_lets_go_of_i
     for (const char* habit : {"ignore quick-stop", "ignore disable"}) {
       EXPECT_EQ(drives.with(1, [habit](emulator::Drive& d) { return d.command(habit); }), "");
     }
-    const Watched beat(board->value_file(kHeartbeat));
+    Watched beat(board->value_file(kHeartbeat));
     board->drive(kContactA, false);
     board->drive(kContactB, false);
     opened_ns = clock.now_ns();

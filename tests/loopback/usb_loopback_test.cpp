@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -77,15 +78,18 @@ class UsbLoopback : public testing::Test {
     handle = std::make_unique<FalconHandle>(falcon::FalconParams{kFirmware, -1}, falcon::ServoThread{80, -1},
                                             clock, falcon::libusb_link(clock));
   }
+  // The kernel asks the device what it is before a program may open it, and knows the one before it for a
+  // while.
   void begin() {
-    // The kernel asks the device what it is before a program may open it, and knows the one before it for a
-    // while.
     tl::expected<void, std::string> opened = tl::unexpected(std::string{});
     for (int i = 0; i < 100 && !opened; ++i) {
       opened = handle->open();
       clock.sleep_until_ns(clock.now_ns() + 20'000'000);
     }
     ASSERT_TRUE(opened) << opened.error();
+    start();
+  }
+  void start() {
     next_ns = clock.now_ns() + 5'000'000;
     const auto started = handle->start(next_ns);
     ASSERT_TRUE(started) << started.error();
@@ -146,8 +150,13 @@ TEST_F(UsbLoopback, without_a_falcon_one_line_says_so) {
 TEST_F(UsbLoopback, firmware_homing_and_two_seconds_at_1_kHz_without_a_tick_that_has_no_reading) {
   write_firmware(3000);
   plug_in({});
+  while (!std::filesystem::exists("/sys/bus/usb/devices/1-1/1-1:1.0/bInterfaceNumber")) {
+    clock.sleep_until_ns(clock.now_ns() + 20'000'000);
+  }
   const std::int64_t begun_ns = clock.now_ns();
-  ASSERT_NO_FATAL_FAILURE(begin());
+  const auto opened = handle->open();
+  ASSERT_TRUE(opened) << opened.error();
+  ASSERT_NO_FATAL_FAILURE(start());
   std::printf("booted with %zu words and homed after %.2f s\n",
               usb->with([](FalconEmulator& f, WatchedHand&) { return f.loaded_words(); }),
               1e-9 * static_cast<double>(clock.now_ns() - begun_ns));
@@ -223,6 +232,16 @@ TEST_F(UsbLoopback, force_is_right_in_newtons_wherever_the_grip_is) {
   EXPECT_LT(worst_N, 0.02);
 }
 
+TEST_F(UsbLoopback, each_button_is_pressed_and_let_go) {
+  plug_in();
+  ASSERT_NO_FATAL_FAILURE(begin());
+  for (const std::uint8_t pressed : std::array<std::uint8_t, 6>{1, 2, 4, 8, 5, 0}) {
+    usb->with([&](FalconEmulator&, WatchedHand& hand) { hand.at.buttons = pressed; });
+    (void)ticks_with(Status::ok, 5);
+    EXPECT_EQ(state.buttons, pressed);
+  }
+}
+
 TEST_F(UsbLoopback, frames_that_are_short_corrupt_or_do_not_fit_cost_ticks_and_nothing_else) {
   plug_in();
   ASSERT_NO_FATAL_FAILURE(begin());
@@ -273,13 +292,18 @@ TEST_F(UsbLoopback,
   EXPECT_NEAR(felt().z(), 2, 0.02);
 }
 
-TEST_F(UsbLoopback, a_falcon_that_another_program_holds_is_refused) {
+TEST_F(UsbLoopback, a_falcon_that_another_program_holds_is_refused_until_it_is_closed_there) {
   plug_in();
   ASSERT_NO_FATAL_FAILURE(begin());
   FalconHandle other({}, {}, clock, falcon::libusb_link(clock));
   const auto opened = other.open();
   ASSERT_FALSE(opened);
   EXPECT_NE(opened.error().find("another program"), std::string::npos) << opened.error();
+  handle->safe_state();
+  handle->close();
+  const auto now = other.open();
+  EXPECT_TRUE(now) << now.error();
+  other.close();
 }
 
 }  // namespace

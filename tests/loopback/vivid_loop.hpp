@@ -162,7 +162,8 @@ class VividLoop {
     for (std::uint8_t* memory : memory_) {
       ::munmap(memory, bytes_);
     }
-    output_.close();  // its buffers keep the format
+    output_.close();   // its buffers keep the format
+    camera_.reopen();  // a device that was unplugged is back once nobody has it open
     loop(false);
     camera_.set("OSD Text Mode", 0);
     camera_.set("Enable Capture Scaler", 1);

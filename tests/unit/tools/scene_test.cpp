@@ -421,7 +421,7 @@ TEST(Scene, each_broken_file_is_told_in_one_line) {
 TEST(Scene, every_built_in_scene_reads_back_to_the_same_numbers) {
   const auto names = builtin_names();
   for (const char* wanted :
-       {"icsi", "zebrafish", "outer-only", "no-holder", "free", "recorded", "hands-on"}) {
+       {"icsi", "zebrafish", "outer-only", "no-holder", "free", "recorded", "hands-on", "loopback"}) {
     EXPECT_NE(std::find(names.begin(), names.end(), wanted), names.end()) << wanted;
   }
   for (const auto name : names) {
@@ -941,11 +941,13 @@ class SceneFiles : public testing::Test {
 
 TEST_F(SceneFiles, what_is_no_scene_file_is_refused_in_one_line) {
   EXPECT_EQ(load_scene("icis").error(),
-            "icis: unknown scene (did you mean icsi?), allowed: free, hands-on, icsi, no-holder, outer-only, "
+            "icis: unknown scene (did you mean icsi?), allowed: free, hands-on, icsi, loopback, no-holder, "
+            "outer-only, "
             "recorded, "
             "zebrafish, or a path");
   EXPECT_EQ(load_scene("/nowhere/a.toml").error(),
-            "/nowhere/a.toml: no such file, allowed: a path, or free, hands-on, icsi, no-holder, outer-only, "
+            "/nowhere/a.toml: no such file, allowed: a path, or free, hands-on, icsi, loopback, no-holder, "
+            "outer-only, "
             "recorded, "
             "zebrafish");
   EXPECT_EQ(load_scene(folder_.string()).error(),

@@ -19,13 +19,20 @@ fail() {
 running=
 trap 'if [ -n "$running" ]; then kill "$running" 2>/dev/null; wait "$running"; fi; exit 130' INT TERM HUP
 
-# What is worth seeing of a failed step's log: the compiler's first complaints, else its end.
+# failed_expectations LOG...: what tests and sanitizers complained about, each with the lines after it.
+failed_expectations() {
+  grep -hE -A 9 ': Failure$|^\[  FAILED  \] .*[a-z]\.|ERROR: [A-Z][A-Za-z]+Sanitizer|: runtime error: |Test timeout|Subprocess aborted' "$@" |
+    cut -c1-400 | head -n 60
+}
+
+# What is worth seeing of a failed step's log: the compiler's first complaints, or those of tests, else its end.
 show_failure() {
   local log=$1
   if grep -q -m1 '^FAILED: ' "$log"; then
     sed -n '/^FAILED: /,$p' "$log" | cut -c1-400 | head -n 60
   else
     cut -c1-400 "$log" | tail -n 60
+    failed_expectations "$log" || true
   fi >&2
 }
 

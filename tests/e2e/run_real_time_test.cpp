@@ -18,7 +18,8 @@ TEST_F(Programs, in_real_time_the_core_keeps_its_grid_without_faults_or_allocati
   ASSERT_EQ(punctum({"run", "free", "--seconds", "2", "--set", kPatientRelay}), 0) << said_;
   const auto r = json();
   EXPECT_EQ(r["clock"], "real");
-  EXPECT_NEAR(r["ticks"].get<double>() + r["missed"].get<double>(), 2100, 150);
+  const double missed = r["missed"];
+  EXPECT_NEAR(r["ticks"].get<double>() + missed, 2100, 50 + missed) << "a machine that stalls ends later";
   EXPECT_FALSE(r["rights"].empty());
   EXPECT_EQ(r["page_faults"]["major"], 0);
   if (!r["allocations"].is_null()) {
@@ -104,7 +105,9 @@ TEST_F(Programs, when_the_core_is_killed_the_devices_go_to_their_safe_state_and_
   EXPECT_TRUE(r["unattended"]["safe"]);
   EXPECT_LT(r["unattended"]["relay_opened_s"], 0.1);
   EXPECT_TRUE(r["page_faults"]["minor"].is_null());  // nobody counted them: not zero
-  EXPECT_EQ(Table(fs::path(report()) / "fault.csv").rows.size(), r["ticks"]);  // fewer than two seconds
+  // Fewer than two seconds: all are kept. The tick in whose middle it was killed is counted, but has no row.
+  const auto rows = static_cast<double>(Table(fs::path(report()) / "fault.csv").rows.size());
+  EXPECT_NEAR(rows, r["ticks"].get<double>() - 0.5, 0.5);
   EXPECT_TRUE(r["events"].is_array());
   EXPECT_NE(run.output().find("the control core was killed by signal 9"), std::string::npos) << run.output();
 }
@@ -209,7 +212,9 @@ TEST_F(Programs, an_operator_beside_the_run_changes_gains_by_commands_that_the_r
     EXPECT_TRUE((*console)->queue.try_push({rt::Command::force_scale, 0.5}));
     EXPECT_TRUE((*console)->queue.try_push({rt::Command::effect_gain, 0, rt::effect_damping}));
     EXPECT_TRUE((*console)->queue.try_push({rt::Command::effect_gain, 0, rt::effect_membrane}));
-    std::this_thread::sleep_for(1s);
+    for (const std::uint64_t ramped = look.ticks() + 1000; look.ticks() < ramped && alive(look.core());) {
+      std::this_thread::sleep_for(10ms);
+    }
     EXPECT_TRUE((*console)->queue.try_push({rt::Command::stop, 0}));
   }
   EXPECT_EQ(run.wait(), 0) << run.output();
@@ -226,7 +231,10 @@ TEST_F(Programs, an_operator_beside_the_run_changes_gains_by_commands_that_the_r
                            "command_refused effect_gain membrane", "command stop"}));
   // Without damping, the only effect of this scene, there is no force.
   const Table t(fs::path(report()) / "samples.csv");
-  const std::size_t before_stop = t.rows.size() - 200;
+  std::size_t before_stop = t.rows.size() - 1;
+  while (before_stop > 0 && t.number(before_stop, "stop") != 0) {
+    --before_stop;
+  }
   EXPECT_EQ(t.number(before_stop, "damping_N"), 0) << t.text(before_stop, "t_s");
 }
 

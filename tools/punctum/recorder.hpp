@@ -88,9 +88,10 @@ class Recorder {
   std::unique_ptr<sim::SnapshotTaker> taker_;
   std::uint64_t every_;
   std::uint64_t rows_ = 0, unusable_ = 0;
-  double half_period_s_;
+  std::int64_t period_ns_;
   std::uint64_t ticks_after_fault_;
   bool world_pending_ = false;  // world_ is of a tick whose sample has not come yet
+  std::uint64_t world_tick_ = 0;
   rt::TelemetrySample sample_, before_;
   sim::Snapshot world_;
 };

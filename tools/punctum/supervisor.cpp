@@ -498,7 +498,10 @@ void Run::judge_end(const Ended& core) {
     recorder_.keep_last_seconds();
     let_devices_come_to_rest();
   }
-  result_.needle = recorder_.measures().whereabouts(result_.unattended ? &result_.unattended->last : nullptr);
+  // While its devices are shut down, or left to themselves, the plant goes on.
+  sim::Snapshot newest;
+  const bool simulated = segments_.bench && sim::newest_valid(**segments_.bench, newest);
+  result_.needle = recorder_.measures().whereabouts(simulated ? &newest : nullptr);
 }
 
 // The core is dead: what the simulated devices do by themselves.

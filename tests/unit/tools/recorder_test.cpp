@@ -164,6 +164,45 @@ TEST_F(RecorderTest, every_row_has_as_many_cells_as_there_are_columns) {
   }
 }
 
+// What the table tells of the needle's true place, tick by tick: empty where nobody knows it.
+std::vector<std::string> true_places(const fs::path& table) {
+  std::ifstream in(table);
+  std::string line;
+  std::getline(in, line);
+  const auto columns = split_csv(line);
+  const auto place = static_cast<std::size_t>(std::ranges::find(columns, "true_tip_x_m") - columns.begin());
+  std::vector<std::string> places;
+  while (std::getline(in, line)) {
+    places.emplace_back(split_csv(line).at(place));
+  }
+  return places;
+}
+
+TEST_F(RecorderTest, a_row_holds_the_truth_of_its_own_tick_however_late_that_and_the_first_one_began) {
+  for (const std::uint64_t first_tick : {0U, 400U}) {
+    for (const std::int64_t late_ns : {0, 300'000, 900'000}) {
+      const auto bench = std::make_unique<sim::Bench>();
+      core_ = std::make_unique<rt::CoreSegment>();
+      auto r = Recorder::create(folder_.string(), *load_scene("free"), *core_, bench.get(), 1);
+      ASSERT_TRUE(r);
+      for (const std::uint64_t k : {0U, 1U, 2U, 5U}) {  // two releases were missed
+        sim::Snapshot world;
+        world.start_ns = 7'000'000'000;
+        world.t_ns = world.start_ns + static_cast<std::int64_t>(first_tick + k) * 1'000'000 + late_ns;
+        world.stage.tip_m = hal::Vec3(0.01 * static_cast<double>(k), 0, 0);
+        bench->snapshots.push(world);
+        sample_.tick = first_tick + k;
+        sample_.t_s = 1e-3 * static_cast<double>(k);
+        core_->telemetry.push(sample_);
+      }
+      core_->status.ticks.store(4);
+      r->finish();
+      EXPECT_EQ(true_places(folder_ / "samples.csv"), (std::vector<std::string>{"0", "0.01", "0.02", "0.05"}))
+          << first_tick << ' ' << late_ns;
+    }
+  }
+}
+
 TEST_F(RecorderTest, events_are_rows_and_those_that_were_overwritten_are_counted) {
   Recorder r = recorder();
   rt::Event event;

@@ -265,6 +265,7 @@ class LyingStation {
   Servo& servo() { return *std::launder(reinterpret_cast<Servo*>(servo_bytes_.data())); }
   const TelemetrySample& sample() { return servo().sample(); }
   Invariants& checker() { return checker_; }
+  LocalStation& memory() { return *station_; }  // shared with vision and the writers of commands
 
   static constexpr std::size_t kPast = 64;
   static constexpr double kRelay_s = 0.05;  // without a heartbeat: the hand's amplifier is off

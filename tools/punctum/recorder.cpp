@@ -47,7 +47,7 @@ std::string columns() {
 // In virtual time the core may be as fast as the recorder: the caller has other work between two rounds.
 constexpr std::uint64_t kMostTicksPerRound = 4096;
 
-constexpr double kLatestFirstTick_s = 1e6;           // later than that is no start
+constexpr double kLatestFirstTick_s = 1e6;          // later than that is no start
 constexpr std::chrono::milliseconds kFlushed{500};  // so long at most a row waits for its file
 constexpr double kBeforeFault_s = 2;
 constexpr double kAfterFault_s = 0.5;
@@ -121,9 +121,9 @@ std::uint64_t Recorder::lost() const noexcept {
   return std::min(telemetry_.lost(), core_.status.ticks.load(std::memory_order_relaxed));
 }
 
-// The plant publishes before the core does: the snapshot of a tick is there, or it was overwritten. It is of the
-// time at which the tick began, late by less than a period. Times of the run count from its first tick; where the
-// first releases were missed, the plant began earlier.
+// The plant publishes before the core does: the snapshot of a tick is there, or it was overwritten. It is of
+// the time at which the tick began, late by less than a period. Times of the run count from its first tick;
+// where the first releases were missed, the plant began earlier.
 const sim::Snapshot* Recorder::world_of(const rt::TelemetrySample& s) {
   if (!taker_) {
     return nullptr;
@@ -134,7 +134,8 @@ const sim::Snapshot* Recorder::world_of(const rt::TelemetrySample& s) {
         return nullptr;
       }
       world_tick_ = static_cast<std::uint64_t>((world_.t_ns - world_.start_ns) / period_ns_);
-      const double first_tick_s = static_cast<double>(s.tick) * 1e-9 * static_cast<double>(period_ns_) - s.t_s;
+      const double first_tick_s =
+          static_cast<double>(s.tick) * 1e-9 * static_cast<double>(period_ns_) - s.t_s;
       world_.start_ns += std::llround(1e9 * std::clamp(first_tick_s, 0.0, kLatestFirstTick_s));
     }
     world_pending_ = world_tick_ > s.tick;  // of a later tick: kept for that

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -15,6 +16,7 @@
 #include "hal/sim/valid.hpp"
 #include "hal/sim/world.hpp"
 #include "tools/punctum/judge.hpp"
+#include "tools/punctum/lab_report.hpp"
 #include "tools/punctum/recorder.hpp"
 #include "tools/punctum/run_report.hpp"
 #include "tools/punctum/terminal.hpp"
@@ -113,9 +115,13 @@ void read_all(Station& station) {
   sim::Snapshot newest;
   const bool simulated = sim::newest_valid(*station.bench, newest);
   result.needle = recorder->measures().whereabouts(simulated ? &newest : nullptr);
-  const auto facts =
-      tools::report_facts(station.scene(), result, recorder->measures(), recorder->events(), status, {});
-  if (!nlohmann::json::parse(facts.dump(), nullptr, false).is_object()) {
+  if (!tools::write_report_json(station.folder(),
+                                tools::report_facts(station.scene(), result, recorder->measures(),
+                                                    recorder->events(), status, {}))) {
+    found("the report is not written");
+  }
+  std::ifstream report(station.folder() + "/report.json");
+  if (!nlohmann::json::parse(report, nullptr, false).is_object()) {
     found("the report cannot be read");
   }
   expect_text(tools::summary(station.scene(), result, recorder->measures(), status, {}, false));

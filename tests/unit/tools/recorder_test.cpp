@@ -183,22 +183,31 @@ TEST_F(RecorderTest, a_row_holds_the_truth_of_its_own_tick_however_late_that_and
     for (const std::int64_t late_ns : {0, 300'000, 900'000}) {
       const auto bench = std::make_unique<sim::Bench>();
       core_ = std::make_unique<rt::CoreSegment>();
-      auto r = Recorder::create(folder_.string(), *load_scene("free"), *core_, bench.get(), 1);
+      auto r = Recorder::create(folder_.string(), *load_scene("icsi"), *core_, bench.get(), 1);
       ASSERT_TRUE(r);
+      sample_ = {};
       for (const std::uint64_t k : {0U, 1U, 2U, 5U}) {  // two releases were missed
         sim::Snapshot world;
         world.start_ns = 7'000'000'000;
         world.t_ns = world.start_ns + static_cast<std::int64_t>(first_tick + k) * 1'000'000 + late_ns;
         world.stage.tip_m = hal::Vec3(0.01 * static_cast<double>(k), 0, 0);
-        bench->snapshots.push(world);
+        world.has_cell = 1;
+        world.cell.outer.punctured = k >= 1;
+        world.zona_puncture_ns =
+            k >= 1 ? world.start_ns + static_cast<std::int64_t>(first_tick + 1) * 1'000'000 : 0;
+        if (k != 1) {  // that of the second tick was overwritten
+          bench->snapshots.push(world);
+        }
         sample_.tick = first_tick + k;
         sample_.t_s = 1e-3 * static_cast<double>(k);
+        sample_.phase = k >= 2 ? rt::Phase::puncture : rt::Phase::indentation;
         core_->telemetry.push(sample_);
       }
       core_->status.ticks.store(4);
       r->finish();
-      EXPECT_EQ(true_places(folder_ / "samples.csv"), (std::vector<std::string>{"0", "0.01", "0.02", "0.05"}))
+      EXPECT_EQ(true_places(folder_ / "samples.csv"), (std::vector<std::string>{"0", "", "0.02", "0.05"}))
           << first_tick << ' ' << late_ns;
+      EXPECT_NEAR(r->measures().puncture_delay_s.mean, 1e-3, 1e-9) << first_tick << ' ' << late_ns;
     }
   }
 }

@@ -33,8 +33,10 @@ const CellFacts& CellObserver::step(const TickTime& time, const Readings& readin
   }
   LocalMembraneModel& model = *model_;
   const hal::Vec3& tip_m = readings.has_stage ? readings.stage.tip_m : hand_point_m;
-  if (!readings.has_stage || readings.stage_fresh) {
+  if (!readings.has_stage) {
     model.push_pose({time.now_ns, tip_m, readings.stage.axis});
+  } else if (readings.stage_fresh) {
+    model.push_pose({readings.stage.sample_ns, tip_m, readings.stage.axis});
   }
   take_newest_observation(model, last.inside_cell);
 

@@ -95,7 +95,9 @@ Fault DeviceInputs::read_estop(const TickTime& time) NONBLOCKING {
   readings_.estop_readable = sample != SampleIs::untimely && !estop_clock_.timed_out();
   if (sample == SampleIs::fresh) {
     readings_.estop = read;
-    reset_held_s_ = read.reset_pressed ? std::min(reset_held_s_ + time.elapsed_s, 2 * kResetHeld_s) : 0;
+    // Since the first sample that said so.
+    const bool held = read.reset_pressed && readings_.reset_down;
+    reset_held_s_ = held ? std::min(reset_held_s_ + time.elapsed_s, 2 * kResetHeld_s) : 0;
     readings_.reset_down = read.reset_pressed;
     readings_.estop.reset_pressed = reset_held_s_ > kResetHeld_s;
   } else if (answered) {  // an open contact counts, whatever its time

@@ -1,5 +1,5 @@
-// Does the drive of the stage obey a stop? Judged from its samples while a stop is latched: what it says of
-// itself, and whether its tip moves. A drive that cannot be read obeys nothing.
+// Does the drive of the stage obey? Judged from its samples while it is to stand, in a stop and before it is
+// enabled: what it says of itself, and whether its tip moves. A drive that cannot be read obeys nothing.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@ namespace punctum::rt {
 
 class DriveCheck {
  public:
-  // Once per tick; stopped: the latch took the drive's power away on an earlier tick.
+  // Once per tick; running: the drive may have power; stopped: its power was taken on an earlier tick.
   void step(const Readings& readings, bool running, bool stopped, double elapsed_s) NONBLOCKING {
     stands_ = false;
     if (running || !readings.has_stage) {
@@ -42,13 +42,15 @@ class DriveCheck {
     restless_s_ = at_rest ? 0 : std::min(restless_s_ + elapsed_s, kLongest_s);
     stood_ = stood_ || (off && at_rest);
     // Not one standstill until the power went: the quick stop has failed.
-    obeys_ = stood_ && powered_s_ <= kPowerOff_s && restless_s_ <= kComesToRest_s &&
-             !(seen && creeps(readings.stage.tip_m));
+    rests_ = stood_ && powered_s_ <= kPowerOff_s && restless_s_ <= kComesToRest_s;
+    creeps_ = seen && creeps(readings.stage.tip_m);
   }
 
   // Seen to stand on this tick.
   [[nodiscard]] bool stands() const NONBLOCKING { return stands_; }
-  [[nodiscard]] bool obeys() const NONBLOCKING { return obeys_; }
+  [[nodiscard]] bool obeys() const NONBLOCKING { return rests_ && !creeps_; }
+  // Without power and at rest, as far as a drive can show that somebody may adjust by hand.
+  [[nodiscard]] bool rests() const NONBLOCKING { return rests_; }
 
  private:
   // Standing: within a micrometre, more than encoders flicker, for as long. Without power it has to be
@@ -86,7 +88,7 @@ class DriveCheck {
   double still_s_ = 0;  // the tip has been at place_m_
   bool placed_ = false;
   hal::Vec3 place_m_ = hal::Vec3::Zero();
-  bool stands_ = false, stood_ = false, obeys_ = true;
+  bool stands_ = false, stood_ = false, rests_ = true, creeps_ = false;
   // While its power is taken, since a sample that shows it
   double powered_s_ = 0;   // without power
   double restless_s_ = 0;  // at rest

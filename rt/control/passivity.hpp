@@ -119,7 +119,7 @@ class PassivityGuard {
     double at_m = 0;  // then
     double since_s = 0;
     double acted_N = 0;  // lately
-    int samples = 0;
+    double samples = 0;
   };
 
   [[nodiscard]] double regular_s() const NONBLOCKING;

@@ -22,7 +22,8 @@ struct SafetyOutput {
 
 class SafetyStop {
  public:
-  explicit SafetyStop(const EstopParams& params) NONBLOCKING : latch_(params) {}
+  explicit SafetyStop(const EstopParams& params) NONBLOCKING : latch_(params),
+                                                               power_off_after_s_(params.power_off_after_s) {}
 
   // causes: all that is wrong on this tick.
   [[nodiscard]] SafetyOutput step(const Causes& causes, const hal::Vec3& hand_force_N,
@@ -36,6 +37,8 @@ class SafetyStop {
 
   SafetyLatch latch_;
   DriveCheck drive_;
+  double power_off_after_s_;
+  double without_power_s_ = 0;  // the drive is to be, up to power_off_after_s_
   hal::Vec3 force_before_stop_N_ = hal::Vec3::Zero();
   std::uint64_t faults_latched_ = 0;
 };

@@ -622,7 +622,7 @@ class Invariants {
         at_most(I::moves_with_the_hand, path_m_ - b_.overshoot * hand_path_m_, extra);
         // A filter that overshoots on the way out comes back in by a part of that way.
         at_most(I::deeper_by_the_hand, inward_m_ - hand_inward_m_ - (b_.overshoot - 1) * hand_path_m_, extra);
-        at_most(I::speed_bounded, length, b_.c.limits.stage_velocity_m_s * 2 * b_.nominal_s * (1 + 1e-6));
+        at_most(I::speed_bounded, length, b_.c.limits.stage_velocity_m_s * b_.nominal_s * (1 + 1e-6));
         regular_ =
             s.clock_true && std::abs(s.elapsed_s - b_.nominal_s) < 0.01 * b_.nominal_s ? regular_ + 1 : 0;
         if (way_known_ && regular_ >= 2) {
@@ -790,6 +790,9 @@ class Invariants {
         at_most(I::relay_stage_obeys, moves_s_, 0.25 + b_.relay_s);
         at_most(I::relay_stage_obeys, away_s_, b_.relay_s);
       }
+      if (running) {
+        at_most(I::relay_stage_obeys, idle_powered_s_, b_.c.estop.power_off_after_s + 0.1 + b_.relay_s);
+      }
       must(I::relay_off_when_distrusted, !(t.stop == StopStage::stopped && stop_ == StopStage::stopped &&
                                            asks_for(t.fault, SafetyAction::heartbeat_off)));
     }
@@ -801,6 +804,9 @@ class Invariants {
     powered_s_ = stopped && stage_new_ && stage_told_.powered ? powered_s_ + s.elapsed_s : 0;
     moves_s_ = stopped && s.stage_moves && told_true ? moves_s_ + s.elapsed_s : 0;
     away_s_ = stopped && (stage_told_.tip_m - left_m_).norm() > b_.settles_m ? away_s_ + s.elapsed_s : 0;
+    // Nobody has enabled it, and it has power.
+    const bool idle = b_.c.enabling && running && was_running_ && !pressed_;
+    idle_powered_s_ = idle && stage_new_ && stage_told_.powered ? idle_powered_s_ + s.elapsed_s : 0;
     still_ticks_ = toggled || !running ? 0 : still_ticks_ + 1;
     at_most(I::relay_alive, still_ticks_, 10);
   }
@@ -810,8 +816,7 @@ class Invariants {
     const int p = static_cast<int>(phase_);
     const int n = static_cast<int>(t.phase);
     if (known_ && n != p) {
-      const bool forth = n == p + 1 || (phase_ == Phase::contact && t.phase == Phase::puncture) ||
-                         (phase_ == Phase::puncture && t.phase == Phase::withdrawal) ||
+      const bool forth = n == p + 1 || (phase_ == Phase::puncture && t.phase == Phase::withdrawal) ||
                          (phase_ == Phase::clear && t.phase == Phase::free);
       const bool back = (phase_ == Phase::contact || phase_ == Phase::indentation) && n < p;
       must(I::phase_order, forth || back, p + 0.1 * n);
@@ -909,7 +914,7 @@ class Invariants {
   bool own_press_ = false;
   int openings_ = 0;
   double open_s_ = 0, open_in_cell_s_ = 0;
-  double powered_s_ = 0, moves_s_ = 0, away_s_ = 0;
+  double powered_s_ = 0, moves_s_ = 0, away_s_ = 0, idle_powered_s_ = 0;
   Vec3 left_m_ = Vec3::Zero();                    // where the needle was told to be when its power went
   double stage_lost_s_ = -1, estop_lost_s_ = -1;  // < 0: not
   int still_ticks_ = 0;

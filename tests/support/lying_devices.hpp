@@ -252,6 +252,7 @@ class LyingStation {
         frame_ticks_(std::llround(0.04 / dt_s_)),
         station_(std::make_unique<LocalStation>()),
         checker_(config) {
+    truth.on = config.enabling.has_value();  // as another program left it
     new (servo_bytes_.data())
         Servo(config,
               Devices{hand_, &stage_, &estop_, config.injector ? &injector_ : nullptr,

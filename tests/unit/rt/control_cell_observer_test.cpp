@@ -23,6 +23,7 @@ struct Observed {
   }
   const CellFacts& tick() {
     now_ns += 1'000'000;
+    readings.stage.sample_ns = now_ns - stage_age_ns;
     const TickTime time{.now_ns = now_ns, .elapsed_s = 1e-3, .dt_s = 1e-3, .first = first};
     first = false;
     return cell.step(time, readings, Vec3::Zero(), last);
@@ -43,6 +44,7 @@ struct Observed {
   Readings readings;
   LastPhase last;
   std::int64_t now_ns = 1'000'000'000;
+  std::int64_t stage_age_ns = 0;
   bool first = true;
   CellObserver cell;
 };
@@ -133,6 +135,34 @@ TEST(CellObserver, tells_a_correction_by_vision_apart_from_the_way_of_the_needle
   const CellFacts& facts = o.tick();
   EXPECT_GT(facts.depth_correction_m, 0);
   EXPECT_NEAR(facts.depth_m - before_m, facts.depth_correction_m, 1e-15);
+}
+
+// A needle at 0.4 mm/s whose drives answer late: each reading is where it was when it was measured.
+TEST(CellObserver, compares_a_picture_with_where_the_needle_was_then_however_late_the_stage_is_read) {
+  for (const std::int64_t age_ns : {0, 5'000'000, 10'000'000}) {
+    Observed o;
+    o.stage_age_ns = age_ns;
+    constexpr double kSpeed_m_s = -0.4e-3;
+    const auto place_m = [&](std::int64_t t_ns) {
+      return 160e-6 + kSpeed_m_s * 1e-9 * static_cast<double>(t_ns - 1'000'000'000);
+    };
+    double entry_m = 0;
+    for (int k = 0; k < 200; ++k) {
+      if (k % 40 == 39) {  // of 30 ms ago
+        Observation seen;
+        seen.exposure_ns = o.now_ns - 30'000'000;
+        seen.flags = Observation::tip_ok | Observation::outer_ok;
+        seen.tip_m[0] = place_m(seen.exposure_ns);
+        seen.centre_m[0] = -40e-6;
+        seen.R_m = 60e-6;
+        seen.gap_m = seen.tip_m[0] - 20e-6;
+        o.station->observation.slot.push(seen);
+      }
+      o.readings.stage.tip_m.x() = place_m(o.now_ns + 1'000'000 - age_ns);
+      entry_m = o.tick().membrane.entry_m.x();
+    }
+    EXPECT_NEAR(entry_m, 20e-6, 1e-9) << age_ns;
+  }
 }
 
 TEST(CellObserver, raises_the_alarm_and_counts_the_ticks_once_an_observation_is_too_old) {

@@ -454,6 +454,15 @@ TEST(DeviceInputs, takes_a_reset_only_from_a_button_that_is_held_for_as_long_as_
   EXPECT_TRUE(in.inputs.readings().estop.reset_pressed);
 }
 
+TEST(DeviceInputs, takes_no_reset_from_one_sample_after_a_late_tick) {
+  Inputs in;
+  in.settle();
+  in.estop.state.reset_pressed = true;
+  EXPECT_FALSE(in.read(0.025).estop.reset_pressed);
+  in.estop.state.reset_pressed = false;
+  EXPECT_FALSE(in.read().estop.reset_pressed);
+}
+
 TEST(DeviceInputs, finds_a_contact_that_chatters_while_the_other_never_opens) {
   Inputs in;
   in.settle();

@@ -251,6 +251,48 @@ TEST(Servo, lets_the_relay_open_when_it_cannot_stop_the_drive) {
   }
 }
 
+TEST(Servo, lets_the_relay_open_when_a_drive_that_nobody_has_enabled_keeps_its_power_or_moves) {
+  struct Case {
+    const char* name;
+    bool obeys;
+    std::function<void(Bench&)> break_it;
+  };
+  const std::vector<Case> cases{
+      {"came with power and gives it up", true, [](Bench& b) { b.stage.on = true; }},
+      {"settles slowly without power", true,
+       [](Bench& b) { b.every_tick = [&b] { b.stage.tip.y() += 2e-9; }; }},
+      {"keeps its power", false, [](Bench& b) { b.stage.on = b.stage.ignores_power = true; }},
+      {"keeps its power and moves", false,
+       [](Bench& b) { b.stage.on = b.stage.ignores_power = b.stage.ignores_stop = true; }},
+      {"moves and says that it has no power", false, [](Bench& b) { b.stage.ignores_stop = true; }},
+      {"moves and says that it stands", false,
+       [](Bench& b) { b.stage.ignores_stop = b.stage.hides_motion = true; }},
+  };
+  for (const bool after_a_reset : {false, true}) {
+    for (const Case& c : cases) {
+      ServoConfig config = icsi();
+      config.enabling.emplace();
+      Bench b(config);
+      if (after_a_reset) {
+        b.estop.state.contact_a_closed = b.estop.state.contact_b_closed = false;
+        b.run(1);
+        b.estop.state.contact_a_closed = b.estop.state.contact_b_closed = true;
+        b.estop.state.reset_pressed = true;
+        b.run(0.5);
+        b.estop.state.reset_pressed = false;
+        ASSERT_EQ(b.servo->fault(), Fault::none);
+      }
+      c.break_it(b);
+      b.run(1.5);
+      EXPECT_EQ(b.servo->fault(), c.obeys ? Fault::none : Fault::stage_not_stopping) << c.name;
+      const int before = b.estop.toggles;
+      b.run(5);
+      EXPECT_EQ(b.estop.toggles - before, c.obeys ? 5000 : 0) << c.name;
+      EXPECT_EQ(b.servo->fault(), c.obeys ? Fault::none : Fault::stage_not_stopping) << c.name;
+    }
+  }
+}
+
 TEST(Servo, keeps_the_relay_closed_in_a_stop_that_the_drive_obeys) {
   Bench b(icsi());
   b.to_indentation();

@@ -13,6 +13,7 @@
 #include "hal/cia402/socket_can.hpp"
 #include "rt/executive/monotonic_clock.hpp"
 #include "tests/loopback/can_wires.hpp"
+#include "tests/loopback/histogram.hpp"
 
 namespace punctum::loopback {
 namespace {
@@ -117,6 +118,40 @@ TEST_F(CanLoopback, three_drives_follow_at_1_kHz_and_every_tick_has_its_answer) 
   std::sort(age_ns.begin(), age_ns.end());
   std::printf("from SYNC to the tick that reads its answers: p50 %.0f us, largest %.0f us\n",
               1e-3 * static_cast<double>(age_ns[500]), 1e-3 * static_cast<double>(age_ns.back()));
+}
+
+// A question to a drive and its answer, from socket to socket: two controllers, their drivers and the drive's
+// thread.
+TEST_F(CanLoopback, a_question_and_its_answer_go_round_within_a_tick) {
+  const int socket = ::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW);
+  ASSERT_GE(socket, 0);
+  const can_filter answers{0x581, CAN_SFF_MASK};
+  ASSERT_EQ(setsockopt(socket, SOL_CAN_RAW, CAN_RAW_FILTER, &answers, sizeof(answers)), 0);
+  sockaddr_can address{};
+  address.can_family = AF_CAN;
+  address.can_ifindex = static_cast<int>(if_nametoindex("can0"));
+  ASSERT_EQ(bind(socket, reinterpret_cast<const sockaddr*>(&address), sizeof(address)), 0);
+  can_frame question{};
+  question.can_id = 0x601;
+  question.len = 8;
+  question.data[0] = 0x40;  // read 1000:00, the device type
+  question.data[2] = 0x10;
+  std::vector<std::int64_t> round_ns;
+  for (int i = 0; i < 500; ++i) {
+    clock.sleep_until_ns(clock.now_ns() + 1'300'000);
+    const std::int64_t asked_ns = clock.now_ns();
+    ASSERT_EQ(write(socket, &question, sizeof(question)), static_cast<ssize_t>(sizeof(question)));
+    pollfd in{socket, POLLIN, 0};
+    ASSERT_EQ(poll(&in, 1, 1000), 1);
+    can_frame answer{};
+    ASSERT_EQ(read(socket, &answer, sizeof(answer)), static_cast<ssize_t>(sizeof(answer)));
+    round_ns.push_back(clock.now_ns() - asked_ns);
+    ASSERT_EQ(answer.data[0], 0x43) << "four bytes";
+    ASSERT_EQ(answer.data[4] | answer.data[5] << 8, 402) << "a drive";
+  }
+  close(socket);
+  print_histogram("CAN, a question to a drive and its answer", round_ns, 20'000);
+  EXPECT_LE(*std::max_element(round_ns.begin(), round_ns.end()), 1'000'000);
 }
 
 TEST_F(CanLoopback, nothing_moves_when_the_drives_are_enabled) {

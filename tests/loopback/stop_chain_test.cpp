@@ -6,28 +6,12 @@
 
 #include "tests/loopback/can_wires.hpp"
 #include "tests/loopback/core_run.hpp"
+#include "tests/loopback/histogram.hpp"
 
 namespace punctum::loopback {
 namespace {
 
 using emulator::DriveState;
-
-// Where the delays of many stops lie, a line for every tenth of a tick.
-void print_histogram(const char* title, std::vector<std::int64_t> delays_ns) {
-  std::sort(delays_ns.begin(), delays_ns.end());
-  const auto us = [](std::int64_t ns) { return static_cast<long>(ns / 1000); };
-  std::printf("%s: %zu stops, p50 %ld us, largest %ld us\n", title, delays_ns.size(),
-              us(delays_ns[delays_ns.size() / 2]), us(delays_ns.back()));
-  constexpr std::int64_t kBin_ns = kPeriod_ns / 10;
-  for (std::int64_t from_ns = delays_ns.front() / kBin_ns * kBin_ns; from_ns <= delays_ns.back();
-       from_ns += kBin_ns) {
-    const auto in_bin = std::count_if(delays_ns.begin(), delays_ns.end(), [from_ns](std::int64_t d) {
-      return d >= from_ns && d < from_ns + kBin_ns;
-    });
-    std::printf("  from %5ld us %3ld %s\n", us(from_ns), static_cast<long>(in_bin),
-                std::string(static_cast<std::size_t>(in_bin), '#').c_str());
-  }
-}
 
 void put_stage_on_can(tools::Scene& scene) {
   scene.devices.stage = tools::kCia402;
@@ -42,6 +26,7 @@ struct DrivesOnCan {
 
 class StopChain : protected DrivesOnCan, public CoreRun {
  protected:
+  static constexpr std::int64_t kBin_ns = kPeriod_ns / 10;
   static constexpr int kStops = 40;
   static constexpr double kFirst_ms = 300,
                           kApart_ms = 150;  // a stop, its reset, and the drives enabled again
@@ -77,12 +62,13 @@ TEST_F(StopChain, an_opened_contact_stops_three_drives_within_two_ticks_wherever
       const double t_ms = kFirst_ms + stop * kApart_ms + static_cast<double>(stop) / kStops;
       at(t_ms);
       enabled += every_drive(DriveState::operation_enabled) ? 1 : 0;
+      opened_ns.push_back(clock.now_ns());
       board->drive(kContactA, false);
       board->drive(kContactB, false);
-      opened_ns.push_back(clock.now_ns());
-      stopped_ns.push_back(delay_until([&] { return every_drive(DriveState::quick_stop_active); }));
-      off_ns.push_back(delay_until([&] { return every_drive(DriveState::switch_on_disabled); }) +
-                       stopped_ns.back());
+      (void)delay_until([&] { return every_drive(DriveState::quick_stop_active); });
+      stopped_ns.push_back(clock.now_ns() - opened_ns.back());
+      (void)delay_until([&] { return every_drive(DriveState::switch_on_disabled); });
+      off_ns.push_back(clock.now_ns() - opened_ns.back());
       board->drive(kContactA, true);
       board->drive(kContactB, true);
       press_reset(t_ms + 30, t_ms + 60);
@@ -93,41 +79,56 @@ TEST_F(StopChain, an_opened_contact_stops_three_drives_within_two_ticks_wherever
   for (const std::int64_t from_ns : opened_ns) {
     EXPECT_LE(ticks_to_stop(from_ns), 2U);
   }
-  print_histogram("from the opened contact to the last of three drives in its quick stop", stopped_ns);
-  print_histogram("from the opened contact to the last of three drives without power", off_ns);
+  print_histogram("from the opened contact to the last of three drives in its quick stop", stopped_ns,
+                  kBin_ns);
+  print_histogram("from the opened contact to the last of three drives without power", off_ns, kBin_ns);
   EXPECT_GT(*std::min_element(stopped_ns.begin(), stopped_ns.end()), 0);
   EXPECT_LE(*std::max_element(stopped_ns.begin(), stopped_ns.end()), 2 * kPeriod_ns + kPeriod_ns / 4);
 }
 
 TEST_F(StopChain, the_heartbeat_ends_when_a_drive_neither_stops_nor_lets_go_of_its_power) {
-  std::int64_t opened_ns = 0, last_beat_ns = 0;
-  run(1100, [&] {
-    at(300.5);
-    EXPECT_TRUE(every_drive(DriveState::operation_enabled));
-    for (const char* habit : {"ignore quick-stop", "ignore disable"}) {
-      EXPECT_EQ(drives.with(1, [habit](emulator::Drive& d) { return d.command(habit); }), "");
-    }
-    Watched beat(board->value_file(kHeartbeat));
-    board->drive(kContactA, false);
-    board->drive(kContactB, false);
-    opened_ns = clock.now_ns();
-    bool level = beat.level();
-    for (double t_ms = 300.9; t_ms < 1080; t_ms += 0.9) {
+  constexpr int kDisobeyed = 8;
+  constexpr double kEach_ms = 1500;  // a stop, what the drive does to it, its reset
+  std::vector<std::int64_t> opened_ns, silent_ns;
+  int enabled = 0;
+  run(static_cast<std::uint64_t>(kFirst_ms + kDisobeyed * kEach_ms), [&] {
+    for (int stop = 0; stop < kDisobeyed; ++stop) {
+      const double t_ms = kFirst_ms + stop * kEach_ms + static_cast<double>(stop) / kDisobeyed;
       at(t_ms);
-      if (beat.level() != level) {
-        level = !level;
-        last_beat_ns = clock.now_ns();
+      enabled += every_drive(DriveState::operation_enabled) ? 1 : 0;
+      for (const char* habit : {"ignore quick-stop", "ignore disable"}) {
+        EXPECT_EQ(drives.with(1, [habit](emulator::Drive& d) { return d.command(habit); }), "");
       }
+      Watched beat(board->value_file(kHeartbeat));
+      opened_ns.push_back(clock.now_ns());
+      board->drive(kContactA, false);
+      board->drive(kContactB, false);
+      bool level = beat.level();
+      std::int64_t last_beat_ns = 0;
+      for (double after_ms = 0.4; after_ms < 800; after_ms += 0.9) {
+        at(t_ms + after_ms);
+        if (beat.level() != level) {
+          level = !level;
+          last_beat_ns = clock.now_ns();
+        }
+      }
+      silent_ns.push_back(last_beat_ns - opened_ns.back());
+      EXPECT_EQ(drives.with(1, [](emulator::Drive& d) { return d.command("obey"); }), "");
+      board->drive(kContactA, true);
+      board->drive(kContactB, true);
+      press_reset(t_ms + 1200, t_ms + 1250);
     }
   });
+  EXPECT_EQ(enabled, kDisobeyed) << "the drives followed before each stop";
   EXPECT_EQ(missed, 0U);
-  EXPECT_LE(ticks_to_stop(opened_ns), 2U);
-  const double after_ms = 1e-6 * static_cast<double>(last_beat_ns - opened_ns);
-  std::printf(
-      "a drive that does not obey: from the opened contact to the last edge of the heartbeat %.1f ms\n",
-      after_ms);
-  EXPECT_GT(after_ms, 2);
-  EXPECT_LE(after_ms, 1e3 * (scene.servo.estop.power_off_after_s + 0.02));
+  for (const std::int64_t from_ns : opened_ns) {
+    EXPECT_LE(ticks_to_stop(from_ns), 2U);
+  }
+  print_histogram("a drive that does not obey: from the opened contact to the last edge of the heartbeat",
+                  silent_ns, kPeriod_ns);
+  EXPECT_GT(*std::min_element(silent_ns.begin(), silent_ns.end()), 2 * kPeriod_ns);
+  EXPECT_LE(1e-9 * static_cast<double>(*std::max_element(silent_ns.begin(), silent_ns.end())),
+            scene.servo.estop.power_off_after_s + 0.02);
 }
 
 }  // namespace

@@ -197,6 +197,7 @@ struct Bounds {
   double vision_sum_m = 8.5e-6;  // from first contact on
   double clear_m = c.phases.value_or(PhaseParams{}).clear_m;
   double clear_known_m = 3e-6;  // nobody outside knows closer when the core takes the needle for clear
+  double remounted = 0.5;       // a needle that is turned by this (rad) was mounted otherwise
   double truth_m = 3e-6;        // the core knows the membrane's place to this
   double lateral_m = lateral_limit_m(c.limits) + 2e-6;  // the tip follows the set-point late
   double jerk_m_s3 = jerk_limit_m_s3(c.limits);
@@ -637,6 +638,9 @@ class Invariants {
           for (int i = 0; i < 3; ++i) {
             held = held || (std::abs(way[i]) <= 1e-12 && std::abs(way_m_[i]) > 1e-12);
           }
+          if (!held) {
+            at_most(I::acceleration_bounded, a.norm(), most + 1e-6);
+          }
           if (held) {
             a.setConstant(std::numeric_limits<double>::infinity());
           }
@@ -717,10 +721,14 @@ class Invariants {
     // more.
     if (in && !near_contact_) {
       touched_at_m_ = stage_told_.tip_m;
+      touched_axis_ = stage_told_.axis.normalized();
       surely_near_ = true;
     }
     const double out_m = (stage_told_.tip_m - touched_at_m_).x();
     near_contact_ = in || (near_contact_ && t.cell == cell_ && out_m < b_.clear_m + b_.clear_known_m);
+    // In a stop the needle may be mounted otherwise: what it would enter then is another place.
+    const bool turned = (stage_told_.axis.normalized() - touched_axis_).norm() > b_.remounted;
+    near_contact_ = near_contact_ && !(!in && turned && t.stop != StopStage::running);
     surely_near_ = surely_near_ && near_contact_ && (in || out_m < b_.clear_m - b_.clear_known_m);
     entry_known_ = in;
     entry_m_ = entry;
@@ -908,7 +916,7 @@ class Invariants {
 
   bool entry_known_ = false;
   bool near_contact_ = false, surely_near_ = false;
-  Vec3 contact_entry_m_ = Vec3::Zero(), touched_at_m_ = Vec3::Zero();
+  Vec3 contact_entry_m_ = Vec3::Zero(), touched_at_m_ = Vec3::Zero(), touched_axis_ = Vec3::Zero();
   Vec3 entry_m_ = Vec3::Zero(), first_entry_m_ = Vec3::Zero();
 
   bool own_press_ = false;

@@ -219,6 +219,23 @@ TEST_F(FalconEmulatorTest, an_arm_is_homed_where_it_passes_its_mark_while_that_i
   EXPECT_EQ(before, -304 + 311) << "from where it was switched on";
 }
 
+TEST_F(FalconEmulatorTest, one_that_hangs_answers_nothing_and_keeps_its_torque_until_its_supply_ends) {
+  make({.booted = true, .homed = true});
+  frames_mode();
+  out("<AMPAAMPAAMPAAA>");
+  (void)next_text();
+  EXPECT_EQ(falcon->command("hang"), "");
+  out("<AAAAAAAAAAAAAA>");
+  EXPECT_EQ(next_text(), "");
+  EXPECT_EQ(falcon->motors(), (std::array<int, 3>{4032, 4032, 4032}));
+  EXPECT_EQ(falcon->frames(), 1U);
+  falcon->power_on();
+  EXPECT_EQ(falcon->motors(), (std::array<int, 3>{}));
+  frames_mode();
+  out("<AAAAAAAAAAAAAA>");
+  EXPECT_EQ(next_text().size(), 16U);
+}
+
 TEST_F(FalconEmulatorTest, commands_that_are_none_are_told) {
   make({});
   EXPECT_EQ(falcon->command("short 3"), "");

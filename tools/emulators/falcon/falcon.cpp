@@ -61,7 +61,7 @@ void FalconEmulator::power_on() {
   origin_ = params_.homed ? std::array<int, 3>{} : kUnhomed;
   was_below_.reset();
   homing_asked_ns_ = -1;
-  frozen_ = mute_ = false;
+  frozen_ = mute_ = hung_ = false;
 }
 
 bool FalconEmulator::baud_is(double rate) const { return std::abs(baud_ - rate) < 0.03 * rate; }
@@ -84,6 +84,7 @@ bool FalconEmulator::request(std::uint8_t request, std::uint16_t value, std::int
         const bool ready = (value & 1U) != 0;
         if (ready && !data_terminal_ready_) {  // it resets the processor
           processor_ = Processor::waiting;
+          hung_ = false;
           heard_.clear();
           homed_ = {};
           origin_ = kUnhomed;
@@ -179,6 +180,9 @@ bool FalconEmulator::spend(int& left) const {
 }
 
 void FalconEmulator::processor_takes(Byte byte) {
+  if (hung_) {
+    return;
+  }
   switch (processor_) {
     case Processor::waiting:
       if (!baud_is(kGreetingBaud)) {
@@ -442,7 +446,8 @@ std::string FalconEmulator::command(const std::string& line) {
     bool& flag;
     bool value;
   } switches[] = {{"mute", mute_, true},    {"speak", mute_, false},   {"freeze", frozen_, true},
-                  {"thaw", frozen_, false}, {"home", home_now_, true}, {"lose-homing", lose_homing_, true}};
+                  {"thaw", frozen_, false}, {"home", home_now_, true}, {"lose-homing", lose_homing_, true},
+                  {"hang", hung_, true}};
   for (const auto& each : switches) {
     if (what == each.name && !(words >> rest)) {
       each.flag = each.value;

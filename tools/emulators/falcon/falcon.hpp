@@ -64,8 +64,8 @@ class FalconEmulator {
   [[nodiscard]] std::string command(const std::string& line);
   static constexpr const char* kCommands =
       "short N, oversized N, corrupt N, long N, line-error N (the next N frames), split N, mute, speak, "
-      "freeze, "
-      "thaw, home, lose-homing, bad-echo N";
+      "hang (the motors keep their torque; its supply or a reset ends it), freeze, thaw, home, lose-homing, "
+      "bad-echo N";
 
   [[nodiscard]] Processor processor() const { return processor_; }
   [[nodiscard]] bool homed() const { return homed_[0] && homed_[1] && homed_[2]; }
@@ -121,7 +121,7 @@ class FalconEmulator {
 
   // Faults.
   int short_ = 0, oversized_ = 0, corrupt_ = 0, long_ = 0, line_errors_ = 0, split_ = 0, bad_echo_ = 0;
-  bool mute_ = false, frozen_ = false, lose_homing_ = false, home_now_ = false;
+  bool mute_ = false, hung_ = false, frozen_ = false, lose_homing_ = false, home_now_ = false;
 };
 
 }  // namespace punctum::emulator

@@ -22,6 +22,18 @@ constexpr std::uint8_t kToChip = 0x40;  // vendor request to the device
 constexpr unsigned kControlWithin_ms = 500;
 constexpr int kMostErrors = 50;  // in a row: a cable or a hub that is no more
 
+// Each direction has its own: packets with nothing but status come in every millisecond, and say nothing of
+// an endpoint that takes no force.
+class Errors {
+ public:
+  // Whether they end the link.
+  [[nodiscard]] bool one_more() { return ++in_a_row_ >= kMostErrors; }
+  void none() { in_a_row_ = 0; }
+
+ private:
+  int in_a_row_ = 0;
+};
+
 // The one system call of the tick: it adds 1 to a counter in the kernel, and never waits for one that starts
 // at 0.
 void add_one(int counter) NONBLOCKING {
@@ -52,6 +64,7 @@ class LibusbLink final : public UsbLink {
   }
   bool send(std::span<const std::uint8_t> bytes) override;
   bool sending() const override { return out_.queued; }
+  bool sent() const override { return out_.whole; }
   Event wait(std::int64_t longest_ns, Packet& out) override;
   void wake() NONBLOCKING override { add_one(wake_); }
 
@@ -63,6 +76,7 @@ class LibusbLink final : public UsbLink {
     std::int64_t ended_ns = 0;
     bool queued = false;
     bool ended = false;  // and nobody has looked yet
+    bool whole = false;  // every byte that was asked for went over
     const hal::Clock* clock = nullptr;
   };
 
@@ -72,7 +86,7 @@ class LibusbLink final : public UsbLink {
   [[nodiscard]] bool submit(Transfer& t);
   static void LIBUSB_CALL on_end(libusb_transfer* transfer);
   void handle_events();
-  [[nodiscard]] bool fatal(libusb_transfer_status status);
+  [[nodiscard]] static bool fatal(libusb_transfer_status status, Errors& errors);
 
   const hal::Clock& clock_;
   libusb_context* context_ = nullptr;
@@ -80,7 +94,7 @@ class LibusbLink final : public UsbLink {
   bool claimed_ = false, gone_ = false;
   Transfer in_, out_;
   int wake_ = -1;
-  int errors_ = 0;  // in a row
+  Errors in_errors_, out_errors_, event_errors_;
   std::vector<pollfd> polled_;
 };
 
@@ -150,6 +164,7 @@ void LibusbLink::fill(Transfer& t, unsigned char endpoint) {
 }
 
 bool LibusbLink::submit(Transfer& t) {
+  t.whole = false;
   t.queued = libusb_submit_transfer(t.transfer) == 0;
   return t.queued;
 }
@@ -159,6 +174,7 @@ void LIBUSB_CALL LibusbLink::on_end(libusb_transfer* transfer) {
   t.ended_ns = t.clock->now_ns();
   t.queued = false;
   t.ended = true;
+  t.whole = transfer->status == LIBUSB_TRANSFER_COMPLETED && transfer->actual_length == transfer->length;
 }
 
 void LibusbLink::close() noexcept {
@@ -186,7 +202,7 @@ void LibusbLink::close() noexcept {
     device_ = nullptr;
   }
   claimed_ = gone_ = false;
-  errors_ = 0;
+  in_errors_ = out_errors_ = event_errors_ = {};
   if (context_ != nullptr) {
     libusb_exit(context_);
     context_ = nullptr;
@@ -203,23 +219,27 @@ bool LibusbLink::send(std::span<const std::uint8_t> bytes) {
   }
   std::copy(bytes.begin(), bytes.end(), out_.bytes.begin());
   out_.transfer->length = static_cast<int>(bytes.size());
-  return submit(out_);
+  const bool queued = submit(out_);
+  gone_ = !queued && out_errors_.one_more();
+  return queued;
 }
 
 // Whether this ends it. Packets that did not fit are none of its errors.
-bool LibusbLink::fatal(libusb_transfer_status status) {
+bool LibusbLink::fatal(libusb_transfer_status status, Errors& errors) {
   if (status == LIBUSB_TRANSFER_COMPLETED || status == LIBUSB_TRANSFER_OVERFLOW) {
-    errors_ = 0;
+    errors.none();
     return false;
   }
-  return status == LIBUSB_TRANSFER_NO_DEVICE || ++errors_ >= kMostErrors;
+  return status == LIBUSB_TRANSFER_NO_DEVICE || errors.one_more();
 }
 
 void LibusbLink::handle_events() {
   timeval none{};
   if (const int error = libusb_handle_events_timeout_completed(context_, &none, nullptr);
       error != 0 && error != LIBUSB_ERROR_INTERRUPTED) {
-    gone_ = gone_ || ++errors_ >= kMostErrors;
+    gone_ = event_errors_.one_more() || gone_;
+  } else {
+    event_errors_.none();
   }
 }
 
@@ -237,14 +257,14 @@ Event LibusbLink::wait(std::int64_t longest_ns, Packet& out) {
   }
   if (out_.ended) {
     out_.ended = false;
-    gone_ = gone_ || fatal(out_.transfer->status);
+    gone_ = gone_ || fatal(out_.transfer->status, out_errors_);
   }
   if (!in_.ended) {
     return gone_ ? Event::gone : Event::nothing;
   }
   in_.ended = false;
   const auto status = in_.transfer->status;
-  gone_ = gone_ || fatal(status);
+  gone_ = gone_ || fatal(status, in_errors_);
   if (status == LIBUSB_TRANSFER_COMPLETED) {
     out.size = std::min(static_cast<std::size_t>(in_.transfer->actual_length), kPacketSize);
     out.bytes = in_.bytes;

@@ -212,7 +212,9 @@ bool Session::pass() {
       return false;
   }
   if (zero_on_its_way_ && !link_.sending()) {
-    zero_sent_ = true;
+    // A zero that ended in an error left the force on: it is sent again.
+    zero_sent_ = zero_sent_ || link_.sent();
+    zero_on_its_way_ = zero_sent_;
   }
   now_ns = clock_.now_ns();
   if (until_send_ns(now_ns) == 0) {
@@ -270,10 +272,9 @@ void Session::send(std::int64_t now_ns) {
   const bool releasing = released_;
   forces_sent_ = forces_.head();
   const Counts values = releasing ? Counts{} : motors(now_ns);
-  if (link_.send(command_frame(values, homed_ ? Light::green : Light::red))) {
-    answered_ = false;
-    zero_on_its_way_ = zero_on_its_way_ || releasing;
-  }
+  const bool queued = link_.send(command_frame(values, homed_ ? Light::green : Light::red));
+  zero_on_its_way_ = zero_on_its_way_ || (queued && releasing);
+  answered_ = false;  // one that could not be queued either: it is tried again as one that was lost
   sent_ns_ = now_ns;
 }
 
@@ -335,6 +336,9 @@ std::string Session::report() const {
   }
   if (homing_lost_) {
     line("lost its homing while it ran: its supply or its firmware failed");
+  }
+  if (released_ && !zero_sent_) {
+    line("did not take the zero at the end: its motors may push until its supply is off");
   }
   const FrameCounts& f = reader_.counts();
   if (f.malformed + f.line_errors + counts_.oversized > 0) {

@@ -52,7 +52,7 @@ class Session {
   bool pass();
   // From here on only zero is sent, whatever is written.
   void release() { released_ = true; }
-  [[nodiscard]] bool released() const { return zero_sent_ || gone_; }  // and the zero is out
+  [[nodiscard]] bool released() const { return zero_sent_ || gone_; }  // and the device has the zero
 
   [[nodiscard]] hal::Status read(hal::HandState& out) NONBLOCKING;
   [[nodiscard]] hal::Status write_force(const hal::Vec3& force_N) NONBLOCKING;

@@ -36,9 +36,12 @@ class UsbLink {
   // A request to the FTDI chip; set-up, waits for its end.
   [[nodiscard]] virtual bool control(std::uint8_t request, std::uint16_t value) = 0;
 
-  // At most kPacketSize bytes. False: the packet before is still on its way, or the device is gone.
+  // At most kPacketSize bytes. False: the packet before is still on its way, it could not be queued, or
+  // the device is gone.
   [[nodiscard]] virtual bool send(std::span<const std::uint8_t> bytes) = 0;
   [[nodiscard]] virtual bool sending() const = 0;
+  // The packet that was sent last has ended, and the device has taken all of it.
+  [[nodiscard]] virtual bool sent() const = 0;
   [[nodiscard]] virtual Event wait(std::int64_t longest_ns, Packet& out) = 0;
   // Ends a wait(), or the next one.
   virtual void wake() NONBLOCKING = 0;

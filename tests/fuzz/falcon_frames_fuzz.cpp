@@ -38,6 +38,7 @@ class Script final : public hal::Clock, public falcon::UsbLink {
     return true;
   }
   bool sending() const override { return false; }
+  bool sent() const override { return true; }
   falcon::Event wait(std::int64_t longest_ns, falcon::Packet& out) override {
     now_ns_ += std::min<std::int64_t>(longest_ns, 300'000) + 1;
     if (at_ >= size_) {

@@ -54,17 +54,22 @@ class VirtualFalcon final : public hal::Clock, public falcon::UsbLink {
     }
     out_.assign(bytes.begin(), bytes.end());
     out_ends_ns_ = now_ns_ + kPacket_ns;
-    sent.push_back(out_);
+    out_taken_ = false;
+    packets_out.push_back(out_);
     return true;
   }
   bool sending() const override { return !out_.empty(); }
+  bool sent() const override { return out_taken_; }
   falcon::Event wait(std::int64_t longest_ns, falcon::Packet& packet) override {
     const std::int64_t until_ns = std::max(now_ns_, std::min(now_ns_ + longest_ns, wait_until_ns));
     for (;;) {
       if (unplugged) {
         return falcon::Event::gone;
       }
-      if (!out_.empty() && out_ends_ns_ <= now_ns_ && !out_hangs && falcon.out(out_, now_ns_)) {
+      if (!out_.empty() && out_ends_ns_ <= now_ns_ && !out_hangs &&
+          (out_fails > 0 || falcon.out(out_, now_ns_))) {
+        out_taken_ = out_fails == 0;
+        out_fails -= out_taken_ ? 0 : 1;
         out_.clear();
         return falcon::Event::nothing;
       }
@@ -102,15 +107,17 @@ class VirtualFalcon final : public hal::Clock, public falcon::UsbLink {
   RestingHand hand;
   emulator::FalconEmulator falcon;
   bool unplugged = false, is_open = false, out_hangs = false;
+  int out_fails = 0;  // so many of the next packets out end with an error, as on an endpoint that is halted
   int opened = 0;
   std::int64_t wait_until_ns = kNever_ns;  // and no longer
   std::vector<Request> requests;
-  std::vector<std::vector<std::uint8_t>> sent;
+  std::vector<std::vector<std::uint8_t>> packets_out;
 
  private:
   static constexpr std::int64_t kPacket_ns = 60'000;  // on the wire, and the host's part of it
   std::int64_t now_ns_ = 1'000'000'000, out_ends_ns_ = 0;
   std::vector<std::uint8_t> out_;
+  bool out_taken_ = false;
   std::atomic<bool> woken_{false};
 };
 

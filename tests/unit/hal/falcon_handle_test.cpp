@@ -41,6 +41,7 @@ class PacedLink final : public UsbLink {
     return usb_.send(bytes);
   }
   bool sending() const override { return usb_.sending(); }
+  bool sent() const override { return usb_.sent(); }
   Event wait(std::int64_t longest_ns, Packet& out) override {
     std::this_thread::sleep_for(std::chrono::microseconds(100));
     const std::lock_guard lock(mutex);
@@ -100,7 +101,7 @@ TEST_F(FalconHandleTest, a_firmware_that_is_none_is_refused_before_anything_is_s
   ASSERT_FALSE(opened);
   EXPECT_EQ(opened.error().find('\n'), std::string::npos);
   EXPECT_EQ(usb.opened, 0);
-  EXPECT_TRUE(usb.sent.empty());
+  EXPECT_TRUE(usb.packets_out.empty());
 }
 
 TEST_F(FalconHandleTest, its_thread_reads_and_pushes_until_the_safe_state) {
@@ -123,10 +124,19 @@ TEST_F(FalconHandleTest, its_thread_reads_and_pushes_until_the_safe_state) {
 
 TEST_F(FalconHandleTest, without_a_start_its_safe_state_still_sends_zero) {
   ASSERT_TRUE(made().open());
-  const std::size_t before = usb.sent.size();
+  const std::size_t before = usb.packets_out.size();
   handle->safe_state();
-  ASSERT_GT(usb.sent.size(), before);
-  EXPECT_EQ(std::string(usb.sent.back().begin(), usb.sent.back().end()), "<AAAAAAAAAAAADA>");
+  ASSERT_GT(usb.packets_out.size(), before);
+  EXPECT_EQ(std::string(usb.packets_out.back().begin(), usb.packets_out.back().end()), "<AAAAAAAAAAAADA>");
+  handle->close();
+}
+
+TEST_F(FalconHandleTest, its_safe_state_sends_zero_until_it_arrives) {
+  ASSERT_TRUE(made().open());
+  usb.out_fails = 3;
+  handle->safe_state();
+  EXPECT_EQ(usb.out_fails, 0);
+  EXPECT_TRUE(usb.sent());
   handle->close();
 }
 

@@ -115,7 +115,7 @@ TEST_F(FalconSessionTest, one_without_firmware_is_booted_and_homed) {
                                {1, 0x0200}, {1, 0x0100}, {1, 0x0101}, {1, 0x0100}, {3, 0x0015}};
   ASSERT_GE(usb->requests.size(), boot.size() + 5);
   EXPECT_TRUE(std::equal(boot.begin(), boot.end(), usb->requests.begin() + 5));
-  for (const auto& packet : usb->sent) {
+  for (const auto& packet : usb->packets_out) {
     EXPECT_LE(packet.size(), 62U);
   }
 }
@@ -308,10 +308,10 @@ TEST_F(FalconSessionTest, of_several_forces_the_newest_is_sent) {
   for (int i = 0; i < 100; ++i) {
     EXPECT_EQ(session->write_force({0, 0, 0.01 * i}), Status::ok);
   }
-  const std::size_t before = usb->sent.size();
+  const std::size_t before = usb->packets_out.size();
   (void)tick({0, 0, 2});
   EXPECT_NEAR(felt().z(), 2, 0.02);
-  EXPECT_LE(usb->sent.size() - before, 2U);
+  EXPECT_LE(usb->packets_out.size() - before, 2U);
 }
 
 TEST_F(FalconSessionTest, a_force_that_nobody_renews_is_forgotten_after_ten_milliseconds) {
@@ -344,6 +344,34 @@ TEST_F(FalconSessionTest, after_the_release_nothing_but_zero_is_sent) {
     EXPECT_FALSE(i > 0 && pushes());
   }
   EXPECT_TRUE(session->released());
+}
+
+TEST_F(FalconSessionTest, a_zero_that_did_not_arrive_is_sent_again_after_the_release) {
+  begin();
+  (void)ticks_with(Status::ok, 10, {0, 0, 2});
+  usb->out_fails = 5;
+  session->release();
+  while (usb->out_fails > 0) {
+    (void)tick({0, 0, 2});
+    EXPECT_TRUE(pushes());
+    EXPECT_FALSE(session->released()) << "nobody took it";
+  }
+  (void)ticks_with(Status::ok, 10, {0, 0, 2});
+  EXPECT_TRUE(session->released());
+  EXPECT_FALSE(pushes());
+  EXPECT_EQ(session->report().find("zero"), std::string::npos);
+}
+
+TEST_F(FalconSessionTest, a_zero_that_never_arrives_is_told_at_the_end) {
+  begin();
+  (void)ticks_with(Status::ok, 10, {0, 0, 2});
+  usb->out_fails = 1000;
+  session->release();
+  const std::size_t before = usb->packets_out.size();
+  (void)ticks_with(Status::ok, 100);
+  EXPECT_FALSE(session->released());
+  EXPECT_GE(usb->packets_out.size() - before, 20U) << "it is tried again and again";
+  EXPECT_NE(session->report().find("did not take the zero"), std::string::npos) << session->report();
 }
 
 TEST_F(FalconSessionTest, a_force_meets_no_old_reading) {

@@ -19,7 +19,11 @@ constexpr std::int64_t kEchoWithin_ns = 200 * kMillisecond_ns;     // latency ti
 // A frame without new force, for its answer: slower than the slowest servo, or it would be in its way.
 constexpr std::int64_t kIdle_ns = 1'500'000;
 constexpr std::int64_t kAnswer_ns = 4 * kMillisecond_ns;  // longer: the frame or its answer is lost
-constexpr std::int64_t kHolds_ns = 10 * kMillisecond_ns;  // a force, and the reading it is meant for
+// A force, the reading that it is meant for, and the answer that tells that forces arrive. Two lost answers
+// in a row are shorter. The core ends its heartbeat only when refusals have lasted for its time-out of the
+// hand: a silence that the time-out bears is over by then. It may let a force that it did not write act for
+// that time-out and 20 ms.
+constexpr std::int64_t kHolds_ns = 10 * kMillisecond_ns;
 
 constexpr int kBootTries = 3, kGreetings = 20;
 constexpr std::size_t kChunk = 62;  // with the two status bytes its echo fills a packet
@@ -225,6 +229,7 @@ bool Session::pass() {
 
 void Session::take(const Reply& reply, std::int64_t received_ns) {
   answered_ = true;
+  answered_ns_ = received_ns;
   pose_.reset();
   if (!reply.homed) {
     homing_lost_ = homing_lost_ || homed_;
@@ -325,7 +330,12 @@ Status Session::write_force(const hal::Vec3& force_N) NONBLOCKING {
   }
   forces_.push(force);
   link_.wake();
-  return !valid || homing_lost_ ? Status::fault : homed_ ? Status::ok : Status::no_data;
+  if (!valid || homing_lost_) {
+    return Status::fault;
+  }
+  // A device that does not answer may have hung with the last force on its motors.
+  const bool answers = force.written_ns - answered_ns_ <= kHolds_ns;
+  return homed_ && answers ? Status::ok : Status::no_data;
 }
 
 std::string Session::report() const {

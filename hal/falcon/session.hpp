@@ -2,8 +2,9 @@
 // frame back, again and again. It has no thread: one calls pass(), the servo calls read() and write_force().
 //
 // A force is sent as soon as the device has answered the frame before; of several the newest. One that is
-// older than 10 ms, or that meets no reading as young, is not sent: zero is. Whatever ends the dialogue
-// (unplugged, homing lost) is latched until a new session.
+// older than 10 ms, or that meets no reading as young, is not sent: zero is. Where no answer is as young, a
+// force is refused (no_data): nobody knows which one acts. Whatever ends the dialogue (unplugged, homing
+// lost) is latched until a new session.
 #pragma once
 
 #include <atomic>
@@ -91,7 +92,8 @@ class Session {
   // Between the thread and the servo.
   hal::SeqRing<Reading, 8> readings_;
   hal::SeqRing<Force, 8> forces_;
-  std::uint64_t taken_ = 0;  // readings, by the servo
+  std::uint64_t taken_ = 0;                   // readings, by the servo
+  std::atomic<std::int64_t> answered_ns_{0};  // the newest answer came in
   std::atomic<bool> gone_{false}, homed_{false}, homing_lost_{false}, released_{false}, zero_sent_{false};
 };
 

@@ -113,7 +113,9 @@ TEST_F(FalconHandleTest, its_thread_reads_and_pushes_until_the_safe_state) {
   handle->safe_state();
   EXPECT_TRUE(soon([&] { return !pushes(); }));  // a loaded machine may take longer than it waits
   for (int i = 0; i < 50; ++i) {
-    EXPECT_EQ(handle->write_force({0, 0, 2}), Status::ok);
+    const Status written = handle->write_force({0, 0, 2});
+    // On a loaded machine its thread may be late with the answer, and a force is refused meanwhile.
+    EXPECT_TRUE(written == Status::ok || written == Status::no_data);
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
     EXPECT_FALSE(pushes()) << "nothing but zero from then on";
   }

@@ -382,6 +382,48 @@ TEST_F(FalconSessionTest, a_force_meets_no_old_reading) {
   EXPECT_FALSE(pushes()) << "nobody knows where the grip is";
 }
 
+// Whoever hangs keeps its torque: only the relay ends that, and it hears of it by the refusal.
+TEST_F(FalconSessionTest, a_force_is_refused_once_the_newest_answer_is_older_than_ten_milliseconds) {
+  for (const char* fault : {"hang", "mute", "short 1000", "out hangs", "out fails"}) {
+    SCOPED_TRACE(fault);
+    begin();
+    EXPECT_EQ(ticks_with(Status::ok, 10, {0, 0, 2}), 10);
+    EXPECT_EQ(written, Status::ok);
+    const std::int64_t answered_ns = state.sample_ns + kTick_ns;  // of the tick that is over
+    if (fault == std::string("out hangs")) {
+      usb->out_hangs = true;
+    } else if (fault == std::string("out fails")) {
+      usb->out_fails = 1000;
+    } else {
+      command(fault);
+    }
+    int taken_late = 0;
+    for (int i = 0; i < 60; ++i) {
+      const std::int64_t silent_ns = usb->now_ns() - answered_ns;
+      (void)tick({0, 0, 2});
+      if (silent_ns <= 9 * kTick_ns) {
+        EXPECT_EQ(written, Status::ok) << i << ": a hiccup";
+      }
+      taken_late += silent_ns > 11 * kTick_ns && written != Status::no_data ? 1 : 0;
+    }
+    EXPECT_EQ(taken_late, 0);
+    const bool zero_arrives = fault == std::string("mute") || fault == std::string("short 1000");
+    EXPECT_EQ(pushes(), !zero_arrives);
+  }
+}
+
+TEST_F(FalconSessionTest, a_force_is_taken_again_as_soon_as_it_answers) {
+  begin();
+  (void)ticks_with(Status::ok, 10, {0, 0, 2});
+  command("mute");
+  (void)ticks_with(Status::ok, 30, {0, 0, 2});
+  EXPECT_EQ(written, Status::no_data);
+  command("speak");
+  (void)ticks_with(Status::ok, 6, {0, 0, 2});
+  EXPECT_EQ(written, Status::ok);
+  EXPECT_TRUE(pushes());
+}
+
 // ---- a bad line ----
 
 TEST_F(FalconSessionTest, a_mute_device_gives_no_data_and_is_asked_again) {

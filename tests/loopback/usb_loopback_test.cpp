@@ -17,6 +17,7 @@
 #include "hal/falcon/libusb_link.hpp"
 #include "rt/executive/monotonic_clock.hpp"
 #include "tests/loopback/falcon_on_usb.hpp"
+#include "tests/loopback/histogram.hpp"
 
 namespace punctum::loopback {
 namespace {
@@ -186,7 +187,7 @@ TEST_F(UsbLoopback, round_trips_of_force_and_of_encoders) {
   plug_in();
   ASSERT_NO_FATAL_FAILURE(begin());
   (void)ticks_with(Status::ok, 20);
-  std::vector<std::int64_t> force_ns, encoder_ns;
+  std::vector<std::int64_t> force_ns, encoder_ns, round_ns;
   for (int i = 0; i < 500; ++i) {
     clock.sleep_until_ns(next_ns);
     next_ns += 1'000'000;
@@ -195,6 +196,9 @@ TEST_F(UsbLoopback, round_trips_of_force_and_of_encoders) {
     (void)handle->write_force({0, 0, i % 2 == 0 ? 1.0 : -1.0});
     clock.sleep_until_ns(written_ns + 900'000);
     force_ns.push_back(usb->with([](FalconEmulator&, WatchedHand& h) { return h.changed_ns; }) - written_ns);
+    hal::HandState answer;
+    EXPECT_EQ(handle->read(answer), Status::ok);
+    round_ns.push_back(answer.sample_ns - written_ns);
   }
   for (int i = 0; i < 500; ++i) {
     (void)tick();
@@ -209,6 +213,11 @@ TEST_F(UsbLoopback, round_trips_of_force_and_of_encoders) {
   }
   print("USB, force written -> in the device", force_ns);
   print("USB, encoders measured -> reading", encoder_ns);
+  print_histogram("USB, a force and the reading that answers it", round_ns, 20'000);
+  for (const std::int64_t ns : round_ns) {
+    EXPECT_GT(ns, 0) << "of this force, not of the one before";
+    EXPECT_LT(ns, 900'000);
+  }
   for (const std::int64_t ns : force_ns) {
     EXPECT_GT(ns, 0);
     EXPECT_LT(ns, 900'000) << "before the next tick";

@@ -207,6 +207,14 @@ void Axis::urge(Wanted wanted) NONBLOCKING {
   reset_tried_ = false;
 }
 
+void Axis::drop() NONBLOCKING {
+  if (step_ != Step::see_it_off && step_ != Step::dropped) {
+    next(Step::dropped);
+    controlword_ = kQuickStop;
+    target_ = position_;
+  }
+}
+
 void Axis::synced() NONBLOCKING {
   reached_ = given_;
   given_ = target_;

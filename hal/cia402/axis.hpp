@@ -39,6 +39,9 @@ class Axis {
   void set_target(std::int32_t counts) NONBLOCKING { target_ = counts; }
   // Off at once, whatever the drive says: for a command that cannot wait for the next cycle.
   void urge(Wanted wanted) NONBLOCKING;
+  // A quick stop that nobody asked for: off until it was told off. A drive that waits for its power is left
+  // so.
+  void drop() NONBLOCKING;
 
   // ---- what it is ----
   [[nodiscard]] int node() const NONBLOCKING { return params_.node; }

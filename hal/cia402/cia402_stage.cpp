@@ -24,11 +24,19 @@ constexpr std::int64_t kStopsWithin_ns = 500 * kMillisecond_ns;  // as [estop] p
 constexpr std::int64_t kPowerOffWithin_ns = 100 * kMillisecond_ns;
 constexpr std::uint32_t kMany = 1'000'000'000;  // counters stop there
 
+// SYNCs in a row after which no node was heard at all; then none of our frames may have passed, and the
+// kernel would keep every further one and play it later. Not one: a tick that comes early after a late one
+// has sent its SYNC before the answers to the last could be there. More would only be more old set-points in
+// the queue.
+constexpr int kUnheard_syncs = 2;
+
 constexpr Object kDeviceType{{0x1000, 0}, 4, 0, "device type", "is it a CANopen drive?"};
 constexpr Object kVendor{{0x1018, 1}, 4, 0, "vendor", "look at vendor_id of its [[cia402.axis]]"};
 constexpr Object kProduct{{0x1018, 2}, 4, 0, "product", "look at product_code of its [[cia402.axis]]"};
 constexpr Object kModes{{0x6502, 0}, 4, 0, "supported modes", "the drive does not say what it can do"};
 constexpr Object kStatus{{0x6041, 0}, 2, 0, "statusword", "is it a CiA 402 drive?"};
+constexpr Object kOnLinkLoss{
+    {0x1029, 1}, 1, 0, "pre-operational when the link is lost", "the drive must then take no PDO"};
 constexpr Object kErrorCode{{0x603F, 0}, 2, 0, "error code", ""};
 constexpr Object kModeShown{{0x6061, 0}, 1, 0, "mode shown", "the drive must show its mode"};
 
@@ -98,6 +106,8 @@ Done Cia402Stage::open() {
   disconnected_ = bus_gone_ = started_ = begun_ = holding_ = force_fresh_ = false;
   wanted_ = Wanted::off;
   unsent_ = {};
+  unheard_ = 0;
+  silent_ = excused_ = stop_due_ = false;
   ticks_to_sync_ = 0;
   sync_ns_ = 0;
   for (std::size_t i = 0; i < count_; ++i) {
@@ -244,6 +254,18 @@ Done Cia402Stage::configure(SdoClient& sdo, const AxisParams& axis) const {
       return done;
     }
   }
+  // What is still in a queue when the link comes back must find a drive that takes no PDO. A drive without
+  // the object becomes pre-operational as well (CiA 301). Stopped (2) would be too much: it tells no
+  // emergency.
+  const auto behaviour = sdo.upload_if_there(axis.node, kOnLinkLoss, kOnLinkLoss.value);
+  if (!behaviour) {
+    return Unexpected(behaviour.error());
+  }
+  if ((*behaviour & 0xFFU) != kOnLinkLoss.value) {
+    if (auto done = sdo.download(axis.node, kOnLinkLoss); !done) {
+      return done;
+    }
+  }
   const std::uint32_t mode = params_.homing ? 6 : 8;
   std::uint32_t shown = 0;
   for (std::int64_t waited = 0; waited < kStateWithin_ns && shown != mode; waited += kMillisecond_ns) {
@@ -372,6 +394,10 @@ std::string Cia402Stage::report() const {
   if (h.bus_off) {
     line("the controller went bus-off: check cable, terminators and bitrate");
   }
+  if (h.silences > 0) {
+    line("no node was heard for " + std::to_string(kUnheard_syncs) + " SYNCs, " + std::to_string(h.silences) +
+         " times, and the drives were stopped: check the connectors");
+  }
   if (h.not_sent > 0) {
     line(std::to_string(h.not_sent) + " frames found the queue full: ip link set " + params_.interface +
          " txqueuelen 128");
@@ -420,6 +446,7 @@ void Cia402Stage::drain(std::int64_t now_ns) NONBLOCKING {
     CanFrame frame;
     switch (bus_->receive(frame)) {
       case Received::frame:
+        unheard_ = 0;
         take(frame, now_ns);
         break;
       case Received::error:
@@ -487,7 +514,11 @@ Status Cia402Stage::judge(std::int64_t now_ns) NONBLOCKING {
   if (disconnected_) {
     return Status::disconnected;
   }
-  if (fault) {
+  // Drives that were stopped because nothing was heard have done nothing wrong that could be known yet: there
+  // is no data, until all answer again.
+  const bool excused = excused_;
+  excused_ = excused_ && !fresh;
+  if (fault && !excused) {
     return Status::fault;
   }
   return fresh ? Status::ok : Status::no_data;
@@ -522,26 +553,76 @@ bool Cia402Stage::all_enabled() const NONBLOCKING {
 }
 
 // What is still to be sent for this SYNC, the SYNC, and what follows from the answers to the last one. The
-// commands of a tick are sent at its end: a controller that sends by priority would let the SYNC overtake
-// them.
+// set-points of a drive that follows are sent at the end of their tick: a controller that sends by priority
+// would let the SYNC overtake them. What the steps below decide goes out right before the next SYNC, and may
+// act one later.
+//
+// A controller that nobody acknowledges repeats its first frame for ever, and the kernel keeps what is sent
+// behind it, in order and with no way to take it back. So as long as no node is heard, nothing is added but a
+// stop. How much waits, the kernel does not tell (a CAN socket has no SIOCOUTQ); but what a node sends goes
+// over the same contact, an answer follows the SYNC that asked for it, and a heartbeat gives way to every
+// command and SYNC that the controller holds. With at most kUnheard_syncs cycles sent after the last frame
+// that was heard, and none but stops from then on until the core has told the drives off, what can be played
+// later is bounded.
 void Cia402Stage::cycle(std::int64_t now_ns) NONBLOCKING {
-  send_commands();
-  if (send(sync())) {
-    sync_ns_ = now_ns;
-    for (std::size_t i = 0; i < count_; ++i) {
-      axes_[i].synced();
-    }
+  const bool was_silent = silent_;
+  silent_ = unheard_ >= kUnheard_syncs;
+  if (silent_ && !was_silent) {
+    fall_silent();
   }
-  if (now_ns - heartbeat_ns_ >= heartbeat_period_ns_ &&
+  if (!silent_) {
+    send_commands();
+    send_sync(now_ns);
+  } else if (stop_due_) {
+    send_stop(now_ns);
+  }
+  if (!silent_ && now_ns - heartbeat_ns_ >= heartbeat_period_ns_ &&
       send(heartbeat(params_.master_node, NodeState::operational))) {
     heartbeat_ns_ = now_ns;
   }
   for (std::size_t i = 0; i < count_; ++i) {
     axes_[i].step(wanted_, now_ns);
-    unsent_[i] = true;
-    if (axes_[i].request_due() && send(axes_[i].request())) {
+    unsent_[i] = unsent_[i] || !silent_;
+    if (!silent_ && axes_[i].request_due() && send(axes_[i].request())) {
       axes_[i].requested();
     }
+  }
+}
+
+// The old set-points that wait already cannot be helped: at most those of kUnheard_syncs cycles, for one that
+// was sent behind the last SYNC is overwritten in the drive by the stop. It goes out with a SYNC of its own
+// that lets it act as soon as anything passes; and once only.
+void Cia402Stage::fall_silent() NONBLOCKING {
+  if (wanted_ == Wanted::operation) {
+    excused_ = true;
+    count(health_.silences);
+    for (std::size_t i = 0; i < count_; ++i) {
+      axes_[i].drop();
+    }
+  }
+  told_ = std::min(wanted_, Wanted::quick_stop);
+  unsent_.fill(true);
+  stop_due_ = true;
+}
+
+// What a full queue refuses is due until it is taken.
+void Cia402Stage::send_stop(std::int64_t now_ns) NONBLOCKING {
+  send_commands();
+  if (std::none_of(unsent_.begin(), unsent_.begin() + static_cast<std::ptrdiff_t>(count_),
+                   [](bool one) { return one; })) {
+    send_sync(now_ns);
+  }
+}
+
+void Cia402Stage::send_sync(std::int64_t now_ns) NONBLOCKING {
+  if (!send(sync())) {
+    return;
+  }
+  stop_due_ = false;
+  unheard_ = std::min(unheard_ + 1, kUnheard_syncs);
+  sync_ns_ = now_ns;
+  for (std::size_t i = 0; i < count_; ++i) {
+    axes_[i].synced();
   }
 }
 
@@ -575,7 +656,13 @@ void Cia402Stage::tell(Wanted wanted) NONBLOCKING {
     axes_[i].urge(wanted);
     unsent_[i] = true;
   }
-  send_commands();
+  if (!silent_) {
+    send_commands();
+  } else if (wanted < told_) {  // power off after a quick stop; neither twice in one silence
+    told_ = wanted;
+    stop_due_ = true;
+    send_stop(clock_.now_ns());
+  }
 }
 
 Status Cia402Stage::command(const hal::StageCommand& set_point) NONBLOCKING {

@@ -4,7 +4,8 @@
 // before is sent, and the next SYNC goes out; at its end the new set-points go out, which act at the next
 // SYNC. Whatever ends the bus (bus-off, a drive that restarts, a heartbeat that stays away) is latched as
 // Status::disconnected until the device is opened again. A drive's fault is Status::fault until the drive is
-// told off; it is reset, once, when the drive is told on again.
+// told off; it is reset, once, when the drive is told on again. While nothing at all is heard nothing is sent
+// but a stop, so that no old set-points wait for the contact to return.
 #pragma once
 
 #include <array>
@@ -28,6 +29,7 @@ struct Health {
   std::uint32_t not_sent = 0;    // the queue was full: txqueuelen
   std::uint32_t bus_errors = 0;  // error frames
   std::uint32_t floods = 0;      // ticks with more frames than are read in one
+  std::uint32_t silences = 0;    // nothing was heard, and the drives were stopped
   std::uint32_t malformed = 0;   // frames of another length than agreed
   bool bus_off = false;
 };
@@ -68,7 +70,10 @@ class Cia402Stage final : public hal::Device, public hal::Stage, public hal::For
   void take(const CanFrame& frame, std::int64_t now_ns) NONBLOCKING;
   void take_force(const CanFrame& frame) NONBLOCKING;
   void cycle(std::int64_t now_ns) NONBLOCKING;
+  void fall_silent() NONBLOCKING;
   void send_commands() NONBLOCKING;
+  void send_sync(std::int64_t now_ns) NONBLOCKING;
+  void send_stop(std::int64_t now_ns) NONBLOCKING;
   [[nodiscard]] bool send(const CanFrame& frame) NONBLOCKING;
   void tell(Wanted wanted) NONBLOCKING;
   [[nodiscard]] hal::Status judge(std::int64_t now_ns) NONBLOCKING;
@@ -94,6 +99,11 @@ class Cia402Stage final : public hal::Device, public hal::Stage, public hal::For
   hal::Vec3 anchor_m_ = hal::Vec3::Zero();
   std::array<bool, kMaxAxes> unsent_{};  // commands for the next SYNC
   int ticks_to_sync_ = 0;
+  int unheard_ = 0;                  // SYNCs since the last frame of a node
+  bool silent_ = false;              // too many: nothing goes out but a stop
+  bool stop_due_ = false;            // in this silence: the stop still waits for its SYNC
+  bool excused_ = false;             // the drives were stopped for it, and have not all answered since
+  Wanted told_ = Wanted::operation;  // in this silence: what was sent last
   std::int64_t sync_ns_ = 0;
   std::int64_t heartbeat_ns_ = 0;  // of the master's last one
 

@@ -32,6 +32,11 @@ class VirtualCan final : public hal::Clock {
   void sleep_until_ns(std::int64_t t_ns) noexcept override {
     while (now_ns_ < t_ns) {
       now_ns_ = std::min(t_ns, now_ns_ + kStep_ns);
+      if (contact && !waiting_.empty()) {
+        const can_frame next = waiting_.front();
+        waiting_.pop_front();
+        deliver(next);
+      }
       collect();
     }
   }
@@ -40,7 +45,11 @@ class VirtualCan final : public hal::Clock {
   std::function<bool(const can_frame&)> lose_of_master, lose_of_drives;  // true: the frame is lost
   int copies_of_drives = 1;
   bool bus_off = false, down = false, full = false;
-  bool hold_drives = false;     // frames of the drives wait until it is false again
+  bool hold_drives = false;  // frames of the drives wait until it is false again
+  // False: the master's connector is open. Nobody acknowledges its frames: they wait in its queue and go out
+  // later in order, one in each step. What the drives say meanwhile, it never hears.
+  bool contact = true;
+  std::size_t queue = 128;      // frames that may wait: txqueuelen
   std::vector<can_frame> sent;  // by the master
   bool record = false;
 
@@ -51,6 +60,7 @@ class VirtualCan final : public hal::Clock {
     }
   }
   void inject_error() { ++errors_; }
+  [[nodiscard]] std::size_t waiting() const { return waiting_.size(); }
 
   [[nodiscard]] std::unique_ptr<cia402::CanBus> master() { return std::make_unique<End>(*this); }
   [[nodiscard]] bool is_open() const { return open_; }
@@ -80,7 +90,7 @@ class VirtualCan final : public hal::Clock {
     if (down) {
       return cia402::Sent::down;
     }
-    if (full) {
+    if (full || waiting_.size() >= queue) {
       return cia402::Sent::full;
     }
     can_frame out{};
@@ -93,11 +103,18 @@ class VirtualCan final : public hal::Clock {
     if (bus_off || (lose_of_master && lose_of_master(out))) {
       return cia402::Sent::ok;
     }
-    for (const auto& drive : drives_) {
-      drive->on_frame(out, now_ns_);
+    if (!contact || !waiting_.empty()) {
+      waiting_.push_back(out);
+      return cia402::Sent::ok;
     }
+    deliver(out);
     collect();
     return cia402::Sent::ok;
+  }
+  void deliver(const can_frame& frame) {
+    for (const auto& drive : drives_) {
+      drive->on_frame(frame, now_ns_);
+    }
   }
   cia402::Received give(cia402::CanFrame& out) {
     if (down) {
@@ -123,7 +140,7 @@ class VirtualCan final : public hal::Clock {
   void collect() {
     for (const auto& drive : drives_) {
       for (const can_frame& frame : drive->step(now_ns_)) {
-        for (int i = 0; i < copies_of_drives && !bus_off; ++i) {
+        for (int i = 0; i < copies_of_drives && !bus_off && contact; ++i) {
           held_.push_back(frame);
         }
       }
@@ -138,7 +155,7 @@ class VirtualCan final : public hal::Clock {
 
   std::vector<std::unique_ptr<emulator::Drive>> drives_;
   std::vector<std::uint16_t> ids_;
-  std::deque<can_frame> to_master_, held_;
+  std::deque<can_frame> to_master_, held_, waiting_;
   std::int64_t now_ns_ = 1'000'000'000;
   int errors_ = 0;
   bool open_ = false;

@@ -1,6 +1,8 @@
 // The servo with a stage of three emulated drives in place of a simulated one, in virtual time.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
 
@@ -136,6 +138,35 @@ TEST_F(Cia402ServoTest, a_drive_that_falls_silent_is_a_lost_stage_within_its_tim
   ticks(25);  // 20 ms, and the cycles between
   EXPECT_EQ(fault(), Fault::stage_lost);
   EXPECT_NE(can.drive(0).state(), DriveState::operation_enabled);
+}
+
+TEST_F(Cia402ServoTest, a_connector_that_opens_for_40_ms_is_a_lost_stage_and_its_drives_stay_stopped) {
+  for (int i = 0; i < 3; ++i) {  // drives that watch no SYNC: only the queue decides
+    can.drive(static_cast<std::size_t>(i))
+        .on_frame(tests::frame_of(0x601U + static_cast<std::uint32_t>(i), {0x23, 0x06, 0x10, 0, 0, 0, 0, 0}),
+                  can.now_ns());
+  }
+  ticks(100);
+  push_along_x(400);
+  const double before_m = x_m();
+  push_along_x(10);
+  const double per_tick_m = (x_m() - before_m) / 10;
+  EXPECT_GT(per_tick_m, 50e-9);
+  can.contact = false;
+  push_along_x(40);
+  EXPECT_EQ(fault(), Fault::stage_lost);
+  const double stood_m = x_m();
+  can.contact = true;
+  double furthest_m = 0;
+  for (int i = 0; i < 300; ++i) {
+    push_along_x(1);
+    furthest_m = std::max(furthest_m, std::abs(x_m() - stood_m));
+    if (i > 2) {
+      EXPECT_NE(can.drive(0).state(), DriveState::operation_enabled);
+    }
+  }
+  EXPECT_LE(furthest_m, 3 * per_tick_m);  // two set-points that were on their way, and rounding
+  EXPECT_EQ(can.drive(0).speed(), 0);
 }
 
 }  // namespace

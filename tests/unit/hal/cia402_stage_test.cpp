@@ -3,10 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "hal/cia402/configuration.hpp"
 #include "tests/support/virtual_can.hpp"
@@ -777,6 +780,244 @@ TEST_F(Cia402StageTest, frames_of_another_length_are_counted_and_not_read) {
   }
   EXPECT_EQ(stage->health().malformed, 8U);
   EXPECT_EQ(state.tip_m, before_m);
+}
+
+// ---- the master's connector ----
+
+// Set-points in motion, 12.5 counts apart, then an open connector; the core asks for its stop 20 ms later, as
+// by its time-out, and the contact returns after `open_ms`.
+class Cia402ContactTest : public Cia402StageTest {
+ protected:
+  static constexpr double kPerCycle = 12.5;
+
+  void configure_drives(int sync_us, int behaviour) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto id = 0x601U + static_cast<std::uint32_t>(i);
+      can.drive(i).on_frame(frame_of(id, {0x23, 0x06, 0x10, 0, sync_us & 0xFF, sync_us >> 8, 0, 0}),
+                            can.now_ns());
+      can.drive(i).on_frame(frame_of(id, {0x2F, 0x29, 0x10, 1, behaviour, 0, 0, 0}), can.now_ns());
+      ASSERT_EQ(can.drive(i).value(0x1006), sync_us);
+      ASSERT_EQ(can.drive(i).value(0x1029, 1), behaviour);
+    }
+  }
+  // What read() told until the contact returned.
+  std::vector<Status> lose_contact(int open_ms) {
+    move_along_x(50);
+    const Vec3 from_m = state.tip_m;
+    can.contact = false;
+    std::vector<Status> told;
+    for (int i = 1; i <= open_ms; ++i) {
+      const Vec3 to_m = from_m + Vec3(0.5e-6 * i, 0, 0);
+      told.push_back(tick([&] {
+        if (i <= 20) {
+          (void)stage->command({to_m, -Vec3::UnitX()});
+        } else {
+          stage->quick_stop();
+        }
+      }));
+      most_waiting = std::max(most_waiting, can.waiting());
+    }
+    stood_at = can.drive(0).position();
+    can.contact = true;
+    return told;
+  }
+  // The furthest that the first drive gets from where it stood, in a tenth of a second after the contact.
+  double furthest() {
+    double most = 0;
+    for (int i = 0; i < 100; ++i) {
+      tick([this] { stage->quick_stop(); });
+      most = std::max(most, std::abs(can.drive(0).position() - stood_at));
+    }
+    return most;
+  }
+
+  std::size_t most_waiting = 0;
+  double stood_at = 0;
+};
+
+TEST_F(Cia402ContactTest, a_contact_that_returns_after_the_stop_plays_no_queue_of_old_set_points) {
+  begin();
+  configure_drives(0, 1);  // drives that watch no SYNC: they are in operation until the stop reaches them
+  enable();
+  const auto told = lose_contact(40);
+  expect_all(DriveState::operation_enabled);
+  EXPECT_LE(furthest(), 2 * kPerCycle + 1);  // the two cycles that were on their way
+  expect_all(DriveState::quick_stop_active);
+  expect_rest();
+  EXPECT_EQ(std::count(told.begin() + 2, told.end(), Status::no_data), 38);
+  EXPECT_EQ(stage->health().not_sent, 0U);
+}
+
+TEST_F(Cia402ContactTest, drives_that_stand_in_quick_stop_stay_there_when_the_contact_returns) {
+  begin();
+  configure_drives(1000, 1);  // they stop by themselves, and stay operational in the network
+  enable();
+  (void)lose_contact(40);
+  expect_all(DriveState::quick_stop_active);
+  EXPECT_LE(furthest(), 2 * kPerCycle + 1);
+  expect_all(DriveState::quick_stop_active);
+  expect_rest();
+}
+
+TEST_F(Cia402ContactTest, drives_that_lost_their_link_are_left_pre_operational_and_take_nothing_old) {
+  for (std::size_t i = 0; i < 3; ++i) {  // a vendor's default of no change
+    can.drive(i).on_frame(frame_of(0x601U + static_cast<std::uint32_t>(i), {0x2F, 0x29, 0x10, 1, 1, 0, 0, 0}),
+                          can.now_ns());
+  }
+  begin();
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(can.drive(i).value(0x1029, 1), 0);
+  }
+  enable();
+  (void)lose_contact(40);
+  EXPECT_EQ(furthest(), 0);
+  expect_all(DriveState::quick_stop_active);
+  EXPECT_EQ(tick(), Status::disconnected);
+}
+
+TEST_F(Cia402ContactTest, a_drive_without_the_object_of_its_error_behaviour_is_opened) {
+  can.lose_of_master = [this](const can_frame& frame) {  // played by hand: there is no such object
+    const bool asks = frame.can_id == 0x601 && frame.data[0] == 0x40 && frame.data[1] == 0x29;
+    if (asks) {
+      can.inject(frame_of(0x581, {0x80, 0x29, 0x10, 1, 0, 0, 0x02, 0x06}));
+    }
+    return asks;
+  };
+  begin();
+  enable();
+}
+
+TEST_F(Cia402ContactTest, a_drive_that_stays_operational_without_its_link_is_refused) {
+  configure_drives(1000, 1);
+  EXPECT_EQ(can.drive(1).command("refuse 1029:01 0x06010002"), "");
+  const auto opened = made().open();
+  ASSERT_FALSE(opened);
+  EXPECT_TRUE(opened.error().starts_with("node 2: 1029:01 (")) << opened.error();
+}
+
+TEST_F(Cia402ContactTest, nothing_piles_up_however_long_the_contact_is_away) {
+  begin();
+  configure_drives(0, 1);
+  enable();
+  (void)lose_contact(2000);
+  // Two cycles of three commands and a SYNC, the stop in the same form, and a heartbeat.
+  EXPECT_LE(most_waiting, 13U);
+  stage->enable(false);  // lower than the stop: it goes out as well
+  const std::size_t with_off = can.waiting();
+  EXPECT_GT(with_off, most_waiting);
+  for (int i = 0; i < 50; ++i) {
+    can.contact = false;
+    tick([&] {
+      stage->enable(true);
+      stage->quick_stop();
+      stage->enable(false);
+    });
+  }
+  EXPECT_EQ(can.waiting(), with_off);
+  can.contact = true;
+  ticks(100);
+  expect_all(DriveState::switch_on_disabled);
+}
+
+TEST_F(Cia402ContactTest,
+       a_contact_that_returns_before_the_time_out_finds_the_drives_stopped_and_is_a_fault) {
+  begin();
+  configure_drives(0, 1);
+  enable();
+  const auto told = lose_contact(10);
+  EXPECT_EQ(std::count(told.begin() + 2, told.end(), Status::no_data), 8);
+  Status status = Status::no_data;
+  int n = 0;
+  for (; n < 10 && status != Status::fault; ++n) {
+    status = tick([&] { (void)stage->command({state.tip_m + Vec3(10e-6, 0, 0), -Vec3::UnitX()}); });
+  }
+  EXPECT_EQ(status, Status::fault);
+  ticks(5);
+  expect_all(DriveState::quick_stop_active);
+  EXPECT_LE(std::abs(can.drive(0).position() - stood_at), 2 * kPerCycle + 1);
+  // Whoever resets the stop goes on.
+  stage->quick_stop();
+  ticks(30);
+  stage->enable(false);
+  ticks(10);
+  state.enabled = false;
+  enable();
+}
+
+TEST_F(Cia402ContactTest, a_stop_that_a_full_queue_refuses_goes_out_once_when_there_is_room) {
+  begin();
+  configure_drives(0, 1);
+  enable();
+  move_along_x(10);
+  can.contact = false;
+  ticks(2);                       // not yet silent
+  can.queue = can.waiting() + 2;  // room for two of three commands
+  ticks(10);
+  EXPECT_EQ(can.waiting(), can.queue);
+  can.queue = 128;
+  can.record = true;
+  can.sent.clear();
+  ticks(10);
+  ASSERT_EQ(can.sent.size(), 2U);  // the third, and the SYNC
+  EXPECT_EQ(can.sent[0].can_id, 0x203U);
+  EXPECT_EQ(can.sent[0].data[0], kQuickStop);
+  EXPECT_EQ(can.sent[1].can_id, 0x080U);
+  EXPECT_NE(stage->report().find("no node was heard for 2 SYNCs, 1 times"), std::string::npos)
+      << stage->report();
+}
+
+TEST_F(Cia402ContactTest, heartbeats_without_answers_are_no_data_and_let_the_stop_be_repeated) {
+  begin();
+  enable();
+  move_along_x(10);
+  can.record = true;
+  can.lose_of_drives = [](const can_frame& frame) { return frame.can_id < 0x200; };
+  (void)tick();
+  can.sent.clear();
+  for (int i = 0; i < 50; ++i) {
+    EXPECT_EQ(tick(), Status::no_data) << i;
+  }
+  // One drive's heartbeat in 20 ms, two SYNCs for each, and one with each stop.
+  const auto syncs = std::count_if(can.sent.begin(), can.sent.end(),
+                                   [](const can_frame& frame) { return frame.can_id == 0x080; });
+  EXPECT_GT(syncs, 2);
+  EXPECT_LT(syncs, 15);
+  expect_all(DriveState::quick_stop_active);
+  can.lose_of_drives = nullptr;
+  int n = 0;
+  while (tick() != Status::fault && n < 30) {
+    ++n;
+  }
+  EXPECT_LT(n, 25);  // a heartbeat away
+}
+
+TEST_F(Cia402ContactTest, answers_of_one_cycle_that_stay_away_stop_nothing) {
+  begin();
+  enable();
+  move_along_x(10);
+  for (int i = 0; i < 20; ++i) {
+    can.lose_of_drives = [](const can_frame&) { return true; };
+    (void)tick();
+    can.lose_of_drives = nullptr;
+    EXPECT_EQ(tick(), Status::no_data);
+    EXPECT_EQ(tick(), Status::ok);
+  }
+  expect_all(DriveState::operation_enabled);
+}
+
+TEST_F(Cia402ContactTest, safe_state_without_contact_leaves_a_stop_and_power_off_in_the_queue) {
+  begin();
+  configure_drives(0, 1);
+  enable();
+  move_along_x(30);
+  can.contact = false;
+  stage->safe_state();
+  EXPECT_LE(can.waiting(), 17U);
+  stood_at = can.drive(0).position();
+  can.contact = true;
+  can.sleep_until_ns(can.now_ns() + 10 * kTick_ns);
+  expect_all(DriveState::switch_on_disabled);
+  EXPECT_LE(std::abs(can.drive(0).position() - stood_at), 2 * kPerCycle + 1);
 }
 
 // ---- homing ----

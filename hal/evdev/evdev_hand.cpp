@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "hal/evdev/which_hand.hpp"
 #include "hal/kernel_call.hpp"
 
 namespace punctum::evdev {
@@ -30,13 +31,9 @@ Status status_of(int error) NONBLOCKING { return error == ENODEV ? Status::disco
 std::string text_of(int error) { return std::generic_category().message(error); }
 
 // What an opened device is.
-struct Identity {
-  std::string name;
-  const Layout* layout = nullptr;  // null: none that can be a hand
-};
-
-Identity identify(int file) {
-  Identity found;
+InputDevice identify(const std::string& path, int file) {
+  InputDevice found;
+  found.path = path;
   std::array<char, 256> name{};
   if (ioctl(file, EVIOCGNAME(name.size() - 1), name.data()) >= 0) {
     found.name = name.data();
@@ -69,7 +66,7 @@ std::string refusal(const std::string& path, int error) {
          ", allowed for evdev.path: an input device (/proc/bus/input/devices lists them)";
 }
 
-std::vector<std::string> input_devices() {
+std::vector<std::string> input_paths() {
   std::vector<std::string> paths;
   if (DIR* folder = opendir(kFolder)) {
     while (const dirent* entry = readdir(folder)) {
@@ -86,34 +83,21 @@ std::vector<std::string> input_devices() {
   return paths;
 }
 
-// The only device that can be a hand, and whose name has the part asked for.
-tl::expected<std::string, std::string> find_by_name(const std::string& part) {
-  std::vector<std::string> found;
-  std::string list, refused;
-  for (const std::string& path : input_devices()) {
-    const int file = open_file(path);
-    if (file < 0) {
-      refused = errno == EACCES && refused.empty() ? not_allowed(path) : refused;
-      continue;
-    }
-    const Identity is = identify(file);
-    ::close(file);
-    if (is.layout != nullptr && is.name.find(part) != std::string::npos) {
-      found.push_back(path);
-      list += (list.empty() ? "" : ", ") + path + " (" + is.name + ")";
+// Those that are there; not one that cannot be opened for another reason than the user's rights.
+std::vector<InputDevice> input_devices() {
+  std::vector<InputDevice> devices;
+  for (const std::string& path : input_paths()) {
+    if (const int file = open_file(path); file >= 0) {
+      devices.push_back(identify(path, file));
+      ::close(file);
+    } else if (errno == EACCES) {
+      InputDevice shut;
+      shut.path = path;
+      shut.refused = not_allowed(path);
+      devices.push_back(std::move(shut));
     }
   }
-  if (found.size() == 1) {
-    return found.front();
-  }
-  if (!found.empty()) {
-    return Unexpected("several devices can be the hand: " + list + ", allowed: one of them as evdev.path");
-  }
-  if (!refused.empty()) {
-    return Unexpected(refused);
-  }
-  return Unexpected("no mouse, gamepad or SpaceMouse" + (part.empty() ? "" : " called \"" + part + "\"") +
-                    " in " + kFolder + ", allowed: plug one in, or say which in evdev.path");
+  return devices;
 }
 
 }  // namespace
@@ -121,7 +105,7 @@ tl::expected<std::string, std::string> find_by_name(const std::string& part) {
 tl::expected<void, std::string> EvdevHand::open() {
   std::string path = params_.path;
   if (path.empty()) {
-    auto found = find_by_name(params_.name);
+    auto found = choose_hand(input_devices(), params_.name);
     if (!found) {
       return Unexpected(found.error());
     }
@@ -138,10 +122,10 @@ tl::expected<void, std::string> EvdevHand::open() {
   if (int version = 0; ioctl(file_, EVIOCGVERSION, &version) != 0) {
     return refuse(refusal(path, errno));
   }
-  const Identity is = identify(file_);
+  const InputDevice is = identify(path, file_);
   layout_ = is.layout;
   if (layout_ == nullptr) {
-    return refuse(path + ": \"" + is.name + "\" is neither a mouse, a gamepad nor a SpaceMouse");
+    return refuse(is_no_hand(is));
   }
   std::array<Range, 3> ranges;
   for (std::size_t i = 0; layout_->counts == Counts::positions && i < ranges.size(); ++i) {

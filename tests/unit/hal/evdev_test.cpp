@@ -9,6 +9,7 @@
 #include <string>
 
 #include "hal/evdev/evdev_hand.hpp"
+#include "hal/evdev/which_hand.hpp"
 
 namespace punctum::evdev {
 namespace {
@@ -317,6 +318,31 @@ class StandingClock final : public hal::Clock {
   [[nodiscard]] std::int64_t now_ns() const noexcept override { return 1; }
   void sleep_until_ns(std::int64_t /*t_ns*/) noexcept override {}
 };
+
+TEST(WhichHand, is_the_only_device_that_can_be_one_and_has_the_part_in_its_name) {
+  const Layout* mouse = layout_of(of_a_mouse());
+  const Layout* pad = layout_of(of_a_gamepad());
+  const std::vector<InputDevice> two = {{"/dev/input/event1", "Keyboard of a mouse", nullptr, ""},
+                                        {"/dev/input/event2", "Optical Mouse", mouse, ""},
+                                        {"/dev/input/event10", "X-Box 360 pad", pad, ""}};
+  EXPECT_EQ(choose_hand(two, "Mouse"), "/dev/input/event2");
+  EXPECT_EQ(choose_hand(two, "pad"), "/dev/input/event10");
+  EXPECT_EQ(choose_hand(two, ""),
+            tl::unexpected<std::string>(
+                "several devices can be the hand: /dev/input/event2 (Optical Mouse), /dev/input/event10 "
+                "(X-Box 360 pad), allowed: one of them as evdev.path"));
+  EXPECT_EQ(choose_hand(two, "Keyboard"),
+            tl::unexpected<std::string>("no mouse, gamepad or SpaceMouse called \"Keyboard\" in /dev/input, "
+                                        "allowed: plug one in, or say which in evdev.path"));
+}
+
+TEST(WhichHand, is_told_to_be_out_of_reach_only_where_none_may_be_read) {
+  const Layout* mouse = layout_of(of_a_mouse());
+  const InputDevice shut{"/dev/input/event1", "", nullptr, "event1: this user may not read it"};
+  const InputDevice shut_too{"/dev/input/event2", "", nullptr, "event2: this user may not read it"};
+  EXPECT_EQ(choose_hand({shut, {"/dev/input/event3", "Mouse", mouse, ""}}, ""), "/dev/input/event3");
+  EXPECT_EQ(choose_hand({shut, shut_too}, ""), tl::unexpected<std::string>(shut.refused));
+}
 
 TEST(EvdevHandTest, says_in_one_line_what_is_no_input_device) {
   const StandingClock clock;

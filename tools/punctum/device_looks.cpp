@@ -9,6 +9,7 @@
 #include "rt/executive/monotonic_clock.hpp"
 #include "tools/scene/messages.hpp"
 #include "tools/scene/scene_keys.hpp"
+#include "tools/punctum/kernel_watchdog.hpp"
 
 namespace punctum::tools {
 namespace {
@@ -99,15 +100,16 @@ hal::Finding look_at_watchdog(const WatchdogParams& params, const Machine& machi
   if (std::string remedy = remedy_for(machine.at(params.path), params.path); !remedy.empty()) {
     return {Is::missing, std::move(remedy)};
   }
-  // /dev/watchdog is the first of them.
-  const std::string path = params.path == "/dev/watchdog" ? "/dev/watchdog0" : params.path;
+  const auto folder = watchdog_folder(machine.at(params.path), machine.at("/sys"));
   for (const PluggedIn& one : watchdogs(machine)) {
-    if (one.place == path) {
+    if (folder && one.place == "/dev/" + folder->filename().string()) {
       return {one.remedy.empty() ? Is::found : Is::missing,
               one.remedy.empty() ? fmt::format("{} ({})", params.path, one.what) : one.remedy};
     }
   }
-  return {Is::found, params.path};
+  const auto may = may_be_armed(machine.at(params.path), machine.at("/sys"));
+  return may ? hal::Finding{Is::found, params.path}
+             : hal::Finding{Is::missing, params.path + ": " + may.error()};
 }
 
 }  // namespace

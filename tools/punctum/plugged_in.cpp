@@ -14,6 +14,7 @@
 #include <fstream>
 #include <set>
 
+#include "tools/punctum/kernel_watchdog.hpp"
 #include "tools/scene/messages.hpp"
 #include "tools/scene/scene.hpp"
 
@@ -278,8 +279,8 @@ std::vector<PluggedIn> watchdogs(const Machine& machine) {
     std::string remedy = remedy_for(machine.at(path), path);
     if (line_of(device / "state") == "active") {
       remedy = path + ": somebody feeds it already (systemd: RuntimeWatchdogSec)";
-    } else if (line_of(device / "nowayout") == "1") {
-      remedy = path + ": could not be disarmed at the end of a run (its driver's option nowayout)";
+    } else if (const std::string why = why_not_disarmed(device); !why.empty()) {
+      remedy = path + ": " + why;
     }
     found.push_back({path, what, remedy});
   }

@@ -3,14 +3,19 @@
 // kernel's own: tests/loopback/plugged_in.
 #include "tools/punctum/device_looks.hpp"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <linux/can/netlink.h>
 #include <linux/rtnetlink.h>
 #include <net/if.h>
 #include <net/if_arp.h>
+#include <poll.h>
+#include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -20,7 +25,9 @@
 #include <string>
 #include <vector>
 
+#include "hal/ipc/segment.hpp"
 #include "tests/support/fake_video.hpp"
+#include "tools/punctum/kernel_watchdog.hpp"
 #include "tools/punctum/plugged_in.hpp"
 #include "tools/scene/scene_keys.hpp"
 
@@ -337,11 +344,71 @@ TEST_F(DeviceLooks, a_watchdog_is_asked_for_by_its_folder_and_never_opened) {
   link_to("/dev/watchdog0", "/dev/null");
   file("/sys/class/watchdog/watchdog0/identity", "Software Watchdog");
   file("/sys/class/watchdog/watchdog0/timeout", "60");
+  EXPECT_TRUE(says(look(scene), "watchdog: MISSING /dev/watchdog0: is no watchdog"));
+  file("/sys/class/watchdog/watchdog0/dev", "1:3");  // as /dev/null, which stands for it
+  EXPECT_TRUE(
+      says(look(scene), "watchdog: MISSING /dev/watchdog0: nobody knows whether it could be disarmed"));
+  file("/sys/class/watchdog/watchdog0/nowayout", "0");
   EXPECT_TRUE(says(look(scene), "watchdog: ok /dev/watchdog0 (Software Watchdog, 60 s)\n"));
   file("/sys/class/watchdog/watchdog0/nowayout", "1");
   EXPECT_TRUE(says(look(scene), "watchdog: MISSING /dev/watchdog0: could not be disarmed"));
   file("/sys/class/watchdog/watchdog0/state", "active");
   EXPECT_TRUE(says(look(scene), "watchdog: MISSING /dev/watchdog0: somebody feeds it already"));
+}
+
+TEST_F(DeviceLooks, a_watchdog_by_another_name_is_found_by_its_number) {
+  link_to("/dev/the_watchdog", "/dev/null");
+  for (const auto& [name, number, nowayout] :
+       {std::tuple{"watchdog0", "248:0", "0"}, std::tuple{"watchdog1", "1:3", "1"}}) {
+    file(std::string("/sys/class/watchdog/") + name + "/dev", number);
+    file(std::string("/sys/class/watchdog/") + name + "/nowayout", nowayout);
+  }
+  EXPECT_TRUE(says(look(kSmallest + "[watchdog]\npath = \"/dev/the_watchdog\"\n"),
+                   "watchdog: MISSING /dev/watchdog1: could not be disarmed"));
+}
+
+TEST_F(DeviceLooks, a_watchdog_may_be_armed_only_where_sysfs_says_that_it_can_be_disarmed_again) {
+  const fs::path sysfs = machine.at("/sys");
+  const auto why = [&](const char* device) {
+    const auto may = may_be_armed(device, sysfs);
+    return may ? std::string("it may") : may.error();
+  };
+  EXPECT_EQ(why("/dev/none"), "No such file or directory");
+  EXPECT_EQ(why("/proc/version"), "is no watchdog, allowed: such as /dev/watchdog");
+  EXPECT_EQ(why("/dev/null"), "is no watchdog, allowed: such as /dev/watchdog");
+  file("/sys/class/watchdog/watchdog3/dev", "1:3");
+  EXPECT_EQ(why("/dev/null"),
+            "nobody knows whether it could be disarmed at the end of a run: " +
+                (sysfs / "class/watchdog/watchdog3/nowayout").string() +
+                " is missing, allowed: a watchdog whose driver and kernel tell it (CONFIG_WATCHDOG_SYSFS)");
+  file("/sys/class/watchdog/watchdog3/nowayout", "1");
+  EXPECT_EQ(
+      why("/dev/null"),
+      "could not be disarmed at the end of a run (its driver's option nowayout), allowed: with nowayout=0");
+  file("/sys/class/watchdog/watchdog3/nowayout", "0");
+  EXPECT_EQ(why("/dev/null"), "it may");
+}
+
+// A terminal's own end tells whether the other one was opened meanwhile.
+TEST_F(DeviceLooks, a_watchdog_that_cannot_be_disarmed_is_not_opened) {
+  const hal::Descriptor terminal(posix_openpt(O_RDWR | O_NOCTTY));
+  ASSERT_GE(terminal.number(), 0);
+  ASSERT_EQ(grantpt(terminal.number()), 0);
+  ASSERT_EQ(unlockpt(terminal.number()), 0);
+  WatchdogParams params;
+  params.path = ptsname(terminal.number());
+  struct stat about{};
+  ASSERT_EQ(stat(params.path.c_str(), &about), 0);
+  file("/sys/class/watchdog/watchdog0/dev",
+       std::to_string(major(about.st_rdev)) + ":" + std::to_string(minor(about.st_rdev)));
+  file("/sys/class/watchdog/watchdog0/nowayout", "1");
+  const auto armed = KernelWatchdog().arm(params, machine.at("/sys"));
+  ASSERT_FALSE(armed);
+  EXPECT_EQ(armed.error(), "watchdog: " + params.path +
+                               ": could not be disarmed at the end of a run (its driver's option nowayout), "
+                               "allowed: with nowayout=0");
+  pollfd was_opened{terminal.number(), POLLIN, 0};
+  EXPECT_EQ(poll(&was_opened, 1, 0), 0);
 }
 
 TEST_F(DeviceLooks, what_is_plugged_in_is_listed_with_the_lines_that_would_use_it) {
@@ -355,6 +422,7 @@ TEST_F(DeviceLooks, what_is_plugged_in_is_listed_with_the_lines_that_would_use_i
   file("/sys/class/video4linux/video3/name", "a microscope camera");
   link_to("/dev/v4l/by-id/usb-Maker_Camera_5-index0", "../../video3");
   file("/sys/class/watchdog/watchdog0/identity", "Software Watchdog");
+  file("/sys/class/watchdog/watchdog0/nowayout", "0");
   const std::string text = plugged_in(machine);
   EXPECT_TRUE(says(text,
                    "GPIO chips\n  /dev/gpiochip2  a board, 5 lines, 1 \"STOP_B\" used by punctum\n"

@@ -1,15 +1,17 @@
 #include "tools/punctum/device_looks.hpp"
 
 #include <fmt/format.h>
+#include <sys/stat.h>
+#include <sys/sysmacros.h>
 
 #include <algorithm>
 
 #include "hal/gpiod/gpiod_devices.hpp"
 #include "hal/v4l2/v4l2_camera.hpp"
 #include "rt/executive/monotonic_clock.hpp"
+#include "tools/punctum/kernel_watchdog.hpp"
 #include "tools/scene/messages.hpp"
 #include "tools/scene/scene_keys.hpp"
-#include "tools/punctum/kernel_watchdog.hpp"
 
 namespace punctum::tools {
 namespace {
@@ -75,15 +77,53 @@ hal::Findings look_at_file(const Machine& machine, const std::string& path, cons
   return {remedy.empty() ? hal::Finding{Is::found, path} : hal::Finding{Is::missing, std::move(remedy)}};
 }
 
-hal::Findings look_at_evdev(const Scene& scene, const Machine& machine, std::string_view) {
-  if (!scene.evdev->path.empty()) {
-    return look_at_file(machine, scene.evdev->path, "evdev.path");
+// The kernel's number of a device's file, as sysfs writes it; empty: it is none.
+std::string number_of(const std::filesystem::path& file) {
+  struct stat about{};
+  return stat(file.c_str(), &about) == 0 && S_ISCHR(about.st_mode)
+             ? fmt::format("{}:{}", major(about.st_rdev), minor(about.st_rdev))
+             : "";
+}
+
+// The path of the hand, chosen as the backend does when the run begins, or why it would refuse.
+tl::expected<std::string, std::string> hand_of(const evdev::EvdevParams& params,
+                                               const std::vector<NumberedInput>& inputs,
+                                               const Machine& machine) {
+  if (params.path.empty()) {
+    std::vector<evdev::InputDevice> there;
+    for (const NumberedInput& one : inputs) {
+      // One that is known to be another device does not matter, may it be read or not.
+      if (one.device.layout != nullptr && one.device.name.find(params.name) != std::string::npos &&
+          !number_of(machine.at(one.device.path)).empty()) {
+        there.push_back(one.device);
+      }
+    }
+    return evdev::choose_hand(there, params.name);
   }
-  std::vector<PluggedIn> hands = hand_inputs(machine);
-  std::erase_if(hands, [&scene](const PluggedIn& one) {
-    return one.what.find(scene.evdev->name) == std::string::npos;
-  });
-  return one_of(hands, "no mouse, gamepad or SpaceMouse is plugged in that evdev.name fits");
+  const std::string number = number_of(machine.at(params.path));
+  const auto one = std::ranges::find(inputs, number, &NumberedInput::number);
+  if (number.empty() || one == inputs.end()) {
+    return tl::unexpected(fmt::format("{}: {}, allowed for evdev.path: one that `punctum devices` shows",
+                                      params.path, number.empty() ? "no such device" : "is no input device"));
+  }
+  if (!one->device.refused.empty()) {
+    return tl::unexpected(one->device.refused);
+  }
+  if (one->device.layout == nullptr) {
+    return tl::unexpected(evdev::is_no_hand(one->device));
+  }
+  return one->device.path;
+}
+
+hal::Findings look_at_evdev(const Scene& scene, const Machine& machine, std::string_view) {
+  const std::vector<NumberedInput> inputs = input_devices(machine);
+  const auto path = hand_of(*scene.evdev, inputs, machine);
+  if (!path) {
+    return {{Is::missing, path.error()}};
+  }
+  const auto one =
+      std::ranges::find(inputs, *path, [](const NumberedInput& input) { return input.device.path; });
+  return {{Is::found, fmt::format("{} ({}, {})", *path, one->device.name, one->device.layout->name)}};
 }
 
 hal::Findings look_at_zaber(const Scene& scene, const Machine& machine, std::string_view) {

@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <grp.h>
-#include <linux/input-event-codes.h>
 #include <linux/videodev2.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -13,6 +12,7 @@
 #include <cstring>
 #include <fstream>
 #include <set>
+#include <sstream>
 
 #include "tools/punctum/kernel_watchdog.hpp"
 #include "tools/scene/messages.hpp"
@@ -23,13 +23,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The first line of a file in sysfs; empty where there is none.
-std::string line_of(const fs::path& file) {
+// The first line of a file in sysfs, as it is; empty where there is none.
+std::string bytes_of(const fs::path& file) {
   std::ifstream in(file);
   std::string line;
   std::getline(in, line);
-  return printable(line, 100);
+  return line;
 }
+
+// The same, to be shown.
+std::string line_of(const fs::path& file) { return printable(bytes_of(file), 100); }
 
 // Names in a folder that begin so, video2 before video10.
 std::vector<std::string> names_in(const fs::path& folder, std::string_view begin) {
@@ -52,40 +55,24 @@ bool is_there(const fs::path& file) {
   return fs::exists(file, ec);
 }
 
-// A bitmap of sysfs: hexadecimal words of the machine's size, the highest first.
-bool has_bit(const std::string& words, unsigned bit) {
-  constexpr unsigned kWord = 8 * sizeof(unsigned long);
+// The codes of one type that an input device knows, from a bitmap of sysfs: hexadecimal words of the
+// machine's size, the highest first.
+template <std::size_t Count>
+evdev::Codes<Count> codes_of(const fs::path& file) {
+  constexpr std::size_t kWord = 8 * sizeof(unsigned long);
+  std::istringstream in(bytes_of(file));
   std::vector<std::string> parts;
-  for (std::size_t at = 0; at < words.size();) {
-    const std::size_t end = std::min(words.find(' ', at), words.size());
-    if (end > at) {
-      parts.push_back(words.substr(at, end - at));
+  for (std::string part; in >> part;) {
+    parts.push_back(part);
+  }
+  evdev::Codes<Count> codes;
+  for (std::size_t bit = 0; bit < std::min(Count, kWord * parts.size()); ++bit) {
+    const unsigned long word = std::strtoul(parts[parts.size() - 1 - bit / kWord].c_str(), nullptr, 16);
+    if ((word >> bit % kWord & 1) != 0) {
+      codes.add(bit);
     }
-    at = end + 1;
   }
-  if (bit / kWord >= parts.size()) {
-    return false;
-  }
-  const unsigned long word = std::strtoul(parts[parts.size() - 1 - bit / kWord].c_str(), nullptr, 16);
-  return (word >> bit % kWord & 1) != 0;
-}
-
-bool has_bits(const std::string& words, std::initializer_list<unsigned> bits) {
-  return std::all_of(bits.begin(), bits.end(), [&words](unsigned bit) { return has_bit(words, bit); });
-}
-
-// What an input device can be as a hand; null: none.
-const char* hand_kind(const fs::path& abilities) {
-  const std::string keys = line_of(abilities / "key"), relative = line_of(abilities / "rel"),
-                    absolute = line_of(abilities / "abs");
-  if (has_bits(relative, {REL_X, REL_Y, REL_Z, REL_RX, REL_RY, REL_RZ}) ||
-      (has_bits(absolute, {ABS_X, ABS_Y, ABS_Z, ABS_RX, ABS_RY, ABS_RZ}) && !has_bit(keys, BTN_SOUTH))) {
-    return "knob of six axes";
-  }
-  if (has_bits(absolute, {ABS_X, ABS_Y, ABS_RX, ABS_RY}) && has_bit(keys, BTN_SOUTH)) {
-    return "gamepad";
-  }
-  return has_bits(relative, {REL_X, REL_Y}) && has_bit(keys, BTN_LEFT) ? "mouse" : nullptr;
+  return codes;
 }
 
 PluggedIn usb_place(const Machine& machine, const UsbDevice& usb, std::string place) {
@@ -97,8 +84,8 @@ PluggedIn usb_place(const Machine& machine, const UsbDevice& usb, std::string pl
 
 }  // namespace
 
-std::string remedy_for(const fs::path& file, const std::string& shown) {
-  if (faccessat(AT_FDCWD, file.c_str(), R_OK | W_OK, AT_EACCESS) == 0 || errno != EACCES) {
+std::string remedy_for(const fs::path& file, const std::string& shown, int rights) {
+  if (faccessat(AT_FDCWD, file.c_str(), rights, AT_EACCESS) == 0 || errno != EACCES) {
     return "";
   }
   struct stat about{};
@@ -230,17 +217,30 @@ std::vector<PluggedIn> falcons(const Machine& machine) {
   return found;
 }
 
+std::vector<NumberedInput> input_devices(const Machine& machine) {
+  std::vector<NumberedInput> found;
+  for (const std::string& name : names_in(machine.at("/sys/class/input"), "event")) {
+    const fs::path folder = machine.at("/sys/class/input") / name;
+    const fs::path can = folder / "device/capabilities";
+    NumberedInput one;
+    one.device.path = "/dev/input/" + name;
+    one.device.name = bytes_of(folder / "device/name");
+    one.device.layout = evdev::layout_of(
+        {codes_of<KEY_CNT>(can / "key"), codes_of<REL_CNT>(can / "rel"), codes_of<ABS_CNT>(can / "abs")});
+    one.device.refused = remedy_for(machine.at(one.device.path), one.device.path, R_OK);
+    one.number = line_of(folder / "dev");
+    found.push_back(std::move(one));
+  }
+  return found;
+}
+
 std::vector<PluggedIn> hand_inputs(const Machine& machine) {
   std::vector<PluggedIn> found;
-  for (const std::string& name : names_in(machine.at("/sys/class/input"), "event")) {
-    const fs::path device = machine.at("/sys/class/input") / name / "device";
-    const char* kind = hand_kind(device / "capabilities");
-    if (kind == nullptr) {
-      continue;
+  for (const auto& [device, number] : input_devices(machine)) {
+    if (device.layout != nullptr) {
+      found.push_back({device.path, fmt::format("{} ({})", printable(device.name, 100), device.layout->name),
+                       device.refused});
     }
-    const std::string path = "/dev/input/" + name;
-    found.push_back(
-        {path, fmt::format("{} ({})", line_of(device / "name"), kind), remedy_for(machine.at(path), path)});
   }
   return found;
 }
@@ -294,7 +294,11 @@ const std::vector<PluggedKind>& plugged_kinds() {
        "device = \"gpiod\"\n"
        "[gpiod]\n"
        "chip = \"{}\"\n"
-       "# and the numbers of the lines: contact_a, contact_b, reset, heartbeat; of an injector, gate\n"},
+       "# and its lines, as they are wired (of an injector gate too):\n"
+       "# contact_a = 0\n"
+       "# contact_b = 1\n"
+       "# reset = 2\n"
+       "# heartbeat = 3\n"},
       {"CAN interfaces", can_interfaces, "stage", "cia402",
        "[stage]\n"
        "device = \"cia402\"\n"
@@ -302,7 +306,9 @@ const std::vector<PluggedKind>& plugged_kinds() {
        "max_tilt_rad = 0\n"
        "[cia402]\n"
        "interface = \"{}\"\n"
-       "# and a [[cia402.axis]] with node and count_um for each drive\n"},
+       "# and its drives, three to six, each a [[cia402.axis]] or here:\n"
+       "# axis = [{node = 1, count_um = [0.04, 0, 0]}, {node = 2, count_um = [0, 0.04, 0]}, "
+       "{node = 3, count_um = [0, 0, 0.04]}]\n"},
       {"V4L2 cameras", v4l2_cameras, "camera", "v4l2",
        "[camera]\n"
        "device = \"v4l2\"\n"
@@ -320,13 +326,16 @@ const std::vector<PluggedKind>& plugged_kinds() {
       {"mice, gamepads, SpaceMice", hand_inputs, "haptic", "evdev",
        "[haptic]\n"
        "device = \"evdev\"\n"
+       "force_max_N = 0\n"
        "[evdev]\n"
        "path = \"{}\"\n"},
       {"serial ports", serial_ports, "positioner", "zaber",
        "[positioner]\n"
        "device = \"zaber\"\n"
        "[zaber]\n"
-       "port = \"{}\"\n"},
+       "port = \"{}\"\n"
+       "# and its axes x, y and z, each a [[zaber.axis]] or here:\n"
+       "# axis = [{device = 1}, {device = 2}, {device = 3}]\n"},
       {"watchdogs", watchdogs, "", "",
        "[watchdog]\n"
        "path = \"{}\"\n"},

@@ -2,6 +2,8 @@
 // opens no watchdog (that would arm it), claims nothing, sends nothing.
 #pragma once
 
+#include <unistd.h>
+
 #include <filesystem>
 #include <functional>
 #include <optional>
@@ -10,6 +12,7 @@
 #include <vector>
 
 #include "hal/cia402/look.hpp"
+#include "hal/evdev/which_hand.hpp"
 #include "hal/gpiod/lines.hpp"
 #include "hal/v4l2/kernel.hpp"
 
@@ -47,19 +50,27 @@ struct UsbDevice {
 [[nodiscard]] std::vector<UsbDevice> usb_devices(const Machine& machine);
 [[nodiscard]] std::vector<PluggedIn> usb_vision_cameras(const Machine& machine);
 [[nodiscard]] std::vector<PluggedIn> falcons(const Machine& machine);
-// Mice, gamepads and knobs of six axes: what can be a hand.
+// Every input device, event2 before event10, as sysfs tells it; `number` is that of its file, major:minor.
+struct NumberedInput {
+  evdev::InputDevice device;
+  std::string number;
+};
+[[nodiscard]] std::vector<NumberedInput> input_devices(const Machine& machine);
+// Those of them that can be a hand: mice, gamepads and SpaceMice.
 [[nodiscard]] std::vector<PluggedIn> hand_inputs(const Machine& machine);
 [[nodiscard]] std::vector<PluggedIn> serial_ports(const Machine& machine);
 [[nodiscard]] std::vector<PluggedIn> watchdogs(const Machine& machine);
 
-// Empty, or what to do so that this user may read and write it.
-[[nodiscard]] std::string remedy_for(const std::filesystem::path& file, const std::string& shown);
+// Empty, or what to do so that this user may use it: `rights` as access(2) has them.
+[[nodiscard]] std::string remedy_for(const std::filesystem::path& file, const std::string& shown,
+                                     int rights = R_OK | W_OK);
 
 // The text of `punctum devices`.
 [[nodiscard]] std::string plugged_in(const Machine& machine);
 
-// How one kind of device is listed, and used by a scene: {} in the lines is its place. A kind whose backend
-// this program lacks is listed without lines.
+// How one kind of device is listed, and used by a scene: {} in the lines is its place. What only the operator
+// knows, such as which wire is on which line, is a comment: with numbers of the station's own and without its
+// "# " it is what the scene still lacks. A kind whose backend this program lacks is listed without lines.
 struct PluggedKind {
   const char* title;
   std::vector<PluggedIn> (*list)(const Machine&);

@@ -5,6 +5,8 @@
 
 #include <cmath>
 #include <deque>
+#include <fstream>
+#include <string>
 #include <vector>
 
 #include "tests/support/tick.hpp"
@@ -291,6 +293,39 @@ TEST(SafetyLatch, the_table_orders_quick_stop_gate_hand_power_for_every_cause) {
     EXPECT_EQ(rule.actions[2], SafetyAction::hand_force_to_zero);
     EXPECT_EQ(rule.actions[3], SafetyAction::drive_power_off);
   }
+}
+
+std::string row_of(const SafetyRule& rule) {
+  constexpr const char* actions[] = {"none",          "quick_stop",     "gate_shut", "hand_force_to_zero",
+                                     "heartbeat_off", "drive_power_off"};
+  constexpr const char* cleared_by[] = {"never", "release_and_reset", "release_and_press"};
+  std::string in_order;
+  for (const SafetyAction action : rule.actions) {
+    if (action != SafetyAction::none) {
+      in_order += (in_order.empty() ? "`" : ", `") + std::string(actions[static_cast<int>(action)]) + "`";
+    }
+  }
+  return "| `" + std::string(name(rule.cause)) + "` | " + in_order + " | `" +
+         cleared_by[static_cast<int>(rule.cleared_by)] + "` |";
+}
+
+TEST(SafetyLatch, the_readme_has_the_table_row_by_row) {
+  std::ifstream in(PUNCTUM_SOURCE_DIR "/rt/control/README.md");
+  std::string line;
+  while (std::getline(in, line) && line != "| cause | actions, in order | cleared by |") {
+  }
+  ASSERT_TRUE(std::getline(in, line));
+  EXPECT_EQ(line, "| --- | --- | --- |");
+  std::vector<std::string> written, rules;
+  while (std::getline(in, line) && line.starts_with('|')) {
+    written.push_back(line);
+  }
+  for (const SafetyRule& rule : kSafetyRules) {
+    if (rule.cause != Fault::none) {
+      rules.push_back(row_of(rule));
+    }
+  }
+  EXPECT_EQ(written, rules);
 }
 
 }  // namespace

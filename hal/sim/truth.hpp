@@ -41,8 +41,8 @@ struct Truth {
   std::optional<Vec3> holder_mouth_m;
 };
 
-// The shortest way from the needle's glass, tip and shaft, to other glass; < 0: they touch. The simulated
-// plant feels nothing of it: the needle goes through.
+// The shortest way from the needle's glass to other glass; < 0: they touch. The simulated plant feels nothing
+// of it: the needle goes through. A horizontal needle's shaft, which is thicker, is nearer to the floor.
 struct GlassClearance {
   std::optional<double> floor_m;   // of the tip, from the dish floor
   std::optional<double> holder_m;  // of tip and shaft, from the holding pipette

@@ -156,7 +156,8 @@ hal::Vec3 ForbiddenRegions::away_from_holder(const NeedlePose& needle) const NON
 double ForbiddenRegions::apart_m(Region region, const hal::Vec3& direction, const NeedlePose& needle) const
     NONBLOCKING {
   if (region == Region::floor) {
-    // The needle comes down to the floor: nothing of it is lower than its tip.
+    // Of the needle the tip alone. The shaft is not kept from the floor: that of a horizontal needle is
+    // thicker than its tip and lies lower.
     const double below_tip_m = direction.z() * (needle.tip_m.z() - params_.floor->z_m);
     return below_tip_m - params_.tip_radius_m - params_.clearance_m;
   }

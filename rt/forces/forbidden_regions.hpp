@@ -1,6 +1,6 @@
-// Where the needle's glass must not be: in the dish floor, and in the holding pipette.
-//
-// The needle is a row of balls along its axis, from the tip backwards, as thick as its taper and its shaft;
+// Where the needle's glass must not be: its tip in the dish floor, tip and shaft in the holding pipette. The
+// shaft, thicker than the tip and so the lower one in a horizontal needle, is not kept from the floor. To the
+// holder the needle is a row of balls along its axis, from the tip back, as thick as its taper and its shaft;
 // the floor is a plane, the holder a cylinder with a flat mouth, without an end. So what the tip must keep
 // out of is convex for each of the two, and every direction in which needle and region lie apart gives a
 // plane that the region is wholly behind, exactly:

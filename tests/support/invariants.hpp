@@ -150,7 +150,7 @@ template <class Limits>
 }
 
 // How far the needle's glass, its tip there, is from the floor and from the holder of a scene, less the
-// clearance: ball by ball along the shaft.
+// clearance: the tip alone from the floor, from the holder ball by ball along the shaft.
 [[nodiscard]] inline double to_regions_m(const ForbiddenParams& regions, const hal::Vec3& tip_m,
                                          const hal::Vec3& axis, int balls = 400, double shaft_m = 2e-3) {
   double least_m = std::numeric_limits<double>::infinity();

@@ -60,7 +60,8 @@ TEST(Measures, the_tremor_ratio_is_the_motion_of_the_tip_scaled_back_to_the_hand
   EXPECT_NEAR(*m.tremor_ratio(), 0.25, 1e-3);
 }
 
-TEST(Measures, the_least_clearance_is_that_of_tip_and_shaft_from_floor_and_holder_in_truth) {
+TEST(Measures,
+     the_least_clearance_is_that_of_the_tip_from_the_floor_and_of_tip_and_shaft_from_the_holder_in_truth) {
   Scene scene = scene_of("icsi");
   scene.servo.forbidden.reset();  // what the core believes does not matter
   Measures m(scene);

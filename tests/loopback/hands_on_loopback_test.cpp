@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
@@ -109,7 +110,9 @@ class AtTheMouse {
 
   void follow(const std::string& words, double for_s) {
     if (words == "hold enable") {
-      press(BTN_LEFT, holds_, true);
+      // Once more after a second: a button that was held from the start on counts for nothing.
+      asked_s_ += for_s;
+      press(BTN_LEFT, holds_, std::fmod(asked_s_, 1.0) >= kLetGo_s);
     } else if (words == "to the cell") {
       move(-kApproach_m_s, for_s);
     } else if (words == "push on" || words == "deeper") {
@@ -138,7 +141,7 @@ class AtTheMouse {
   static constexpr double kCount_m = 25e-6;  // evdev.count_um
   // Of the needle.
   static constexpr double kApproach_m_s = 40e-6, kPush_m_s = 15e-6, kBack_m_s = 60e-6;
-  static constexpr double kFurther_s = 1, kDose_s = 0.6;
+  static constexpr double kFurther_s = 1, kDose_s = 0.6, kLetGo_s = 0.2;
 
   void press(int button, bool& pressed, bool down) {
     if (pressed != down) {
@@ -158,7 +161,7 @@ class AtTheMouse {
 
   VirtualInput& mouse_;
   bool holds_ = false, injects_ = false;
-  double owed_ = 0, inside_s_ = 0, injected_s_ = 0;
+  double owed_ = 0, asked_s_ = 0, inside_s_ = 0, injected_s_ = 0;
 };
 
 TEST(HandsOnTerminal, leads_somebody_who_does_what_it_says_through_a_whole_injection) {

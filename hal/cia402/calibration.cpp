@@ -40,7 +40,7 @@ Calibration::Calibration(const CanStageParams& params) : offset_m_(params.tip_m)
   counts_from_tip_.setZero();
   const Directions directions = directions_of(params);
   const Stretch stretch(directions * directions.transpose());
-  const Eigen::Vector3d squares = stretch.eigenvalues();
+  const Eigen::Vector3d& squares = stretch.eigenvalues();
   Eigen::Vector3d undone = Eigen::Vector3d::Zero();
   for (int i = 0; i < 3; ++i) {
     undone[i] = squares[i] > kNoStretch * kNoStretch * squares[2] ? 1 / squares[i] : 0;

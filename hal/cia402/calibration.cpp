@@ -7,8 +7,8 @@
 namespace punctum::cia402 {
 namespace {
 
-constexpr double kNoStretch =
-    1e-6;  // axes that stretch space by less than this part of the most do not reach there
+// Where axes stretch space by less than this part of the most, they do not reach.
+constexpr double kNoStretch = 1e-6;
 
 using Directions = Eigen::Matrix<double, 3, kMaxAxes>;  // unit vectors; 0 beyond the last axis
 

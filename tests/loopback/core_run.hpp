@@ -4,13 +4,10 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <pthread.h>
 
-#include <atomic>
 #include <functional>
 #include <memory>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -18,6 +15,7 @@
 #include "rt/executive/executive.hpp"
 #include "rt/executive/monotonic_clock.hpp"
 #include "rt/station/station.hpp"
+#include "tests/loopback/beside.hpp"
 #include "tests/loopback/gpiod_wiring.hpp"
 #include "tools/core/assembly.hpp"
 #include "tools/scene/scene.hpp"
@@ -37,8 +35,6 @@ struct Seen {
 
 class CoreRun : public testing::Test {
  protected:
-  static constexpr int kCorePriority = 80, kOutsidePriority = 90;
-
   // Scene `free` with its emergency stop on the chip, and what else is changed of it.
   explicit CoreRun(const std::function<void(tools::Scene&)>& change = [](tools::Scene&) {}) {
     const std::vector<std::pair<const char*, std::string>> keys = {{"chip", "\"" + board->path() + "\""},
@@ -61,11 +57,6 @@ class CoreRun : public testing::Test {
     board->drive(kContactB, true);
   }
 
-  static void become(int priority) {
-    const sched_param param{priority};
-    ASSERT_EQ(pthread_setschedparam(pthread_self(), SCHED_FIFO, &param), 0);
-  }
-
   // Runs so many ticks; meanwhile `outside` acts on the wires, on a thread of its own that waits for the
   // times it is given (from the release of the first tick on).
   void run(std::uint64_t ticks, const std::function<void()>& outside) {
@@ -79,16 +70,7 @@ class CoreRun : public testing::Test {
     rt::ExecutiveConfig config;
     config.start_ns = first_ns;
     rt::Executive executive(clock, clock, config, slots, station->core.status);
-    std::thread wires([&] {
-      become(kOutsidePriority);
-      outside();
-    });
-    become(kCorePriority);
-    std::atomic<bool> stop{false};
-    EXPECT_EQ(executive.run(stop), rt::Executive::Ended::by_slot);
-    const sched_param ordinary{0};
-    pthread_setschedparam(pthread_self(), SCHED_OTHER, &ordinary);
-    wires.join();
+    run_beside(executive, outside);
   }
   void at(double t_ms) { clock.sleep_until_ns(first_ns + static_cast<std::int64_t>(t_ms * 1e6)); }
 
@@ -97,13 +79,7 @@ class CoreRun : public testing::Test {
     return rt::After::go_on;
   }
   rt::After tick_servo(const rt::Tick& tick) noexcept {
-    rt::TickInfo now;
-    now.tick = tick.index;
-    now.release_ns = tick.release_ns;
-    now.start_ns = tick.wake_ns;
-    now.period_s = static_cast<double>(tick.period_ns) * 1e-9;
-    now.missed_in_window = tick.missed_in_window;
-    servo->tick(now);
+    servo->tick(tick_info(tick));
     missed = tick.missed;
     seen.push_back({tick.index, tick.wake_ns, servo->fault(), servo->stop_stage(), servo->sample().estop});
     return tick.index >= last_tick ? rt::After::end : rt::After::go_on;

@@ -23,6 +23,7 @@
 #include "rt/executive/executive.hpp"
 #include "rt/executive/monotonic_clock.hpp"
 #include "rt/station/station.hpp"
+#include "tests/loopback/beside.hpp"
 #include "tests/loopback/virtual_input.hpp"
 #include "tools/core/assembly.hpp"
 #include "tools/scene/scene.hpp"
@@ -479,13 +480,7 @@ class HandsOn : public testing::Test {
     return rt::After::go_on;
   }
   rt::After tick_servo(const rt::Tick& tick) noexcept {
-    rt::TickInfo now;
-    now.tick = tick.index;
-    now.release_ns = tick.release_ns;
-    now.start_ns = tick.wake_ns;
-    now.period_s = static_cast<double>(tick.period_ns) * 1e-9;
-    now.missed_in_window = tick.missed_in_window;
-    servo->tick(now);
+    servo->tick(tick_info(tick));
     missed = tick.missed;
     ++ticks;
     const rt::TelemetrySample& s = servo->sample();

@@ -426,12 +426,12 @@ const std::vector<Cell>& cells() {
        36,
        "config.hpp: overrun_limit, three missed in five",
        [](W& s) {
-         W::become(95);
+         become(95);
          for (int i = 0; i < 9; ++i) {
            s.at(kFault_ms + 5 * i);
            s.occupy(kFault_ms + 5 * i + 3.6);
          }
-         W::become(W::kOutsidePriority);
+         become(kOutsidePriority);
        },
        {.missed = 40}},
       {"core",

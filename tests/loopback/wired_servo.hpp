@@ -9,7 +9,6 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <pthread.h>
 
 #include <algorithm>
 #include <array>
@@ -23,7 +22,6 @@
 #include <numbers>
 #include <optional>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -31,6 +29,7 @@
 #include "rt/executive/executive.hpp"
 #include "rt/executive/monotonic_clock.hpp"
 #include "rt/station/station.hpp"
+#include "tests/loopback/beside.hpp"
 #include "tests/loopback/can_wires.hpp"
 #include "tests/loopback/falcon_on_usb.hpp"
 #include "tests/loopback/gpiod_wiring.hpp"
@@ -138,7 +137,6 @@ struct WiredTick {
 class WiredServo {
  public:
   static constexpr std::int64_t kPeriod_ns = 1'000'000;
-  static constexpr int kCorePriority = 80, kOutsidePriority = 90;
   static constexpr double kApproach_ms = 45, kInside_ms = 225, kPress_ms = 245, kTrembles_ms = 275;
   static constexpr double kPowerOffAfter_s = 0.1;
   static constexpr double kFalconAhead_m = 0.12;  // of the middle of its base: the origin of the hand
@@ -203,23 +201,10 @@ class WiredServo {
     rt::ExecutiveConfig executive_config;
     executive_config.start_ns = first_ns_;
     rt::Executive executive(clock, clock, executive_config, slots, station_->core.status);
-    std::thread world([&] {
-      become(kOutsidePriority);
-      outside();
-    });
-    become(kCorePriority);
-    std::atomic<bool> stop{false};
-    EXPECT_EQ(executive.run(stop), rt::Executive::Ended::by_slot);
-    const sched_param ordinary{0};
-    pthread_setschedparam(pthread_self(), SCHED_OTHER, &ordinary);
-    world.join();
+    run_beside(executive, outside);
   }
 
   // ---- for those outside ----
-  static void become(int priority) {
-    const sched_param param{priority};
-    ASSERT_EQ(pthread_setschedparam(pthread_self(), SCHED_FIFO, &param), 0);
-  }
   void at(double t_ms) { clock.sleep_until_ns(first_ns_ + std::llround(t_ms * 1e6)); }
   [[nodiscard]] double now_ms() const { return 1e-6 * static_cast<double>(clock.now_ns() - first_ns_); }
   // Nothing below runs meanwhile.
@@ -387,13 +372,7 @@ class WiredServo {
     seen.seen_ns = seen_ns_;
     seen.punctured_frames = std::exchange(punctured_frames_, 0);
 
-    rt::TickInfo now;
-    now.tick = tick.index;
-    now.release_ns = tick.release_ns;
-    now.start_ns = tick.wake_ns;
-    now.period_s = static_cast<double>(tick.period_ns) * 1e-9;
-    now.missed_in_window = tick.missed_in_window;
-    servo_->tick(now);
+    servo_->tick(tick_info(tick));
     missed = tick.missed;
 
     // The force that acts is one of those that were written last, to the steps of the motors.

@@ -271,10 +271,20 @@ void PassivityGuard::account(const GuardInput& in, const hal::Vec3& moved_m, con
   net_gain_ = std::min(net_gain_, most);
 }
 
+// The guard's own velocity at a new sample, and how fast the handle is braked.
+void PassivityGuard::follow_motion(const GuardInput& in, double between_s) NONBLOCKING {
+  const hal::Vec3 before_m_s = v_m_s_;
+  v_m_s_ = velocity_.step(in.position_m, between_s);
+  const double speed_m_s = before_m_s.norm();
+  braked_m_s2_ = !first_ && speed_m_s > 0
+                     ? std::max(0.0, before_m_s.dot(before_m_s - v_m_s_) / (speed_m_s * between_s))
+                     : 0;
+}
+
 // The damper beside the springs and against surplus, of a new sample. share: of the effects' damping that is
 // rendered.
 void PassivityGuard::damp(const GuardInput& in, double share) NONBLOCKING {
-  const hal::Vec3 v = velocity_.step(in.position_m, in.between_s > 0 ? in.between_s : since_s_);
+  const hal::Vec3& v = v_m_s_;
   const double bound = kDamperShare * (T_s_ / sample_.kept_s()) * own_stable_Ns_m_;
   const double stiffness = gain_ * std::max(in.stiffness_N_m, 0.0);
   const double compensation = std::min(kCompensation * stiffness * delay_s(), bound);
@@ -324,6 +334,7 @@ hal::Vec3 PassivityGuard::step(const GuardInput& in) NONBLOCKING {
     const double between_s = in.between_s > 0 ? in.between_s : since_s_;
     sample_.follow(between_s, params_.recover_s);
     gap_ = in.leaps || between_s > kSeen * regular_s();
+    follow_motion(in, between_s);
   }
   lower_gain(in);
   if (!first_) {
@@ -336,7 +347,10 @@ hal::Vec3 PassivityGuard::step(const GuardInput& in) NONBLOCKING {
   // Effects' damping that the device can render, and that a spring of this stiffness leaves in phase.
   const double rendered = gain_ * std::max(in.stiffness_N_m, 0.0);
   const double in_phase = rendered > in_phase_N_m_ ? square(in_phase_N_m_ / rendered) : 1;
-  const double most = kDamperShare * (T_s_ / sample_.kept_s()) * stable_Ns_m_ * in_phase;
+  // Of a handle that is braked hard only as much as the limit behind the guard lets go before the handle turns
+  // round: what is left of the force then pushes it on.
+  const double most = std::min(kDamperShare * (T_s_ / sample_.kept_s()) * stable_Ns_m_ * in_phase,
+                               slew_N_s_ / braked_m_s2_);
   const double share = in.damping_Ns_m > most ? most / in.damping_Ns_m : 1;
   if (in.fresh) {
     damp(in, share);

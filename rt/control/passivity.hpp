@@ -131,6 +131,7 @@ class PassivityGuard {
   void observe_tick(const GuardInput& in) NONBLOCKING;
   void observe_sample(const GuardInput& in) NONBLOCKING;
   void account(const GuardInput& in, const hal::Vec3& moved_m, const hal::Vec3& acted_N) NONBLOCKING;
+  void follow_motion(const GuardInput& in, double between_s) NONBLOCKING;
   void damp(const GuardInput& in, double share) NONBLOCKING;
 
   GuardParams params_;
@@ -171,7 +172,9 @@ class PassivityGuard {
   double net_gain_ = 1;      // for the net account
   double gain_ = 1;
   double active_gain_ = 1;
-  hal::Vec3 slow_m_s_ = hal::Vec3::Zero();  // velocity of the hand's own motion
+  hal::Vec3 v_m_s_ = hal::Vec3::Zero();     // of the handle
+  hal::Vec3 slow_m_s_ = hal::Vec3::Zero();  // of the hand's own motion
+  double braked_m_s2_ = 0;
   double taking_Ns_m_ = 0;                  // the damper's part against surplus
   double damper_Ns_m_ = 0;
   hal::Vec3 damper_N_ = hal::Vec3::Zero();

@@ -370,6 +370,38 @@ TEST(Passivity, no_damper_acts_on_the_velocity_of_a_leap) {
   }
 }
 
+// A handle of 75 g that is thrown at 1.2 m/s into a strong damper and then pulled back by an arm with 14 N:
+// it turns round within 7 ms, in which a limit of 300 N/s takes back 2 N of the 3.
+TEST(Passivity, a_damper_that_cannot_come_down_in_time_does_not_push_a_handle_that_turns_round) {
+  constexpr double T = 1e-3, kSlew_N_s = 300, kMass_kg = 0.075, kMost_N = 3, B = 4;
+  HandDevice device;
+  device.mass_kg = kMass_kg;
+  PassivityGuard guard({}, device, {}, 1 / T, kSlew_N_s);
+  double x = 0, v = -1.2, acts_N = 0, work_J = 0, least_J = 0, pushed_J = 0, largest_N = 0;
+  for (int k = 0; k < 60; ++k) {
+    const double arm_N = k < 15 ? 2.5 : 14.0;
+    for (int i = 0; i < 10; ++i) {
+      v += (acts_N + (k < 15 ? -arm_N : arm_N)) / kMass_kg * T / 10;
+      x += v * T / 10;
+      work_J += acts_N * v * T / 10;
+    }
+    least_J = std::min(least_J, work_J);
+    pushed_J = std::max(pushed_J, work_J - least_J);
+    largest_N = std::max(largest_N, acts_N);
+    GuardInput in;
+    in.elapsed_s = T;
+    in.position_m = {device.encoder_step_m * std::round(x / device.encoder_step_m), 0, 0};
+    in.damping_Ns_m = B;
+    in.dissipative_N = {-B * v, 0, 0};
+    const double asked_N = std::clamp(guard.step(in).x(), -kMost_N, kMost_N);
+    acts_N = std::clamp(asked_N, acts_N - kSlew_N_s * T, acts_N + kSlew_N_s * T);
+    guard.wrote({acts_N, 0, 0});
+  }
+  EXPECT_GT(largest_N, 2.5);
+  EXPECT_GT(v, 1);
+  EXPECT_LT(pushed_J, PassivityGuard::kAllowed_J);
+}
+
 // An active force of 0.5 N that always goes with a hand at up to 20 mm/s: 6 mW, of which it may give
 // kActive_W.
 TEST(Passivity, an_effect_that_may_give_energy_gives_no_more_than_it_is_allowed) {

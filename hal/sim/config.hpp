@@ -262,6 +262,7 @@ enum class Channel : std::uint8_t {
   membrane_velocity,
   contact,
   punctured,
+  inner_punctured,
   // commands
   enable,
   disable,
@@ -297,7 +298,7 @@ constexpr auto keys_of(const ScheduledFailure*) {
                   "axis", "following_error", "clutch", "inject", "next_cell", "enabled", "standstill",
                   "contact_a", "contact_b", "reset", "pulse", "open", "pressure", "force", "centre", "cell",
                   "radius", "entry", "gap", "dimple_depth", "dimple_width", "membrane_velocity", "contact",
-                  "punctured", "enable", "disable", "quick_stop", "gate"),
+                  "punctured", "inner_punctured", "enable", "disable", "quick_stop", "gate"),
       hal::choice("component", &ScheduledFailure::component, "x", "y", "z", "w", "all"),
       hal::real("size", &ScheduledFailure::size, -1e308, 1e308),
       hal::real("every_s", &ScheduledFailure::every_s, 0, 1e6));

@@ -114,10 +114,10 @@ static_assert(std::atomic<double>::is_always_lock_free);
     case Device::force_sensor:
       return channel == Channel::force;
     case Device::vision:
-      return is_one_of(channel,
-                       {Channel::position, Channel::axis, Channel::centre, Channel::cell, Channel::radius,
-                        Channel::entry, Channel::gap, Channel::dimple_depth, Channel::dimple_width,
-                        Channel::membrane_velocity, Channel::contact, Channel::punctured});
+      return is_one_of(channel, {Channel::position, Channel::axis, Channel::centre, Channel::cell,
+                                 Channel::radius, Channel::entry, Channel::gap, Channel::dimple_depth,
+                                 Channel::dimple_width, Channel::membrane_velocity, Channel::contact,
+                                 Channel::punctured, Channel::inner_punctured});
     case Device::camera:
       return false;
   }
@@ -132,9 +132,10 @@ static_assert(std::atomic<double>::is_always_lock_free);
 }
 
 [[nodiscard]] constexpr bool is_yes_or_no(Channel channel) NONBLOCKING {
-  return is_one_of(channel, {Channel::clutch, Channel::inject, Channel::next_cell, Channel::enabled,
-                             Channel::standstill, Channel::contact_a, Channel::contact_b, Channel::reset,
-                             Channel::pulse, Channel::open, Channel::contact, Channel::punctured});
+  return is_one_of(
+      channel, {Channel::clutch, Channel::inject, Channel::next_cell, Channel::enabled, Channel::standstill,
+                Channel::contact_a, Channel::contact_b, Channel::reset, Channel::pulse, Channel::open,
+                Channel::contact, Channel::punctured, Channel::inner_punctured});
 }
 
 // Which channels of a device a kind can concern; none at all for a kind that concerns the whole device.

@@ -8,7 +8,8 @@
 namespace punctum::rt {
 namespace {
 
-constexpr double kOutwardTau_s = 0.03;  // low-pass of the tip's speed
+// Low-pass of the tip's speed, 5 Hz: below the tremor of a hand (8 to 12 Hz), within the time of a picture.
+constexpr double kOutwardTau_s = 0.03;
 
 }  // namespace
 

@@ -8,13 +8,15 @@
 namespace punctum::rt {
 namespace {
 
-constexpr double kTiltSpeed_rad_s = 0.5;  // of the approach axis
-constexpr double kAtLimit_m = 0.05e-6;    // nearer to a limit than this, the needle is said to be held by it
+// Of the approach axis: the glass 0.2 mm behind the tip then goes 0.1 mm/s, no faster than it is led.
+constexpr double kTiltSpeed_rad_s = 0.5;
+// Nearer to a limit than this, the needle is said to be held by it: an encoder step of a fine stage.
+constexpr double kAtLimit_m = 0.05e-6;
 constexpr double kRounding_m = 1e-15;
 // Part of the acceleration that the approach to a target plans with; the rest is for what it did not foresee.
 constexpr double kPlanned = 0.8;
-constexpr double kFinestPart = 1e-3;
-constexpr double kSurface_m = 1e-9;  // of a region: the needle is at it when nearer
+constexpr double kFinestPart = 1e-3;  // of a way: a thousandth of 1 um is beyond every stage
+constexpr double kSurface_m = 1e-9;   // of a region: the needle is at it when nearer
 // Newton's steps double the digits; more are needed only where a way grazes an edge, and it may end early
 // there.
 constexpr int kSurfaceSteps = 12;

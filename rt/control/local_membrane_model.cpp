@@ -7,8 +7,8 @@ namespace punctum::rt {
 namespace {
 
 // What an observation may claim at most; beyond it the frame is not believed.
-constexpr double kFarthest_m = 5e-3;
-constexpr double kLargestCell_m = 2e-3;
+constexpr double kFarthest_m = 5e-3;     // no objective that shows a needle's tip has a field of 10 mm
+constexpr double kLargestCell_m = 2e-3;  // radius; an egg of Xenopus has 0.65 mm
 // An undeformed cell keeps its size. 10 % of R are 17 % of the law's force, as much as one pixel in the depth
 // and the width of the dimple makes, and far more than the fit of a circle scatters.
 constexpr double kRadiusPart = 0.1;
@@ -18,6 +18,8 @@ constexpr double kLetGo = 0.8;
 // Before the needle touches a cell it may be pushed by its holder; a cell that is further off than half its
 // radius is another one.
 constexpr double kStrayPart = 0.5;
+// Width of the dimple over sqrt(2 R w_d), which a sphere that is cut flat has: 0.45 at the cells of the
+// paper.
 constexpr double kScaleMin = 0.1;
 constexpr double kScaleMax = 3;
 // Stage minus picture: a change slower than this time constant is drift. After a disagreement, the two agree

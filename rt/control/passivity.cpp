@@ -59,6 +59,13 @@ constexpr double kLate = 1.5;
 constexpr double kLateReserve = 1.5;
 // Of kAllowed_J: so much the handle is left; at the other end as much is kept for what is on its way.
 constexpr double kUnnoticed = 0.25;
+// Of an account: once this much of it is used, the gain falls, so that it is gone only when all is used.
+constexpr double kFallsFrom = 0.5;
+// Of a damper's bound: within a twentieth it is at the bound, for it comes there as a low-pass does.
+constexpr double kAtBound = 0.05;
+// A single interval, however long, takes half of the stiffness at most: the next one shows what that was
+// worth.
+constexpr double kMostLowered = 0.5;
 // Rad of lag, 35 degrees: a damper with more of it hardly damps.
 constexpr double kPhase = 0.6;
 // Poles of the guard's velocity over the fastest oscillation, so that its lag there is within kPhase.
@@ -227,7 +234,7 @@ void PassivityGuard::observe_sample(const GuardInput& in) NONBLOCKING {
   account(in, moved_m, acted_N);
 
   active_J_ = std::max(0.0, active_J_ + active_J - kActive_W * since_s_);
-  active_gain_ = std::clamp(2 * (1 - active_J_ / kActive_J), 0.0, 1.0);
+  active_gain_ = std::clamp((1 - active_J_ / kActive_J) / kFallsFrom, 0.0, 1.0);
 }
 
 // The net account. Between two steps of a coordinate the mean force acted on the way between the places where
@@ -260,7 +267,7 @@ void PassivityGuard::account(const GuardInput& in, const hal::Vec3& moved_m, con
   const double falls_s = written_[newest_].passive_N.norm() / slew_N_s_;
   const double coming_s = sample_.kept_s() + device_.delay_ticks * tick_.kept_s() + 0.5 * falls_s;
   const double soon_J = net_J_ - std::max(given_W, 0.0) * coming_s;
-  const double most = std::clamp(2 * (1 - kUnnoticed + soon_J / kAllowed_J), 0.0, 1.0);
+  const double most = std::clamp((1 - kUnnoticed + soon_J / kAllowed_J) / kFallsFrom, 0.0, 1.0);
   approach(net_gain_, 1.0, since_s_, params_.recover_s);
   // A handle that presses in meets the passive stiffness from where it is: no effect falls away under it.
   const double wanted_N = in.stored_N().norm();
@@ -301,10 +308,10 @@ void PassivityGuard::damp(const GuardInput& in, double share) NONBLOCKING {
 
   // Where the damper cannot suffice, stiffness falls. A late needle leaves surplus at a handle that rests:
   // the stage has paid for it, and nothing is given back yet.
-  const bool at_its_bound = wanted > room && taking_Ns_m_ >= 0.95 * (room - 0.05 * bound);
+  const bool at_its_bound = wanted > room && taking_Ns_m_ >= (1 - kAtBound) * (room - kAtBound * bound);
   const bool gives = given_J_ > real_J(in);
   if (surplus_J_ > real_J(in) && at_its_bound && gives) {
-    surplus_gain_ *= 1 - std::min(0.5, since_s_ / kLower_s);
+    surplus_gain_ *= 1 - std::min(kMostLowered, since_s_ / kLower_s);
   } else {
     approach(surplus_gain_, 1.0, since_s_, params_.recover_s);
   }
@@ -347,10 +354,10 @@ hal::Vec3 PassivityGuard::step(const GuardInput& in) NONBLOCKING {
   // Effects' damping that the device can render, and that a spring of this stiffness leaves in phase.
   const double rendered = gain_ * std::max(in.stiffness_N_m, 0.0);
   const double in_phase = rendered > in_phase_N_m_ ? square(in_phase_N_m_ / rendered) : 1;
-  // Of a handle that is braked hard only as much as the limit behind the guard lets go before the handle turns
-  // round: what is left of the force then pushes it on.
-  const double most = std::min(kDamperShare * (T_s_ / sample_.kept_s()) * stable_Ns_m_ * in_phase,
-                               slew_N_s_ / braked_m_s2_);
+  // Of a handle that is braked hard only as much as the limit behind the guard lets go before the handle
+  // turns round: what is left of the force then pushes it on.
+  const double most =
+      std::min(kDamperShare * (T_s_ / sample_.kept_s()) * stable_Ns_m_ * in_phase, slew_N_s_ / braked_m_s2_);
   const double share = in.damping_Ns_m > most ? most / in.damping_Ns_m : 1;
   if (in.fresh) {
     damp(in, share);

@@ -7,8 +7,11 @@
 namespace punctum::rt {
 namespace {
 
-constexpr double kFadeOut_s = 0.05;     // when the clutch is pressed or the run ends
-constexpr double kStiffnessKept = 0.9;  // of the commanded one; less raises an alarm
+// When the clutch is pressed or the run ends: soon, and for 3 N a fifth of the rate at which a force may
+// change.
+constexpr double kFadeOut_s = 0.05;
+// Of the commanded stiffness; less raises an alarm. A finger tells two springs apart by a tenth or more.
+constexpr double kStiffnessKept = 0.9;
 
 [[nodiscard]] EffectSetup setup_of(const ServoConfig& config) NONBLOCKING {
   return {.force_scale = config.mapping.force_scale, .force_delay_ticks = config.device.delay_ticks};

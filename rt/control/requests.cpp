@@ -5,7 +5,8 @@
 namespace punctum::rt {
 namespace {
 
-constexpr double kRampRate_1_s = 2;  // of the whole range: half a second from one end to the other
+// Of the whole range: half a second from one end to the other, so that a hand can follow the change.
+constexpr double kRampRate_1_s = 2;
 
 void approach(double& value, double target, double most) NONBLOCKING {
   value += std::clamp(target - value, -most, most);

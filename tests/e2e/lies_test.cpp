@@ -404,6 +404,8 @@ std::vector<Row> rows() {
              {"gap_offset_20um", "vision", "offset", 5, "gap", "size=20e-6"},
              {"punctured_too_early", "vision", "set", 5.6, "punctured", "size=1"},
              {"never_punctured", "vision", "set", 0, "punctured", "size=0"},
+             {"inner_punctured_too_early", "vision", "set", 5.6, "inner_punctured", "size=1"},
+             {"inner_never_punctured", "vision", "set", 0, "inner_punctured", "size=0"},
              {"never_contact", "vision", "set", 0, "contact", "size=0"},
              {"always_contact", "vision", "set", 0, "contact", "size=1"},
              {"dimple_huge", "vision", "set", 6, "dimple_depth", "size=1e308"},

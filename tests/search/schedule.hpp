@@ -154,6 +154,7 @@ inline constexpr std::array<Draw, kLies> kDraws{{
     {Lie::pulse, 4, 1, 1, false, 1, 3},
     {Lie::estop_no_data, 4, 1, 1, false, 1, 900},
     {Lie::estop_gone, 4, 1, 1, false, 1, 900},
+    {Lie::estop_time, 4, 1e-4, 10, true, 1, 300},
     {Lie::reset, 4, 1, 1, false, 1, 300},
     {Lie::vision_gone, 5, 1, 1, false, 40, 1200},
     {Lie::vision_late, 5, 1e-3, 1, false, 40, 800},
@@ -162,6 +163,7 @@ inline constexpr std::array<Draw, kLies> kDraws{{
     {Lie::vision_recedes, 5, 1e-6, 300e-6, true, 40, 1500},
     {Lie::vision_grows, 5, 1e-6, 300e-6, true, 40, 1500},
     {Lie::false_puncture, 5, 1, 1, false, 1, 400},
+    {Lie::false_inner_puncture, 5, 1, 1, false, 1, 400},
     {Lie::false_contact, 5, 1, 1, false, 1, 400},
     {Lie::no_puncture, 5, 1, 1, false, 40, 1000},
     {Lie::vision_future, 5, 1e-3, 10, false, 1, 400},
@@ -171,9 +173,12 @@ inline constexpr std::array<Draw, kLies> kDraws{{
     {Lie::vision_absurd, 5, 1e-3, 1e300, true, 1, 400},
     {Lie::injector_stuck_open, 6, 1, 1, false, 10, 1000},
     {Lie::injector_stuck_shut, 6, 1, 1, false, 10, 1000},
+    {Lie::injector_time, 6, 1e-4, 10, true, 1, 300},
     {Lie::vacuum_lost, 6, 1, 1, false, 10, 500},
-    {Lie::sensor_pushed, 6, 1e-6, 1e-3, true, 1, 500},
+    {Lie::vacuum_time, 6, 1e-4, 10, true, 1, 300},
+    {Lie::sensor_pushed, 6, 1e-6, 1e300, true, 1, 500},
     {Lie::sensor_nan, 6, 1, 1, false, 1, 300},
+    {Lie::sensor_time, 6, 1e-4, 10, true, 1, 300},
     {Lie::stall, 7, 2e-3, 0.3, false, 1, 1},
     {Lie::start_late, 7, 1e-5, 0.05, false, 1, 100},
     {Lie::clock_back, 7, 1e-5, 0.5, false, 1, 10},
@@ -201,7 +206,7 @@ inline Schedule random_schedule(std::uint64_t seed, std::uint64_t number) {
   Schedule s;
   s.from = static_cast<From>(random.below(static_cast<int>(kFroms)));
   const double setup = random.uniform();
-  s.setup = setup < 0.2 ? 1 : setup < 0.4 ? 2 : 0;
+  s.setup = setup < 0.2 ? 1 : setup < 0.4 ? 2 : setup < 0.55 ? 3 : 0;
   s.events.reserve(16);
   s.ticks = random.duration(300, 2000);
   // Most schedules keep to two or three groups: what is combined is then combined often.
@@ -323,7 +328,9 @@ struct Coverage {
 class Search {
  public:
   explicit Search(int setup = 0)
-      : station_(searched_config(setup)), rate_Hz_(searched_config(setup).rate_Hz) {
+      : station_(searched_config(setup)),
+        rate_Hz_(searched_config(setup).rate_Hz),
+        inner_membrane_(searched_config(setup).inner_membrane) {
     prepare();
   }
 
@@ -494,6 +501,10 @@ class Search {
     rest(0.5);
     expect(Phase::puncture);
     keep(From::inside);
+    if (inner_membrane_) {
+      go(-10e-6, 12e-6, Phase::clear);
+      rest(0.5);
+    }
     const Event pressed{100, 60, Lie::injects, 1, 0};
     rest(0.8, {&pressed, 1});
     expect(Phase::injection);
@@ -524,6 +535,7 @@ class Search {
 
   LyingStation station_;
   double rate_Hz_;
+  bool inner_membrane_;
   std::array<std::optional<LyingStation::State>, kFroms> states_;
 };
 

@@ -72,6 +72,7 @@ enum class Invariant : std::uint8_t {
   phase_order,
   puncture_confirmed,
   over_at_rest,
+  injects_inside,
   count
 };
 inline constexpr std::size_t kInvariants = static_cast<std::size_t>(Invariant::count);
@@ -128,25 +129,10 @@ inline constexpr std::array<InvariantName, kInvariants> kInvariantNames{{
     {"P1", "phase_order"},
     {"P2", "puncture_confirmed"},
     {"P3", "over_at_rest"},
+    {"P4", "injects_inside"},
 }};
 [[nodiscard]] constexpr const InvariantName& name(Invariant i) {
   return kInvariantNames[static_cast<std::size_t>(i)];
-}
-
-// A limit that the scene may have, or what is asked for without it.
-template <class Limits>
-[[nodiscard]] double lateral_limit_m(const Limits& limits) {
-  if constexpr (requires { limits.lateral_m; }) {
-    return limits.lateral_m;
-  }
-  return 5e-6;
-}
-template <class Limits>
-[[nodiscard]] double jerk_limit_m_s3(const Limits& limits) {
-  if constexpr (requires { limits.stage_jerk_m_s3; }) {
-    return limits.stage_jerk_m_s3;
-  }
-  return std::numeric_limits<double>::infinity();
 }
 
 // How far the needle's glass, its tip there, is from the floor and from the holder of a scene, less the
@@ -199,8 +185,7 @@ struct Bounds {
   double clear_known_m = 3e-6;  // nobody outside knows closer when the core takes the needle for clear
   double remounted = 0.5;       // a needle that is turned by this (rad) was mounted otherwise
   double truth_m = 3e-6;        // the core knows the membrane's place to this
-  double lateral_m = lateral_limit_m(c.limits) + 2e-6;  // the tip follows the set-point late
-  double jerk_m_s3 = jerk_limit_m_s3(c.limits);
+  double lateral_m = c.limits.lateral_m + 2e-6;  // the tip follows the set-point late
   double shortest_opening_s = 0.02;
   double brake_s = 0.03;      // v/a, and two periods of the slowest check
   double relay_s = 0.02;      // beyond the stop's own time
@@ -245,7 +230,7 @@ struct Seen {
 
   // Vision: exposure of the newest observation that was delivered, of those that a core may believe.
   std::int64_t seen_ns = 0;
-  int punctured_frames = 0;  // delivered with this tick
+  int punctured_frames = 0, inner_punctured_frames = 0;  // delivered with this tick
   bool gate = false;
   bool injector_stuck = false;
   bool stop_commanded = false;
@@ -362,15 +347,18 @@ class Invariants {
       stage_known_ = true;
     }
     stage_new_ = stage_silent_s_ < 0.5 * s.elapsed_s;
-    if (s.estop_status == hal::Status::ok) {
-      estop_silent_s_ = 0;
+    if (s.estop_status == hal::Status::ok && s.estop.sample_ns > estop_sample_ns_) {
+      estop_sample_ns_ = s.estop.sample_ns;
+      estop_silent_s_ =
+          std::min(estop_silent_s_, std::max(0.0, 1e-9 * static_cast<double>(s.now_ns - s.estop.sample_ns)));
       // A press that began in this stop with the contacts closed, and was held with them closed since.
       if (s.estop.reset_pressed && !reset_ && !was_running_) {
         reset_edge_ = true;
       }
-      reset_edge_ = reset_edge_ && s.estop.reset_pressed && !open(s.estop) && !was_running_;
+      reset_edge_ = reset_edge_ && s.estop.reset_pressed;
       reset_ = s.estop.reset_pressed;
     }
+    reset_edge_ = reset_edge_ && !was_running_ && !(s.estop_status == hal::Status::ok && open(s.estop));
     unseen_s_ = 1e-9 * static_cast<double>(s.now_ns - s.seen_ns);
     blind_s_ = s.seen_ns > 0 && unseen_s_ > b_.stale_s + 2 * b_.nominal_s ? blind_s_ + dt : 0;
   }
@@ -567,8 +555,10 @@ class Invariants {
     const bool clutched = (buttons_ & hal::kButtonClutch) != 0 || (buttons_were_ & hal::kButtonClutch) != 0;
     const Vec3 hand_way = world_from_hand(s.hand_true_m - hand_m_) / least_scale_;
     const bool coupled = running && was_running_ && !clutched;
+    // Once the clutch has lasted, the needle goes no way until hand and needle are coupled again.
+    const bool settled = clutched_s_ > b_.filter_s;
     clutched_s_ = clutched ? clutched_s_ + s.elapsed_s : 0;
-    if (!running || clutched_s_ > b_.filter_s) {
+    if (!running || (!settled && clutched_s_ > b_.filter_s)) {
       settle_paths();
     } else if (known_ && !clutched) {
       hand_path_m_ += hand_way.norm();
@@ -645,7 +635,7 @@ class Invariants {
             a.setConstant(std::numeric_limits<double>::infinity());
           }
           if (regular_ >= 3 && a.norm() < most && a_m_s2_.norm() < most && length > 0 && way_m_.norm() > 0) {
-            at_most(I::jerk_bounded, (a - a_m_s2_).norm() / b_.nominal_s, b_.jerk_m_s3 * 1.1);
+            at_most(I::jerk_bounded, (a - a_m_s2_).norm() / b_.nominal_s, b_.c.limits.stage_jerk_m_s3 * 1.1);
           }
           a_m_s2_ = a;
         } else {
@@ -833,9 +823,13 @@ class Invariants {
       must(I::over_at_rest, s.asked_N.norm() == 0 && !s.gate);
     }
     if (t.phase == Phase::free || t.phase == Phase::clear) {
-      punctured_frames_ = 0;
+      punctured_frames_ = inner_punctured_frames_ = 0;
     }
     punctured_frames_ += s.punctured_frames;
+    inner_punctured_frames_ += s.inner_punctured_frames;
+    if (b_.c.inner_membrane && known_ && t.phase == Phase::injection && phase_ != Phase::injection) {
+      at_most(I::injects_inside, b_.punctured_frames - inner_punctured_frames_, 0);
+    }
     if (known_ && t.phase == Phase::puncture && phase_ != Phase::puncture) {
       at_most(I::puncture_confirmed, b_.punctured_frames - punctured_frames_, 0);
     }
@@ -874,7 +868,7 @@ class Invariants {
 
   // What was told.
   bool hand_known_ = false, stage_known_ = false, stage_new_ = false;
-  std::int64_t hand_sample_ns_ = -1, stage_sample_ns_ = -1;
+  std::int64_t hand_sample_ns_ = -1, stage_sample_ns_ = -1, estop_sample_ns_ = -1;
   double told_s_ = 0;  // of this tick, as the servo may count it
   double hand_silent_s_ = 0, stage_silent_s_ = 0, estop_silent_s_ = 0;
   std::uint32_t buttons_ = 0, buttons_were_ = 0;
@@ -926,7 +920,7 @@ class Invariants {
   Vec3 left_m_ = Vec3::Zero();                    // where the needle was told to be when its power went
   double stage_lost_s_ = -1, estop_lost_s_ = -1;  // < 0: not
   int still_ticks_ = 0;
-  int punctured_frames_ = 0;
+  int punctured_frames_ = 0, inner_punctured_frames_ = 0;
 };
 
 }  // namespace punctum::rt::test

@@ -82,6 +82,7 @@ enum class Lie : std::uint8_t {
   pulse,
   estop_no_data,
   estop_gone,
+  estop_time,  // s, added to the sample's time
   reset,
   // Vision.
   vision_gone,
@@ -91,8 +92,9 @@ enum class Lie : std::uint8_t {
   vision_recedes,  // m/s: the cell
   vision_grows,    // m/s: its radius
   false_puncture,
+  false_inner_puncture,
   false_contact,
-  no_puncture,
+  no_puncture,    // of either membrane
   vision_future,  // s
   vision_past,    // s
   vision_frozen,  // the same picture with fresh times
@@ -101,9 +103,12 @@ enum class Lie : std::uint8_t {
   // Other devices.
   injector_stuck_open,
   injector_stuck_shut,
+  injector_time,  // s, added to the sample's time
   vacuum_lost,
+  vacuum_time,    // s
   sensor_pushed,  // N
   sensor_nan,
+  sensor_time,  // s
   // The clock.
   stall,        // s, one tick afterwards
   start_late,   // s
@@ -167,6 +172,7 @@ inline constexpr std::array<const char*, kLies> kLieNames{"moves",
                                                           "pulse",
                                                           "estop_no_data",
                                                           "estop_gone",
+                                                          "estop_time",
                                                           "reset",
                                                           "vision_gone",
                                                           "vision_late",
@@ -175,6 +181,7 @@ inline constexpr std::array<const char*, kLies> kLieNames{"moves",
                                                           "vision_recedes",
                                                           "vision_grows",
                                                           "false_puncture",
+                                                          "false_inner_puncture",
                                                           "false_contact",
                                                           "no_puncture",
                                                           "vision_future",
@@ -184,9 +191,12 @@ inline constexpr std::array<const char*, kLies> kLieNames{"moves",
                                                           "vision_absurd",
                                                           "injector_stuck_open",
                                                           "injector_stuck_shut",
+                                                          "injector_time",
                                                           "vacuum_lost",
+                                                          "vacuum_time",
                                                           "sensor_pushed",
                                                           "sensor_nan",
+                                                          "sensor_time",
                                                           "stall",
                                                           "start_late",
                                                           "clock_back",
@@ -208,7 +218,8 @@ struct Event {
 
 // Icsi with everything that has a place in the servo, and cells without end. Set-up 1: twice as fast, with
 // real actuators, an enabling device and a force sensor. Set-up 2: a dish floor and a holding pipette that
-// the hand reaches, beside the way to the cell, and a position scale that commands may change.
+// the hand reaches, beside the way to the cell, and a position scale that commands may change. Set-up 3: a
+// cell with an inner membrane, for which an injection waits.
 inline ServoConfig searched_config(int setup = 0) {
   ServoConfig c;
   c.membrane.emplace();
@@ -228,6 +239,7 @@ inline ServoConfig searched_config(int setup = 0) {
     c.enabling.emplace();
     c.force_sensor = true;
   }
+  c.inner_membrane = setup == 3;
   if (setup == 2) {
     c.forbidden.emplace();
     c.forbidden->clearance_m = 2e-6;
@@ -293,7 +305,7 @@ class LyingStation {
     hal::EstopState chain;
     // Cell and microscope.
     Vec3 centre{-40e-6, 0, 0};
-    bool punctured = false;
+    bool punctured = false, inner_punctured = false;
     Vec3 recession = Vec3::Zero();
     double growth_m = 0;
     Observation shown;
@@ -315,7 +327,7 @@ class LyingStation {
   std::function<hal::Status(hal::ForceState&)> tell_sensor;
   int frame_divisor = 1;  // only every so many pictures is seen
 
-  static constexpr double kR_m = 60e-6, kPuncture_m = 14e-6;
+  static constexpr double kR_m = 60e-6, kPuncture_m = 14e-6, kInnerPuncture_m = 22e-6;
   const Vec3 registration{3e-6, -2e-6, 0};
 
   [[nodiscard]] double gap_m() const {
@@ -427,6 +439,15 @@ class LyingStation {
     return on(lie) && truth.tick % static_cast<std::uint64_t>(std::clamp(value(lie), 1.0, 64.0)) != 0;
   }
 
+  // Of a reading that is taken now.
+  [[nodiscard]] std::int64_t at_false_time(Lie lie) const {
+    return truth.now + std::llround(1e9 * value(lie));
+  }
+  // No core needs to believe a reading from the future.
+  [[nodiscard]] bool ahead(std::int64_t sample_ns) const {
+    return sample_ns > std::max(truth.now, truth.latest_start) + 1'000'000;
+  }
+
   // ---- the truth ----
   void step_hand(int k, std::span<const Event> events) {
     Truth& w = truth;
@@ -498,6 +519,7 @@ class LyingStation {
     }
     const double gap = gap_m();
     w.punctured = gap <= 10e-6 && (w.punctured || -gap > kPuncture_m);
+    w.inner_punctured = w.punctured && (w.inner_punctured || -gap > kInnerPuncture_m);
     if (on(Lie::vision_recedes)) {
       w.recession.x() -= value(Lie::vision_recedes) * dt_s_;
     }
@@ -514,6 +536,9 @@ class LyingStation {
     Observation o;
     const double gap = gap_m();
     o.flags = Observation::tip_ok | Observation::outer_ok | (w.punctured ? Observation::punctured : 0U);
+    if (config_.inner_membrane) {
+      o.flags |= Observation::inner_ok | (w.inner_punctured ? Observation::inner_punctured : 0U);
+    }
     const Vec3 off = along(Lie::vision_jumps) + w.recession;
     const double R = kR_m + w.growth_m;
     for (int i = 0; i < 2; ++i) {
@@ -532,11 +557,14 @@ class LyingStation {
     if (on(Lie::false_puncture)) {
       o.flags |= Observation::punctured;
     }
+    if (on(Lie::false_inner_puncture)) {
+      o.flags |= Observation::inner_punctured;
+    }
     if (on(Lie::false_contact)) {
       o.flags |= Observation::contact;
     }
     if (on(Lie::no_puncture)) {
-      o.flags &= ~static_cast<std::uint32_t>(Observation::punctured);
+      o.flags &= ~(std::uint32_t{Observation::punctured} | std::uint32_t{Observation::inner_punctured});
     }
     const Vec3 shift = along(Lie::picture_shifts);
     for (int i = 0; i < 2; ++i) {
@@ -578,6 +606,7 @@ class LyingStation {
           w.seen_ns = std::max(w.seen_ns, o.exposure_ns);
         }
         punctured_frames_ += o.has(Observation::punctured) ? 1 : 0;
+        inner_punctured_frames_ += o.has(Observation::inner_punctured) ? 1 : 0;
       }
       station_->observation.slot.push(o);
       --w.waiting;
@@ -626,6 +655,7 @@ class LyingStation {
     seen_.stage_moves = w.speed.norm() > 15e-6;
     seen_.seen_ns = w.seen_ns;
     seen_.punctured_frames = std::exchange(punctured_frames_, 0);
+    seen_.inner_punctured_frames = std::exchange(inner_punctured_frames_, 0);
     seen_.hand_hidden = on(Lie::hand_stuck);
     seen_.hand_false_m = on(Lie::hand_absurd) ? 1 : w.told_false_m;
     seen_.hand_status = seen_.stage_status = seen_.estop_status = hal::Status::no_data;
@@ -687,8 +717,7 @@ class LyingStation {
     }
     out = told;
     seen_.hand = told;
-    const std::int64_t now = std::max(truth.now, truth.latest_start);
-    if (on(Lie::hand_nan) || on(Lie::hand_absurd) || told.sample_ns > now + 1'000'000) {
+    if (on(Lie::hand_nan) || on(Lie::hand_absurd) || ahead(told.sample_ns)) {
       seen_.hand_status = hal::Status::fault;  // no core needs to believe it
     }
     return hal::Status::ok;
@@ -778,12 +807,15 @@ class LyingStation {
         out.contact_b_closed = !at.on(Lie::contact_b) && !at.on(Lie::contacts);
         out.reset_pressed = at.on(Lie::reset);
         out.pulse_seen = at.on(Lie::pulse);
-        out.sample_ns = at.truth.now;
+        out.sample_ns = at.at_false_time(Lie::estop_time);
         status = at.tell_estop ? at.tell_estop(out) : status;
       }
       at.seen_.estop_status = status;
       if (status == hal::Status::ok) {
         at.seen_.estop = out;
+      }
+      if (at.ahead(out.sample_ns)) {
+        at.seen_.estop_status = hal::Status::fault;
       }
       return status;
     }
@@ -796,7 +828,7 @@ class LyingStation {
     void gate(bool open) noexcept override { at.truth.gate = open; }
     hal::Status read(hal::InjectorState& out) noexcept override {
       out.open = (at.truth.gate || at.on(Lie::injector_stuck_open)) && !at.on(Lie::injector_stuck_shut);
-      out.sample_ns = at.truth.now;
+      out.sample_ns = at.at_false_time(Lie::injector_time);
       return at.tell_injector ? at.tell_injector(out) : hal::Status::ok;
     }
   };
@@ -805,7 +837,7 @@ class LyingStation {
     LyingStation& at;
     hal::Status read(hal::VacuumState& out) noexcept override {
       out.pressure_Pa = (at.on(Lie::vacuum_lost) ? 50 : 600) + 0.1 * (at.truth.gauge++ % 2);
-      out.sample_ns = at.truth.now;
+      out.sample_ns = at.at_false_time(Lie::vacuum_time);
       return at.tell_vacuum ? at.tell_vacuum(out) : hal::Status::ok;
     }
   };
@@ -816,7 +848,7 @@ class LyingStation {
     hal::Status read(hal::ForceState& out) noexcept override {
       out.axial_force_N = at.on(Lie::sensor_nan) ? std::numeric_limits<double>::quiet_NaN()
                                                  : at.value(Lie::sensor_pushed) + 1e-9 * (at.truth.gauge % 2);
-      out.sample_ns = at.truth.now;
+      out.sample_ns = at.at_false_time(Lie::sensor_time);
       return at.tell_sensor ? at.tell_sensor(out) : hal::Status::ok;
     }
   };
@@ -835,7 +867,7 @@ class LyingStation {
   alignas(Servo) std::array<std::byte, sizeof(Servo)> servo_bytes_;
   Invariants checker_;
   Seen seen_;
-  int punctured_frames_ = 0;
+  int punctured_frames_ = 0, inner_punctured_frames_ = 0;
   std::array<const Event*, kLies> active_{};
   std::array<bool, kLies> begins_{};
 };

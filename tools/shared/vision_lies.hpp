@@ -60,6 +60,9 @@ namespace punctum::rt {
     case sim::Channel::punctured:
       bit(Observation::punctured);
       break;
+    case sim::Channel::inner_punctured:
+      bit(Observation::inner_punctured);
+      break;
     default:
       break;
   }

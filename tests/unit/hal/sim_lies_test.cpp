@@ -502,6 +502,14 @@ TEST(LiesOfVision, one_frame_says_punctured) {
   }
 }
 
+TEST(LiesOfVision, one_frame_says_that_the_inner_membrane_is_through) {
+  const auto all = vision_says({Failure::glitch, Channel::inner_punctured});
+  for (std::size_t i = 0; i < 20; ++i) {
+    EXPECT_EQ(all[i]->has(rt::Observation::inner_punctured), i == 5);
+    EXPECT_FALSE(all[i]->has(rt::Observation::punctured));
+  }
+}
+
 TEST(LiesOfVision, contact_flickers) {
   const auto all = vision_says({Failure::flicker, Channel::contact});
   int contacts = 0;

@@ -176,8 +176,9 @@ StageLimits::Checked StageLimits::check_cell(const hal::Vec3& wanted_m, const St
     return out;
   }
   const double depth_here = std::max(m.depth_m(here), 0.0);
+  const double at_most_m = std::min(limits_.penetration_depth_m, c.depth_limit_m);
   const auto room = [&](const hal::Vec3& p) {
-    return std::max(std::min(limits_.penetration_depth_m, m.chord_m(p) - limits_.far_wall_m), 0.0);
+    return std::max(std::min(at_most_m, m.chord_m(p) - limits_.far_wall_m), 0.0);
   };
   const double excess = std::max(depth_here - room(here), 0.0);
   double deepest = room(out.point_m) + excess;

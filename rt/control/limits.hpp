@@ -68,6 +68,7 @@ struct StageConstraint {
   bool frozen = false;           // no motion at all
   // The needle goes no further along the axis than this, whatever vision says of the membrane.
   double inward_limit_m = std::numeric_limits<double>::infinity();
+  double depth_limit_m = std::numeric_limits<double>::infinity();  // past the membrane, below the scene's
   std::optional<FixtureFrame> insertion;  // the needle is in the cell, along this line: not sideways
 };
 

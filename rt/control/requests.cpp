@@ -17,10 +17,13 @@ void approach(double& value, double target, double most) NONBLOCKING {
 Requests::Requests(const ServoConfig& config, Station& station) NONBLOCKING
     : station_(station),
       most_hand_force_N_(config.limits.hand_force_N),
+      most_depth_m_(config.limits.penetration_depth_m),
       least_position_scale_(config.mapping.least_position_scale()),
       most_position_scale_(config.mapping.most_position_scale()),
-      hand_force_target_N_(config.limits.hand_force_N) {
+      hand_force_target_N_(config.limits.hand_force_N),
+      depth_target_m_(config.limits.penetration_depth_m) {
   requested_.hand_force_N = config.limits.hand_force_N;
+  requested_.depth_limit_m = config.limits.penetration_depth_m;
   requested_.position_scale = config.mapping.position_scale;
 #define PUNCTUM_EFFECT(name, Class) effect_exists_[effect_##name] = config.name.has_value();
   PUNCTUM_EFFECTS(PUNCTUM_EFFECT)
@@ -54,6 +57,7 @@ void Requests::approach_targets(double dt_s) NONBLOCKING {
     approach(requested_.effect_gain[i], effect_gain_target_[i], most);
   }
   approach(requested_.hand_force_N, hand_force_target_N_, most * most_hand_force_N_);
+  approach(requested_.depth_limit_m, depth_target_m_, most * most_depth_m_);
 }
 
 bool Requests::obey(const Command& command, CommandKinds role) NONBLOCKING {
@@ -91,6 +95,12 @@ bool Requests::obey(const Command& command, CommandKinds role) NONBLOCKING {
         return false;
       }
       requested_.position_scale = command.value;
+      return true;
+    case Command::depth_limit:
+      if (!(command.value > 0 && command.value <= most_depth_m_)) {
+        return false;
+      }
+      depth_target_m_ = command.value;
       return true;
     default:
       return false;

@@ -28,6 +28,7 @@ struct Requested {
   double force_scale = 1;                // 0 .. 1, ramped
   EffectGains effect_gain = kFullGains;  // 0 .. 1, ramped
   double hand_force_N = 0;               // limit, ramped; never above the scene's
+  double depth_limit_m = 0;              // past the membrane, ramped; never above the scene's
   double position_scale = 500;           // taken over while hand and needle are uncoupled
   std::uint64_t refused = 0;             // commands out of range, or not of their writer's role
   std::array<TakenCommand, kCommandsPerTick * kCommandWriterCount> taken{};  // on this tick
@@ -53,12 +54,14 @@ class Requests {
   Station& station_;
   std::array<bool, effect_count> effect_exists_{};
   double most_hand_force_N_;
+  double most_depth_m_;
   double least_position_scale_;
   double most_position_scale_;
   Requested requested_;
   double force_scale_target_ = 1;
   EffectGains effect_gain_target_ = kFullGains;
   double hand_force_target_N_;
+  double depth_target_m_;
 };
 
 }  // namespace punctum::rt

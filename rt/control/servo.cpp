@@ -160,6 +160,7 @@ StageConstraint Servo::constraint(const CellFacts& cell, const TaskFacts& task, 
   c.withdrawal_only = !cell.vision_fresh || requested.end;
   c.no_deeper = tip_force_soft;
   c.inward_limit_m = cell.inward_limit_m;
+  c.depth_limit_m = requested.depth_limit_m;
   if (task.inside_cell && !task.outside()) {  // without phases nobody knows where the needle went in
     c.insertion = task.insertion;
   }

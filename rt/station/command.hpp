@@ -21,17 +21,19 @@ struct Command {
     // value: hand metres per needle metre, within the scene's bounds; from when hand and needle are next
     // uncoupled on, by clutch or stop
     position_scale,
+    depth_limit,  // value: metres past the membrane, more than 0, up to the scene's penetration depth
   };
   std::uint64_t kind = none;
   double value = 0;
   std::uint64_t target = 0;
 };
-inline constexpr int kCommandKinds = 7;
+inline constexpr int kCommandKinds = 8;
 
 // As report.json has it.
 [[nodiscard]] constexpr const char* name(Command::Kind kind) NONBLOCKING {
-  constexpr const char* names[] = {
-      "none", "stop", "end", "force_scale", "effect_gain", "hand_force_limit", "position_scale"};
+  constexpr const char* names[] = {"none",           "stop",        "end",
+                                   "force_scale",    "effect_gain", "hand_force_limit",
+                                   "position_scale", "depth_limit"};
   static_assert(sizeof names == kCommandKinds * sizeof names[0]);
   return names[static_cast<int>(kind)];
 }
@@ -56,7 +58,7 @@ inline constexpr CommandWriter kParent = {"parent", kinds(Command::stop, Command
 // Whoever operates the running station from outside.
 inline constexpr CommandWriter kConsole = {
     "console", kinds(Command::stop, Command::end, Command::force_scale, Command::effect_gain,
-                     Command::hand_force_limit, Command::position_scale)};
+                     Command::hand_force_limit, Command::position_scale, Command::depth_limit)};
 
 // Everybody who may ask, in the order in which the core takes their commands. The place in this table is the
 // writer's number in an event.

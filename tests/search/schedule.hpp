@@ -188,6 +188,7 @@ inline constexpr std::array<Draw, kLies> kDraws{{
     {Lie::command_scale, 8, 1e-3, 10, true, 1, 1},
     {Lie::command_odd, 8, 1, 1, false, 1, 1},
     {Lie::command_position_scale, 8, 150, 1500, false, 1, 1},
+    {Lie::command_depth_limit, 8, 1e-7, 1e-3, true, 1, 1},
 }};
 static_assert([] {
   for (std::size_t i = 0; i < kLies; ++i) {

@@ -120,6 +120,7 @@ enum class Lie : std::uint8_t {
   command_scale,
   command_odd,
   command_position_scale,  // hand metres per needle metre
+  command_depth_limit,     // m
   count
 };
 inline constexpr std::size_t kLies = static_cast<std::size_t>(Lie::count);
@@ -205,7 +206,8 @@ inline constexpr std::array<const char*, kLies> kLieNames{"moves",
                                                           "command_end",
                                                           "command_scale",
                                                           "command_odd",
-                                                          "command_position_scale"};
+                                                          "command_position_scale",
+                                                          "command_depth_limit"};
 
 // One lie, from a tick on for so many ticks.
 struct Event {
@@ -634,6 +636,9 @@ class LyingStation {
       const MappingParams& m = config_.mapping;
       const bool within = scale >= m.least_position_scale() && scale <= m.most_position_scale();
       seen_.position_scale = within ? scale : 0;
+    }
+    if (begins(Lie::command_depth_limit)) {
+      (void)station_->console.queue.try_push({Command::depth_limit, value(Lie::command_depth_limit), 0});
     }
     seen_.stop_commanded = begins(Lie::command_stop);
     truth.ending = truth.ending || begins(Lie::command_end);

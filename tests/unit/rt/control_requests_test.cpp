@@ -97,6 +97,23 @@ TEST(Requests, lower_the_hands_force_limit_within_the_scenes_and_never_raise_it)
   EXPECT_NEAR(requests.take(10).hand_force_N, 1, 1e-12);
 }
 
+TEST(Requests, lower_the_depth_limit_within_the_scenes_and_never_raise_it) {
+  const auto station = std::make_unique<LocalStation>();
+  ServoConfig config;
+  config.limits.penetration_depth_m = 80e-6;
+  Requests requests(config, station->station);
+  EXPECT_EQ(requests.take(1e-3).depth_limit_m, 80e-6);
+  for (const double bad : {0.0, -1e-6, 81e-6, std::nan("")}) {
+    ASSERT_TRUE(station->console.queue.try_push({Command::depth_limit, bad}));
+  }
+  ASSERT_TRUE(station->parent.queue.try_push({Command::depth_limit, 30e-6}));  // not its role
+  EXPECT_EQ(requests.take(1e-3).refused, 5U);
+  ASSERT_TRUE(station->console.queue.try_push({Command::depth_limit, 30e-6}));
+  (void)requests.take(1e-3);
+  EXPECT_NEAR(requests.take(1e-3).depth_limit_m, (1 - 2e-3) * 80e-6, 1e-15);
+  EXPECT_NEAR(requests.take(10).depth_limit_m, 30e-6, 1e-15);
+}
+
 TEST(Requests, change_the_position_scale_within_the_scenes_bounds_and_not_without_them) {
   const auto station = std::make_unique<LocalStation>();
   ServoConfig config;

@@ -37,6 +37,32 @@ TEST(Servo, holds_the_needle_at_the_depth_limit_and_at_the_soft_tip_force) {
   EXPECT_EQ(s.servo->fault(), Fault::none);
 }
 
+// Lowered under the needle, raised again while the hand pushes: neither moves it.
+TEST(Servo, lets_the_operator_lower_the_depth_limit_and_moves_the_needle_for_none_of_it) {
+  Bench b(icsi());
+  b.to_inside();
+  b.move(-10e-6, 40e-6);
+  b.run(0.5);
+  const double depth_m = -b.gap();
+  ASSERT_GT(depth_m, 20e-6);
+  const auto ask = [&](double limit_m) {
+    ASSERT_TRUE(b.station->console.queue.try_push({Command::depth_limit, limit_m}));
+    b.run(0.7);
+  };
+  ask(12e-6);
+  EXPECT_NEAR(-b.gap(), depth_m, 0.1e-6);
+  b.move(b.wanted_x - 15e-6, 40e-6);
+  b.run(0.5);
+  EXPECT_NEAR(-b.gap(), depth_m, 0.1e-6);
+  EXPECT_NE(b.sample().alarms & alarm_depth_limited, 0U);
+  ask(b.config_.limits.penetration_depth_m);
+  EXPECT_NEAR(-b.gap(), depth_m, 0.1e-6);
+  b.move(b.wanted_x - 10e-6, 40e-6);
+  b.run(0.5);
+  EXPECT_GT(-b.gap(), depth_m + 5e-6);
+  EXPECT_EQ(b.servo->fault(), Fault::none);
+}
+
 TEST(Servo, stops_at_the_hard_tip_force_as_measured) {
   ServoConfig config = icsi();
   config.force_sensor = true;

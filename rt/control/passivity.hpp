@@ -175,7 +175,7 @@ class PassivityGuard {
   hal::Vec3 v_m_s_ = hal::Vec3::Zero();     // of the handle
   hal::Vec3 slow_m_s_ = hal::Vec3::Zero();  // of the hand's own motion
   double braked_m_s2_ = 0;
-  double taking_Ns_m_ = 0;                  // the damper's part against surplus
+  double taking_Ns_m_ = 0;  // the damper's part against surplus
   double damper_Ns_m_ = 0;
   hal::Vec3 damper_N_ = hal::Vec3::Zero();
 };

@@ -176,7 +176,7 @@ inline constexpr std::array<Draw, kLies> kDraws{{
     {Lie::injector_time, 6, 1e-4, 10, true, 1, 300},
     {Lie::vacuum_lost, 6, 1, 1, false, 10, 500},
     {Lie::vacuum_time, 6, 1e-4, 10, true, 1, 300},
-    {Lie::sensor_pushed, 6, 1e-6, 1e300, true, 1, 500},
+    {Lie::sensor_pushed, 6, 1e-6, 1e3, true, 1, 500},
     {Lie::sensor_nan, 6, 1, 1, false, 1, 300},
     {Lie::sensor_time, 6, 1e-4, 10, true, 1, 300},
     {Lie::stall, 7, 2e-3, 0.3, false, 1, 1},
@@ -239,6 +239,13 @@ inline Schedule random_schedule(std::uint64_t seed, std::uint64_t number) {
             {std::max(at - 50, 0) + random.below(200), random.duration(20, 400), Lie::clutches, 1, 0});
       }
     }
+  }
+  // No drive is waited for so long as one that is to be enabled.
+  if (random.chance(0.01)) {
+    s.ticks = random.duration(3500, 4500);
+    s.setup = 0;
+    s.from = From::start;
+    s.events.push_back({0, s.ticks, Lie::stage_never_enables, 1, 0});
   }
   // A real hand is never still.
   if (random.chance(0.4)) {

@@ -21,6 +21,7 @@
 namespace punctum::hal {
 
 using Vec3 = Eigen::Vector3d;
+using Mat3 = Eigen::Matrix3d;
 using Quat = Eigen::Quaternion<double, Eigen::DontAlign>;
 
 enum class Status : std::uint8_t {

@@ -1,6 +1,7 @@
 #include "hal/cia402/calibration.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -27,12 +28,25 @@ using Stretch = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>;
 
 double condition_of_axes(const CanStageParams& params) {
   const Directions directions = directions_of(params);
-  if (params.axis_count < 3 || !directions.allFinite()) {
+  if (params.axis_count < 1 || !directions.allFinite()) {
     return std::numeric_limits<double>::infinity();
   }
   const Eigen::Vector3d squares = Stretch(directions * directions.transpose()).eigenvalues();
-  const double condition = std::sqrt(squares[2] / squares[0]);
+  const double condition = std::sqrt(squares[2] / squares[3 - std::min(params.axis_count, 3)]);
   return condition < 1 / kNoStretch ? condition : std::numeric_limits<double>::infinity();
+}
+
+std::optional<hal::Mat3> reach_of_axes(const CanStageParams& params) {
+  if (params.axis_count >= 3) {
+    return std::nullopt;
+  }
+  hal::Mat3 reach = hal::Mat3::Zero();
+  const Directions directions = directions_of(params);
+  for (int i = 0; i < params.axis_count; ++i) {
+    const hal::Vec3 rest = directions.col(i) - reach * directions.col(i);
+    reach += rest.normalized() * rest.normalized().transpose();
+  }
+  return reach;
 }
 
 Calibration::Calibration(const CanStageParams& params) : offset_m_(params.tip_m) {

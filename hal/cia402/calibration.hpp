@@ -1,9 +1,10 @@
 // Counts of the drives <-> the tip in the world frame: tip = offset + C counts. Each column of C is the
-// motion of the tip with one count of one axis; axes may be oblique, and there may be more than three of
-// them.
+// motion of the tip with one count of one axis; axes may be oblique, and there may be fewer or more than
+// three of them.
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 
 #include "hal/cia402/config.hpp"
 #include "hal/realtime.hpp"
@@ -13,13 +14,17 @@ namespace punctum::cia402 {
 using Counts = Eigen::Matrix<double, kMaxAxes, 1>;  // 0 beyond the last axis
 using CountMatrix = Eigen::Matrix<double, 3, kMaxAxes>;
 
-// Of the directions of the axes, largest by smallest stretch: 1 for three perpendicular axes; infinite where
-// three axes do not span space. Set-up code.
+// Of the directions of the axes, largest by smallest stretch: 1 for perpendicular axes; infinite where two
+// axes do not span a plane, or three and more not space. Set-up code.
 [[nodiscard]] double condition_of_axes(const CanStageParams& params);
+
+// Of one or two axes, the projector onto the motions of the tip that they can make; none where axes span
+// space. Set-up code.
+[[nodiscard]] std::optional<hal::Mat3> reach_of_axes(const CanStageParams& params);
 
 class Calibration {
  public:
-  // Set-up code. With fewer than three axes the tip is reached as nearly as they can.
+  // Set-up code. With fewer than three axes the tip comes as near as they can bring it.
   explicit Calibration(const CanStageParams& params);
 
   [[nodiscard]] hal::Vec3 tip_m(const Counts& counts) const NONBLOCKING {

@@ -81,7 +81,11 @@ Cia402Stage::Cia402Stage(const CanStageParams& params, double tick_s, hal::Clock
       bus_(std::move(bus)),
       calibration_(params),
       heartbeat_period_ns_(std::llround(params.heartbeat_s * 1e9)),
-      count_(static_cast<std::size_t>(std::clamp(params.axis_count, 0, kMaxAxes))) {}
+      count_(static_cast<std::size_t>(std::clamp(params.axis_count, 0, kMaxAxes))) {
+  if (const auto reach = reach_of_axes(params)) {
+    params_.needle = (*reach * params.needle).normalized();  // depth is told along the way that it goes
+  }
+}
 
 // ---- life ----
 

@@ -55,9 +55,9 @@ struct CanStageParams {
   double heartbeat_timeout_s = 0.06;
   bool homing = false;                  // on the first enable after the start, each drive by its method
   hal::Vec3 tip_m = hal::Vec3::Zero();  // where the tip is when every drive stands at zero
-  hal::Vec3 needle{-1, 0, 0};           // its axis, out of the tip; no drive turns it
-  int force_node = 0;                   // of the force sensor, 0 = none
-  double force_count_N = 1e-9;          // per count of 9130:1; negative where tension counts up
+  hal::Vec3 needle{-1, 0, 0};   // its axis, out of the tip; no drive turns it, one or two move along it
+  int force_node = 0;           // of the force sensor, 0 = none
+  double force_count_N = 1e-9;  // per count of 9130:1; negative where tension counts up
   std::array<AxisParams, kMaxAxes> axes{};
   int axis_count = 0;
 };

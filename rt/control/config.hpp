@@ -55,9 +55,11 @@ struct ServoConfig : EffectParams {
   double hand_timeout_s = 0.02;
   double hand_jump_m = 0.006;     // in a millisecond: 6 m/s; a hand that is thrown reaches 5
   double stage_timeout_s = 0.02;  // silent for longer: stage_lost
-  int cells = 1;                  // to inject; 0 = until the time limit
-  bool vision = true;             // observations are expected
-  bool inner_membrane = false;    // vision follows it: an injection waits until it is through
+  // Projects a motion of the tip onto those that the stage can make, along the needle at least; absent: all.
+  std::optional<hal::Mat3> stage_reach;
+  int cells = 1;                // to inject; 0 = until the time limit
+  bool vision = true;           // observations are expected
+  bool inner_membrane = false;  // vision follows it: an injection waits until it is through
 
   HandDevice device;
   VelocityParams velocity;

@@ -57,10 +57,12 @@ double Membrane3D::chord_m(const hal::Vec3& p) const NONBLOCKING {
 }
 
 StageLimits::StageLimits(const LimitParams& limits, const MappingParams& mapping, double rate_Hz,
-                         const std::optional<ForbiddenParams>& forbidden) NONBLOCKING
+                         const std::optional<ForbiddenParams>& forbidden,
+                         const std::optional<hal::Mat3>& reach) NONBLOCKING
     : limits_(limits),
       low_m_(mapping.workspace_min_m),
       high_m_(mapping.workspace_max_m),
+      reach_(reach),
       dt_s_(1 / rate_Hz),
       // A window as long as can be still has to bound the jerk: a stage this slow gets less acceleration.
       hardest_m_s2_(std::min(limits.stage_acceleration_m_s2,
@@ -111,12 +113,34 @@ StageLimits::Checked StageLimits::check(const hal::Vec3& wanted_m, const StageCo
   return out;
 }
 
+hal::Vec3 StageLimits::made(const hal::Vec3& motion_m) const NONBLOCKING {
+  return reach_ ? hal::Vec3(reach_->lazyProduct(motion_m)) : motion_m;
+}
+
+hal::Vec3 StageLimits::within_workspace(const hal::Vec3& point_m) const NONBLOCKING {
+  const hal::Vec3& here = set_point_.tip_m;
+  const hal::Vec3 way = point_m - here;
+  double part = 1;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const double end = way[i] > 0 ? std::max(high_m_[i], here[i]) : std::min(low_m_[i], here[i]);
+    if (std::abs(way[i]) > std::abs(end - here[i]) + kRounding_m) {
+      part = std::min(part, (end - here[i]) / way[i]);
+    }
+  }
+  return part < 1 ? hal::Vec3(here + part * way) : point_m;
+}
+
 StageLimits::Checked StageLimits::check_cell(const hal::Vec3& wanted_m, const StageConstraint& c) const
     NONBLOCKING {
   const hal::Vec3& here = set_point_.tip_m;
   Checked out{wanted_m, 0};
   if (c.frozen || !is_finite(wanted_m)) {
     return {here, 0};
+  }
+
+  // What the stage cannot reach is not asked for: the hand slips there.
+  if (reach_) {
+    out.point_m = here + made(wanted_m - here);
   }
 
   // Workspace; a needle that is outside already may stay or come back.
@@ -128,8 +152,12 @@ StageLimits::Checked StageLimits::check_cell(const hal::Vec3& wanted_m, const St
     }
     out.point_m[i] = std::clamp(out.point_m[i], low, high);
   }
+  if (reach_) {
+    out.point_m = within_workspace(here + made(out.point_m - here));
+  }
 
   const Membrane3D& m = c.membrane;
+  const hal::Vec3 inward = made(m.axis);
   if (c.withdrawal_only) {
     // Outward along the axis, nothing else, and not out of the workspace.
     const double wanted = std::max(-m.axis.dot(wanted_m - here), 0.0);
@@ -147,18 +175,19 @@ StageLimits::Checked StageLimits::check_cell(const hal::Vec3& wanted_m, const St
     if (outward < wanted) {
       out.alarms |= alarm_travel_limited;
     }
-    out.point_m = here - std::max(outward, 0.0) * m.axis;
+    out.point_m = here - std::max(outward, 0.0) * inward;
     return out;
   }
   if (c.insertion) {
     out.alarms |= keep_to_line(out.point_m, *c.insertion);
+    out.point_m = within_workspace(out.point_m);  // an oblique line leads out of it
   }
   const double beyond = m.axis.dot(out.point_m) - std::max(c.inward_limit_m, m.axis.dot(here));
   if (beyond > -kAtLimit_m) {
     out.alarms |= alarm_depth_limited;
   }
   if (beyond > 0) {
-    out.point_m -= beyond * m.axis;
+    out.point_m -= beyond * inward;
     for (Eigen::Index i = 0; i < 3; ++i) {
       if (out.point_m[i] < std::min(low_m_[i], here[i]) || out.point_m[i] > std::max(high_m_[i], here[i])) {
         out.point_m = here;
@@ -190,7 +219,7 @@ StageLimits::Checked StageLimits::check_cell(const hal::Vec3& wanted_m, const St
     out.alarms |= alarm_tip_force;
   }
   if (depth > deepest) {
-    out.point_m -= (depth - deepest) * m.axis;
+    out.point_m -= (depth - deepest) * inward;
     for (Eigen::Index i = 0; i < 3; ++i) {
       // Out of the cell but out of the workspace too: stay.
       if (out.point_m[i] < std::min(low_m_[i], here[i]) || out.point_m[i] > std::max(high_m_[i], here[i])) {
@@ -297,7 +326,7 @@ bool StageLimits::may_point(const hal::Vec3& axis) const NONBLOCKING {
 std::uint32_t StageLimits::keep_to_line(hal::Vec3& point_m, const FixtureFrame& line) const NONBLOCKING {
   const auto beside = [&](const hal::Vec3& p) {
     const hal::Vec3 V = p - line.entry_m;
-    return hal::Vec3(V - line.axis.dot(V) * line.axis);
+    return made(V - line.axis.dot(V) * line.axis);
   };
   const hal::Vec3 wanted = beside(point_m);
   const hal::Vec3 now = beside(set_point_.tip_m);

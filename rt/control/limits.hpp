@@ -85,8 +85,10 @@ struct StageConstraint {
 // another.
 class StageLimits {
  public:
+  // reach: of a stage that cannot make every motion, the projector onto those that it can.
   StageLimits(const LimitParams& limits, const MappingParams& mapping, double rate_Hz,
-              const std::optional<ForbiddenParams>& forbidden = std::nullopt) NONBLOCKING;
+              const std::optional<ForbiddenParams>& forbidden = std::nullopt,
+              const std::optional<hal::Mat3>& reach = std::nullopt) NONBLOCKING;
 
   void restart(const hal::Vec3& tip_m, const hal::Vec3& axis) NONBLOCKING;  // at rest there
 
@@ -116,6 +118,10 @@ class StageLimits {
  private:
   // Workspace, cell and line of insertion.
   [[nodiscard]] Checked check_cell(const hal::Vec3& wanted_m, const StageConstraint& c) const NONBLOCKING;
+  // The part of a motion that the stage can make.
+  [[nodiscard]] hal::Vec3 made(const hal::Vec3& motion_m) const NONBLOCKING;
+  // The way to a point, up to where it leaves the workspace.
+  [[nodiscard]] hal::Vec3 within_workspace(const hal::Vec3& point_m) const NONBLOCKING;
   void keep_out(Checked& out, const StageConstraint& c) const NONBLOCKING;
   // A way of the tip that begins at the set-point: how much of it keeps out of the region, and what lies
   // beyond the plane before which the region ends it.
@@ -139,6 +145,7 @@ class StageLimits {
   LimitParams limits_;
   hal::Vec3 low_m_;
   hal::Vec3 high_m_;
+  std::optional<hal::Mat3> reach_;
   std::optional<ForbiddenRegions> regions_;
   // Directions in which needle and regions lie apart: as long as they do, nothing more is computed.
   std::array<hal::Vec3, std::size(kRegions)> away_{hal::Vec3::UnitX(), hal::Vec3::UnitX()};

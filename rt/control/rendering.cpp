@@ -14,7 +14,9 @@ constexpr double kFadeOut_s = 0.05;
 constexpr double kStiffnessKept = 0.9;
 
 [[nodiscard]] EffectSetup setup_of(const ServoConfig& config) NONBLOCKING {
-  return {.force_scale = config.mapping.force_scale, .force_delay_ticks = config.device.delay_ticks};
+  return {.force_scale = config.mapping.force_scale,
+          .force_delay_ticks = config.device.delay_ticks,
+          .reach = config.stage_reach};
 }
 
 }  // namespace

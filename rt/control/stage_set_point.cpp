@@ -25,7 +25,7 @@ constexpr double kLead_s = 0.2;
 
 StageSetPoint::StageSetPoint(const ServoConfig& config) NONBLOCKING
     : mapping_(config.mapping),
-      limits_(config.limits, config.mapping, config.rate_Hz, config.forbidden),
+      limits_(config.limits, config.mapping, config.rate_Hz, config.forbidden, config.stage_reach),
       lag_s_(limits_.lag_s() + mapping_.lag_s()) {}
 
 std::uint32_t StageSetPoint::follow_hand(const Readings& readings, const FollowInput& in) NONBLOCKING {

@@ -10,6 +10,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "hal/devices.hpp"
 #include "hal/realtime.hpp"
@@ -21,6 +22,9 @@ namespace punctum::rt {
 struct EffectSetup {
   double force_scale = 1e5;   // k_f: hand newtons per needle newton
   int force_delay_ticks = 0;  // a force acts this many ticks after it is written
+  // Of a stage that cannot make every motion, the projector onto those that it can: what pulls the needle
+  // elsewhere would pull the hand for ever.
+  std::optional<hal::Mat3> reach{};
 };
 
 struct EffectInput {

@@ -62,13 +62,21 @@ void fade(ForceParts& parts, double force_fade) NONBLOCKING {
 
 }  // namespace
 
-Effects::Effects(const EffectParams& params, const EffectSetup& setup) NONBLOCKING {
+Effects::Effects(const EffectParams& params, const EffectSetup& setup) NONBLOCKING : reach_(setup.reach) {
 #define PUNCTUM_EFFECT(name, Class)       \
   if (params.name) {                      \
     name##_.emplace(*params.name, setup); \
   }
   PUNCTUM_EFFECTS(PUNCTUM_EFFECT)
 #undef PUNCTUM_EFFECT
+}
+
+// The stored energy changes only along the ways that the stage can make.
+EffectOutput Effects::reachable(EffectOutput out) const NONBLOCKING {
+  if (reach_ && out.point != EnergyPoint::handle) {
+    out.storing_N = reach_->lazyProduct(hal::Vec3(out.storing_N));
+  }
+  return out;
 }
 
 const EffectSum& Effects::step(const EffectInput& in, const EffectGains& gain) NONBLOCKING {
@@ -83,10 +91,11 @@ const EffectSum& Effects::step(const EffectInput& in, const EffectGains& gain) N
       add(fixtures, out);
     }
   };
-#define PUNCTUM_EFFECT(name, Class)                                                                      \
-  if (name##_) {                                                                                         \
-    outputs_[effect_##name] = scaled(name##_->step(in), gain[effect_##name], last_gain_[effect_##name]); \
-    add_effect(outputs_[effect_##name], sum_.effect_N[effect_##name]);                                   \
+#define PUNCTUM_EFFECT(name, Class)                                                           \
+  if (name##_) {                                                                              \
+    outputs_[effect_##name] =                                                                 \
+        reachable(scaled(name##_->step(in), gain[effect_##name], last_gain_[effect_##name])); \
+    add_effect(outputs_[effect_##name], sum_.effect_N[effect_##name]);                        \
   }
   PUNCTUM_EFFECTS(PUNCTUM_EFFECT)
 #undef PUNCTUM_EFFECT

@@ -34,90 +34,13 @@
 #include "tests/loopback/falcon_on_usb.hpp"
 #include "tests/loopback/gpiod_wiring.hpp"
 #include "tests/support/invariants.hpp"
+#include "tests/support/watched_devices.hpp"
 #include "tools/core/assembly.hpp"
 #include "tools/scene/scene.hpp"
 
 namespace punctum::loopback {
 
 using hal::Vec3;
-
-// Notes what the servo is told and what it writes.
-class WatchedDevices {
- public:
-  explicit WatchedDevices(const rt::Devices& real) : real_(real) {}
-
-  [[nodiscard]] rt::Devices devices() {
-    return {hand_, real_.stage != nullptr ? &stage_ : nullptr, real_.estop != nullptr ? &estop_ : nullptr,
-            real_.injector != nullptr ? &injector_ : nullptr};
-  }
-
-  rt::test::Seen seen;
-  Vec3 asked_N = Vec3::Zero();
-  bool power = false, gate = false;
-
- private:
-  struct Hand final : hal::HapticDevice {
-    explicit Hand(WatchedDevices& w) : at(w) {}
-    WatchedDevices& at;
-    hal::Status read(hal::HandState& out) noexcept override {
-      at.seen.hand_status = at.real_.hand.read(out);
-      at.seen.hand = out;
-      return at.seen.hand_status;
-    }
-    hal::Status write_force(const Vec3& force_N) noexcept override {
-      ++at.seen.hand_writes;
-      at.asked_N = force_N;
-      return at.real_.hand.write_force(force_N);
-    }
-  };
-  struct Stage final : hal::Stage {
-    explicit Stage(WatchedDevices& w) : at(w) {}
-    WatchedDevices& at;
-    hal::Status read(hal::StageState& out) noexcept override {
-      at.seen.stage_status = at.real_.stage->read(out);
-      at.seen.stage = out;
-      return at.seen.stage_status;
-    }
-    hal::Status command(const hal::StageCommand& set_point) noexcept override {
-      ++at.seen.commands;
-      at.seen.command = set_point;
-      return at.real_.stage->command(set_point);
-    }
-    void quick_stop() noexcept override {
-      ++at.seen.quick_stops;
-      at.real_.stage->quick_stop();
-    }
-    void enable(bool on) noexcept override {
-      at.power = on;
-      at.real_.stage->enable(on);
-    }
-  };
-  struct Estop final : hal::EstopChain {
-    explicit Estop(WatchedDevices& w) : at(w) {}
-    WatchedDevices& at;
-    hal::Status read(hal::EstopState& out) noexcept override {
-      at.seen.estop_status = at.real_.estop->read(out);
-      at.seen.estop = out;
-      return at.seen.estop_status;
-    }
-    void heartbeat(bool level) noexcept override { at.real_.estop->heartbeat(level); }
-  };
-  struct Injector final : hal::Injector {
-    explicit Injector(WatchedDevices& w) : at(w) {}
-    WatchedDevices& at;
-    void gate(bool open) noexcept override {
-      at.gate = open;
-      at.real_.injector->gate(open);
-    }
-    hal::Status read(hal::InjectorState& out) noexcept override { return at.real_.injector->read(out); }
-  };
-
-  const rt::Devices real_;
-  Hand hand_{*this};
-  Stage stage_{*this};
-  Estop estop_{*this};
-  Injector injector_{*this};
-};
 
 // What one tick left: of the servo, and of the world.
 struct WiredTick {
@@ -407,7 +330,7 @@ class WiredServo {
 
   std::unique_ptr<rt::LocalStation> station_ = std::make_unique<rt::LocalStation>();
   std::unique_ptr<tools::Assembly> assembly_;
-  std::optional<WatchedDevices> watched_;
+  std::optional<tests::WatchedDevices> watched_;
   std::unique_ptr<rt::Servo> servo_;
   Watched beat_wire_{board->value_file(kHeartbeat)}, gate_wire_{board->value_file(kGate)};
   std::int64_t first_ns_ = 0, last_wake_ns_ = 0, beat_ns_ = 0, seen_ns_ = 0;

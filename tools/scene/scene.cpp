@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "hal/cia402/calibration.hpp"
 #include "tools/scene/messages.hpp"
 #include "tools/scene/scene_keys.hpp"
 #include "tools/scene/scene_reader.hpp"
@@ -55,6 +56,7 @@ void settle(Scene& s) {
   const auto real = [](const std::string& backend) { return !backend.empty() && backend != kSimulated; };
   s.servo.real_actuators =
       (real(s.devices.haptic) && s.hand_feels()) || real(s.devices.stage) || real(s.devices.injector);
+  s.servo.stage_reach = s.cia402 ? cia402::reach_of_axes(*s.cia402) : std::nullopt;
   s.servo.vision = s.vision.has_value();
   if (s.sim) {
     s.sim->seed = s.seed;

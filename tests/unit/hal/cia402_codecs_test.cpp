@@ -216,6 +216,71 @@ TEST(Calibration, of_a_fourth_axis_moves_the_tip_where_it_is_sent) {
   EXPECT_LT((calibration.motion_m(calibration.counts(motion_m)) - motion_m).norm(), 1e-15);
 }
 
+// What the axes can make of a motion, by hand: along (0.6, 0.8, 0) its part of length 0.6 x + 0.8 y; in the
+// plane of (1, 0, 0) and (0.6, 0.8, 0) all but z, y / 0.8 along the second axis and the rest along the first.
+TEST(Calibration, of_one_or_two_axes_makes_the_part_of_a_motion_that_they_can_make) {
+  const hal::Vec3 motion_m(3e-6, -4e-6, 7e-6);
+  const Calibration one(stage_of({{30e-9, 40e-9, 0}}));
+  EXPECT_NEAR(one.counts(motion_m)[0], (0.6 * 3 - 0.8 * 4) * 1e-6 / 50e-9, 1e-9);
+  EXPECT_LT((one.motion_m(one.counts(motion_m)) - -1.4e-6 * hal::Vec3(0.6, 0.8, 0)).norm(), 1e-18);
+  const Calibration two(stage_of({{20e-9, 0, 0}, {60e-9, 80e-9, 0}}));
+  EXPECT_NEAR(two.counts(motion_m)[1], -4e-6 / 80e-9, 1e-9);
+  EXPECT_NEAR(two.counts(motion_m)[0], (3e-6 + 3e-6) / 20e-9, 1e-9);
+  EXPECT_EQ(two.counts(motion_m).tail<4>(), (Eigen::Vector4d::Zero()));
+}
+
+// Every motion of the axes is made exactly; and with more than three of them, what they do in vain together
+// is no part of it: the ways are the shortest (Lagrange: the ways are the axes' shares of one vector).
+TEST(Calibration, of_one_to_six_axes_makes_a_motion_of_its_axes_exactly_and_on_the_shortest_ways) {
+  const std::array<hal::Vec3, kMaxAxes> all = {{{40e-9, 5e-9, 0},
+                                                {-10e-9, 90e-9, 8e-9},
+                                                {3e-9, 0, -700e-9},
+                                                {20e-9, -20e-9, 30e-9},
+                                                {0, 1e-6, 2e-6},
+                                                {-5e-9, 4e-9, 6e-9}}};
+  for (std::size_t n = 1; n <= all.size(); ++n) {
+    const Calibration calibration(stage_of({all.begin(), all.begin() + static_cast<std::ptrdiff_t>(n)}));
+    Counts counts = Counts::Zero();
+    hal::Vec3 motion_m = hal::Vec3::Zero();
+    for (std::size_t i = 0; i < n; ++i) {
+      counts[static_cast<Eigen::Index>(i)] = 100.0 - 37.0 * static_cast<double>(i);
+      motion_m += counts[static_cast<Eigen::Index>(i)] * all[i];
+    }
+    const Counts back = calibration.counts(motion_m);
+    EXPECT_LT((calibration.motion_m(back) - motion_m).norm(), 1e-12 * motion_m.norm()) << n;
+    if (n <= 3) {
+      EXPECT_LT((back - counts).norm(), 1e-9 * counts.norm()) << n;
+      continue;
+    }
+    // way_i = direction_i . v of one vector v, which the first three axes tell.
+    Eigen::Matrix3d directions;
+    Eigen::Vector3d ways;
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      const hal::Vec3& axis = all[static_cast<std::size_t>(i)];
+      directions.row(i) = axis.normalized();
+      ways[i] = back[i] * axis.norm();
+    }
+    const Eigen::Vector3d v = directions.inverse() * ways;
+    for (std::size_t i = 3; i < n; ++i) {
+      EXPECT_NEAR(back[static_cast<Eigen::Index>(i)] * all[i].norm(), all[i].normalized().dot(v), 1e-17) << n;
+    }
+  }
+}
+
+TEST(Calibration, the_reach_of_one_or_two_axes_is_what_they_make_of_a_motion) {
+  EXPECT_FALSE(reach_of_axes(stage_of({{1, 0, 0}, {0, 1, 0}, {0, 0, 1}})));
+  const auto along_x = reach_of_axes(stage_of({{-40e-9, 0, 0}}));
+  EXPECT_EQ(*along_x, hal::Mat3(hal::Vec3(1, 0, 0).asDiagonal()));
+  for (const auto& axes : {std::vector<hal::Vec3>{{30e-9, 40e-9, 5e-9}},
+                           std::vector<hal::Vec3>{{20e-9, 0, 1e-9}, {60e-9, 80e-9, -300e-9}}}) {
+    const Calibration calibration(stage_of(axes));
+    const hal::Mat3 reach = reach_of_axes(stage_of(axes)).value();
+    for (const hal::Vec3& motion_m : {hal::Vec3(1, 0, 0), hal::Vec3(0, 1, 0), hal::Vec3(-0.3, 0.2, 1)}) {
+      EXPECT_LT((reach * motion_m - calibration.motion_m(calibration.counts(motion_m))).norm(), 1e-13);
+    }
+  }
+}
+
 // Two axes that enclose an angle t: condition sqrt((1 + cos t) / (1 - cos t)).
 TEST(Calibration, condition_says_how_oblique_axes_are_and_not_how_small_their_counts) {
   EXPECT_NEAR(condition_of_axes(stage_of({{1e-9, 0, 0}, {0, 5e-6, 0}, {0, 0, -1e-7}})), 1, 1e-12);
@@ -224,7 +289,11 @@ TEST(Calibration, condition_says_how_oblique_axes_are_and_not_how_small_their_co
       stage_of({{1e-9, 0, 0}, {1e-6 * std::cos(t), 1e-6 * std::sin(t), 0}, {0, 0, 1e-7}});
   EXPECT_NEAR(condition_of_axes(narrow), std::sqrt((1 + std::cos(t)) / (1 - std::cos(t))), 1e-6);
   EXPECT_GT(condition_of_axes(stage_of({{1, 0, 0}, {0, 1, 0}, {1, 1, 0}})), 1e9);
-  EXPECT_GT(condition_of_axes(stage_of({{1, 0, 0}, {0, 1, 0}})), 1e9);
+  EXPECT_NEAR(condition_of_axes(stage_of({{0, 1e-7, 1e-7}})), 1, 1e-12);
+  const CanStageParams two = stage_of({{1e-9, 0, 0}, {1e-6 * std::cos(t), 1e-6 * std::sin(t), 0}});
+  EXPECT_NEAR(condition_of_axes(two), std::sqrt((1 + std::cos(t)) / (1 - std::cos(t))), 1e-6);
+  EXPECT_GT(condition_of_axes(stage_of({{1, 0, 0}, {-2, 0, 0}})), 1e9);
+  EXPECT_GT(condition_of_axes(stage_of({})), 1e9);
   EXPECT_FALSE(condition_of_axes(stage_of({{1, 0, 0}, {0, 1, 0}, {0, 0, 0}})) < 1e9);
 }
 

@@ -131,6 +131,71 @@ TEST(StageLimits, hold_for_any_target_and_any_mix_of_constraints) {
   }
 }
 
+// A stage that moves the needle along one line or in one plane, both oblique: the needle's axis lies there.
+TEST(StageLimits, of_a_stage_of_one_or_two_axes_stay_on_the_line_or_plane_whatever_is_wanted) {
+  const LimitParams limits;
+  const MappingParams mapping;
+  ForbiddenParams forbidden;
+  forbidden.floor.emplace().z_m = 40e-6;
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    Wild wild(seed);
+    const Vec3 along = (-Vec3::UnitX() + 0.3 * wild.unit()).normalized();
+    const Vec3 across = along.cross(wild.unit()).normalized();
+    const Vec3 aside = along.cross(across);
+    const bool plane = wild.pick(2) == 0;
+    hal::Mat3 reach = along * along.transpose();
+    reach += plane ? hal::Mat3(across * across.transpose()) : hal::Mat3::Zero();
+    const bool floor = wild.pick(2) == 0;
+    StageLimits stage(limits, mapping, 1000, floor ? std::optional(forbidden) : std::nullopt, reach);
+    const Vec3 start = wild.pick(2) == 0 ? Vec3(90e-6, 6e-6, 0) : Vec3(10e-6, 190e-6, 1e-6);
+    stage.restart(start, along);
+    StageConstraint c;
+    c.membrane = cell(wild);
+    c.membrane.axis = along;
+    hal::StageCommand target{wild.near(), along};
+    Vec3 here = start;
+    double way_m = 0, beside_m = 0;
+    for (int k = 0; k < 4000; ++k) {
+      c.membrane.known = c.membrane.known != (wild.pick(300) == 0);
+      c.withdrawal_only = c.withdrawal_only != (wild.pick(300) == 0);
+      c.no_deeper = c.no_deeper != (wild.pick(300) == 0);
+      if (wild.pick(300) == 0) {
+        c.insertion =
+            wild.pick(2) == 0 ? std::optional(FixtureFrame{here + 3e-6 * wild.unit(), along}) : std::nullopt;
+      }
+      if (wild.pick(40) == 0) {
+        target.tip_m = wild.pick(3) == 0 ? wild.vector() : wild.near();
+      }
+      const Vec3 next = stage.step(target, c).tip_m;
+      const Vec3 checked = stage.check(target.tip_m, c).point_m;
+      for (const Vec3& p : {next, checked}) {
+        const Vec3 V = p - start;
+        ASSERT_LE(std::abs(V.dot(aside)), 1e-15) << seed << " " << k;
+        ASSERT_LE(plane ? 0 : std::abs(V.dot(across)), 1e-15) << seed << " " << k;
+        for (int i = 0; i < 3; ++i) {
+          ASSERT_GE(p[i], std::min(mapping.workspace_min_m[i], start[i]) - 1e-15);
+          ASSERT_LE(p[i], std::max(mapping.workspace_max_m[i], start[i]) + 1e-15);
+        }
+      }
+      if (c.withdrawal_only) {
+        ASSERT_GE(-(next - here).dot(along), 0);
+        ASSERT_LE(std::abs((next - here).dot(across)), 1e-18);
+      }
+      if (floor) {
+        const double apart_m = forbidden.floor->z_m - forbidden.tip_radius_m - forbidden.clearance_m;
+        ASSERT_LE(next.z(), std::max(apart_m, start.z()) + 1e-8) << seed << " " << k;
+      }
+      way_m += (next - here).norm();
+      beside_m += std::abs((next - here).dot(across));
+      here = next;
+    }
+    EXPECT_GT(way_m, 30e-6) << seed;
+    if (plane) {
+      EXPECT_GT(beside_m, 10e-6) << seed;
+    }
+  }
+}
+
 // Velocity, acceleration and jerk of set-points, by differences.
 struct Derivatives {
   Derivatives(const Vec3& at, double dt_s) : x(at), dt(dt_s) {}

@@ -61,8 +61,8 @@ TEST(SceneCia402, what_does_not_fit_is_one_line_with_what_is_allowed) {
        "can.toml:4:10: stage.device: \"cia402\" needs to know its drives, allowed: with [cia402]"},
       {"no stage", "[haptic]\n[sim.operator]\n[stage]\n[sim.needle]\n[cia402]\n" + kAxes,
        "can.toml:5:2: cia402: no stage uses it, allowed: with device = \"cia402\" in [stage]"},
-      {"two axes", kStage + kAxes.substr(0, kAxes.rfind("[[")),
-       "can.toml:7:3: cia402.axis: 2 cannot follow the hand in space, allowed: from 3 to 6 [[cia402.axis]]"},
+      {"no axis", kStage + "[cia402]\n",
+       "can.toml:7:2: cia402.axis: is missing, allowed: from 1 to 6 [[cia402.axis]]"},
       {"one node twice", kGood + "[[cia402.axis]]\nnode = 2\ncount_um = [0, 0, 1]\n",
        "can.toml:21:8: cia402.axis[3].node: 2 is taken, allowed: a number from 1 to 127"},
       {"no node", kGood + "[[cia402.axis]]\ncount_um = [0, 0, 1]\n",
@@ -100,6 +100,45 @@ TEST(SceneCia402, axes_that_hardly_span_space_are_refused) {
                        "{node=7, count_um=[0,0,1]}]"});
   EXPECT_TRUE(
       error.starts_with("--set: cia402.axis: the axes' directions count_um hardly span space, condition 40"))
+      << error;
+}
+
+TEST(SceneCia402, one_or_two_axes_along_the_needle_are_read_and_tell_the_servo_what_they_can_reach) {
+  EXPECT_FALSE(parse_scene(kGood, "can.toml")->servo.stage_reach);
+  const auto one = parse_scene(kStage + kAxes.substr(0, kAxes.find("[[", 2)), "can.toml");
+  ASSERT_TRUE(one) << one.error();
+  EXPECT_EQ(one->servo.stage_reach.value(), hal::Mat3(hal::Vec3(1, 0, 0).asDiagonal()));
+  const auto two = parse_scene(kStage + kAxes.substr(0, kAxes.rfind("[[")), "can.toml");
+  ASSERT_TRUE(two) << two.error();
+  EXPECT_EQ(two->servo.stage_reach.value(), hal::Mat3(hal::Vec3(1, 1, 0).asDiagonal()));
+  const auto again = parse_scene(to_toml(*one), "can.toml");
+  ASSERT_TRUE(again) << again.error();
+  EXPECT_EQ(again->servo.stage_reach, one->servo.stage_reach);
+}
+
+TEST(SceneCia402, one_or_two_axes_that_do_not_move_the_needle_along_itself_are_refused) {
+  EXPECT_EQ(
+      error_of(kStage + "[cia402]\n[[cia402.axis]]\nnode = 1\ncount_um = [0.04, 0.002, 0]\n"),
+      "can.toml:7:2: cia402.needle: lies 4.99 um beside what the axis can do on a way of 100 um, allowed: at "
+      "most 2; one or two [[cia402.axis]] must move the needle along its own axis");
+  EXPECT_EQ(error_of(kStage + "[cia402]\nneedle = [-1, 0.05, 0]\n[[cia402.axis]]\nnode = 1\n"
+                              "count_um = [0.04, -0.0025, 0]\n"),
+            "")
+      << "0.7 degrees";
+  const std::string across =
+      "[[cia402.axis]]\nnode = 1\ncount_um = [0, 0.04, 0]\n"
+      "[[cia402.axis]]\nnode = 2\ncount_um = [0, 0, 0.04]\n";
+  EXPECT_EQ(
+      error_of(kStage + across),
+      "can.toml:7:3: cia402.needle: lies 100 um beside what the axes can do on a way of 100 um, allowed: "
+      "at most 2; one or two [[cia402.axis]] must move the needle along its own axis");
+}
+
+TEST(SceneCia402, two_axes_that_hardly_span_a_plane_are_refused) {
+  const std::string error =
+      error_of(kGood, {"cia402.axis=[{node=5, count_um=[1,0,0]},{node=6, count_um=[-1,0.05,0]}]"});
+  EXPECT_TRUE(error.starts_with(
+      "--set: cia402.axis: the axes' directions count_um hardly span a plane, condition 40"))
       << error;
 }
 

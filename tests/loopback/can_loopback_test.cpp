@@ -6,14 +6,21 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
+#include <limits>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "hal/cia402/cia402_stage.hpp"
 #include "hal/cia402/socket_can.hpp"
+#include "rt/control/device_inputs.hpp"
 #include "rt/executive/monotonic_clock.hpp"
+#include "rt/station/alarm.hpp"
 #include "tests/loopback/can_wires.hpp"
+#include "tests/loopback/force_sensor_on_bus.hpp"
 #include "tests/loopback/histogram.hpp"
+#include "tests/support/fake_devices.hpp"
 
 namespace punctum::loopback {
 namespace {
@@ -38,9 +45,8 @@ class CanLoopback : public testing::Test {
     const sched_param ordinary{0};
     pthread_setschedparam(pthread_self(), SCHED_OTHER, &ordinary);
   }
-  void open() {
-    stage = std::make_unique<Cia402Stage>(three_drives(), 1e-3, clock,
-                                          std::make_unique<cia402::SocketCan>("can0"));
+  void open(const cia402::CanStageParams& params = three_drives()) {
+    stage = std::make_unique<Cia402Stage>(params, 1e-3, clock, std::make_unique<cia402::SocketCan>("can0"));
     const auto opened = stage->open();
     ASSERT_TRUE(opened) << opened.error();
     next_ns = clock.now_ns() + 5'000'000;
@@ -259,6 +265,117 @@ TEST_F(CanLoopback, a_fault_of_a_drive_is_a_fault_with_its_code_kept) {
   EXPECT_GT(seen, 0);
   EXPECT_LE(seen, 3);
   EXPECT_NE(stage->report().find("7300"), std::string::npos) << stage->report();
+}
+
+// A force sensor beside the drives, and the part of the core that reads it. What it measures must reach the
+// core with the time of its SYNC; what cannot be a measurement must not.
+class ForceOnCan : public CanLoopback {
+ protected:
+  static constexpr double kCount_N = -2e-9;  // tension counts up
+  static constexpr int kCounts = -1500;
+  static constexpr double kForce_N = 3e-6;
+
+  ForceOnCan() {
+    sensor.counts = kCounts;
+    cia402::CanStageParams params = three_drives();
+    params.force_node = ForceSensorOnBus::kNode;
+    params.force_count_N = kCount_N;
+    open(params);
+    enable();
+    rt::ServoConfig config;
+    config.force_sensor = true;
+    rt::Devices devices{hand};
+    devices.force_sensor = stage.get();
+    inputs.emplace(config, devices);
+  }
+  void core_tick() {
+    EXPECT_EQ(tick(), Status::ok) << "the drives go on, whatever the sensor does";
+    const std::int64_t now_ns = clock.now_ns();
+    hand.now_ns = now_ns;
+    readings = &inputs->read({.now_ns = now_ns, .elapsed_s = 1e-3, .dt_s = 1e-3}, {});
+  }
+  void core_ticks(int n) {
+    for (int i = 0; i < n; ++i) {
+      core_tick();
+    }
+  }
+  [[nodiscard]] bool alarmed() const { return (readings->alarms & rt::alarm_sensor) != 0; }
+  // Values are given up 0.1 s after the last good one, and believed again with the first one.
+  void expect_given_up_and_taken_up(const std::function<void()>& returns) {
+    const auto until_given_up = [&] {
+      for (int i = 1; i <= 200; ++i) {
+        core_tick();
+        if (!readings->sensor_fresh) {
+          return i;
+        }
+      }
+      return 0;
+    };
+    const int given_up = until_given_up();
+    std::printf("force sensor: not believed after %d ticks\n", given_up);
+    EXPECT_GE(given_up, 99);
+    EXPECT_LE(given_up, 103) << "0.1 s, what was on its way, and the tick that notices it";
+    EXPECT_TRUE(alarmed());
+    EXPECT_EQ(readings->sensor_N, kForce_N) << "the last good one";
+    returns();
+    core_ticks(3);
+    EXPECT_TRUE(readings->sensor_fresh);
+    EXPECT_FALSE(alarmed());
+    EXPECT_NEAR(readings->sensor_N, kForce_N, 1e-15);
+  }
+
+  ForceSensorOnBus sensor{"can1"};
+  rt::test::FakeHand hand;
+  std::optional<rt::DeviceInputs> inputs;
+  const rt::Readings* readings = nullptr;
+};
+
+TEST_F(ForceOnCan, a_value_comes_with_every_tick_and_has_the_time_of_its_sync) {
+  int values = 0;
+  for (int i = 0; i < 200; ++i) {
+    (void)tick();
+    hal::ForceState force;
+    if (stage->read(force) == Status::ok) {
+      ++values;
+      EXPECT_NEAR(force.axial_force_N, kForce_N, 1e-15);
+      EXPECT_EQ(force.sample_ns, state.sample_ns) << "of the SYNC that the drives answered";
+    }
+    EXPECT_EQ(stage->read(force), Status::no_data) << "once";
+  }
+  EXPECT_EQ(values, 200);
+  sensor.counts = 250'000;
+  core_ticks(50);
+  EXPECT_TRUE(readings->sensor_fresh);
+  EXPECT_NEAR(readings->sensor_N, -0.5e-3, 1e-12);
+  EXPECT_FALSE(alarmed());
+}
+
+TEST_F(ForceOnCan, a_sensor_that_falls_silent_is_given_up_and_counts_again_when_it_returns) {
+  core_ticks(50);
+  sensor.silent = true;
+  expect_given_up_and_taken_up([&] { sensor.silent = false; });
+  EXPECT_EQ(stage->health().malformed, 0U);
+}
+
+TEST_F(ForceOnCan, frames_of_another_length_are_no_values_and_are_counted) {
+  core_ticks(50);
+  for (const int bytes : {0, 3, 5, 8}) {
+    const std::uint32_t before = stage->health().malformed;
+    sensor.bytes = bytes;
+    expect_given_up_and_taken_up([&] { sensor.bytes = 4; });
+    EXPECT_GE(stage->health().malformed, before + 99) << bytes << " bytes";
+  }
+}
+
+// 80000000h is what sensors send that cannot measure; the other is 2 N, more than any that tells
+// micronewtons.
+TEST_F(ForceOnCan, values_that_no_sensor_measures_are_not_believed) {
+  core_ticks(50);
+  for (const std::int32_t counts : {std::numeric_limits<std::int32_t>::min(), 1'000'000'000}) {
+    sensor.counts = counts;
+    expect_given_up_and_taken_up([&] { sensor.counts = kCounts; });
+    EXPECT_NEAR(readings->sensor_filtered_N, kForce_N, 1e-9) << "nothing of it is left in the low-pass";
+  }
 }
 
 // Remote frames are left out: after one of them the emulated controller hands on garbage.

@@ -3,8 +3,9 @@
 // from the table of rt/control/safety_latch.hpp, the invariants of rt/control/README.md, the tables in the
 // READMEs of the backends and the time-outs in headers and scene; never from a run. Measured: ticks from the
 // fault to the stop, and until nothing moves, pushes or is open any more; the motion of the true needle
-// afterwards; and every invariant of tests/support on every tick. At the end a table is printed, a line for
-// each cell. A cell alone: --gtest_filter=*emergency*.
+// afterwards; and every invariant of tests/support on every tick. A camera that fails stops nothing: there,
+// what counts is when the core knows, and that the needle then goes outward only. At the end a table is
+// printed, a line for each cell. A cell alone: --gtest_filter=*emergency*.
 #include <gtest/gtest.h>
 #include <linux/can/error.h>
 
@@ -13,8 +14,10 @@
 #include <functional>
 #include <ostream>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "rt/station/alarm.hpp"
 #include "tests/loopback/wired_servo.hpp"
 
 namespace punctum::loopback {
@@ -31,8 +34,9 @@ enum class Safe : std::uint8_t {
   stop,     // the stop of the table, the heartbeat goes on
   relay,    // the same, and the heartbeat ends
   goes_on,  // as if nothing were wrong
+  blind,    // it goes on, but the gate shuts and the needle goes outward only, until vision is back
 };
-constexpr const char* kSafeNames[] = {"stop", "stop, relay", "goes on"};
+constexpr const char* kSafeNames[] = {"stop", "stop, relay", "goes on", "outward only, vision_stale"};
 
 enum class Reset : std::uint8_t {
   none,      // is not tried
@@ -53,6 +57,14 @@ constexpr int kRamp = 20 + 12;
 constexpr int kRelay = 52;    // the relay takes the force 50 ms after the last edge of the heartbeat
 constexpr int kRefused = 10;  // a Falcon that does not answer refuses forces only then
 
+// Of a camera of 60 Hz: the newest picture was exposed up to 17 ms before the fault, and is stale 100 ms
+// after its exposure; a tick to notice it, and one that may be under way.
+constexpr int kBlind = 102, kSeesUntil = 100 - 17;
+// From its return until vision is fresh: what opens it looks every 5 ms and takes some, two pictures, 10 ms
+// for each, and a tick.
+constexpr int kSees = 5 + 30 + 2 * 17 + 10 + 1;
+constexpr double kSeesAgain_ms = 700;
+
 // What else a cell may say.
 struct Also {
   std::function<void(WiredServo&)> returns = {};
@@ -65,6 +77,8 @@ struct Also {
   int rest = kRamp;            // ticks from the stop until all is still, at most
   double may_move_um = 0.01;   // of itself, whatever it is told
   bool from_return = false;    // the fault is there when the kernel's call has returned
+  const char* complaint = "";  // part of what the camera says of it
+  std::uint64_t lost = 0;      // pictures, at least, by its own count
 };
 
 struct Cell {
@@ -124,6 +138,16 @@ void pulse(WiredServo& s, int contact) {
   s.board->drive(contact, true);
 }
 void close_contacts(WiredServo& s) { s.contacts(true, true); }
+void drop_pictures(WiredServo& s, int percent) {
+  s.camera->vivid.set("Percentage of Dropped Buffers", percent);
+}
+// Each press of the driver's button damages the next picture.
+void damage_pictures(WiredServo& s, double until_ms) {
+  do {
+    s.camera->vivid.set("Inject V4L2_BUF_FLAG_ERROR", 1);
+    s.at(s.now_ms() + 4);
+  } while (s.now_ms() < until_ms);
+}
 
 // haptic.timeout_ms and stage.timeout_ms are 20, servo.overrun_limit is 20 in a second, estop.discrepancy_ms
 // 50; estop.power_off_after_ms is 100 here. A tick reads every level that was there before it: 1; the tick
@@ -418,6 +442,67 @@ const std::vector<Cell>& cells() {
       {"hand", "half rate", goes_on, Fault::none, 0, "hal/README: devices have rates of their own",
        [](W& s) { s.falcon->slow_down(std::chrono::microseconds(1500)); }},
 
+      // ---- camera: vivid, 60 pictures a second, stale after 100 ms ----
+      {"camera",
+       "stalls, gives pictures again",
+       blind,
+       Fault::none,
+       kBlind,
+       "M11, G5; alarm vision_stale",
+       [](W& s) { drop_pictures(s, 100); },
+       {.returns = [](W& s) { drop_pictures(s, 0); }, .end_ms = kSeesAgain_ms, .lost = 8}},
+      {"camera",
+       "damaged pictures only, for 150 ms",
+       blind,
+       Fault::none,
+       kBlind,
+       "M11, G5; v4l2: a damaged picture is a fault",
+       [](W& s) { damage_pictures(s, kReturns_ms); },
+       {.end_ms = kSeesAgain_ms, .complaint = "damaged"}},
+      {"camera",
+       "unplugged, plugged in again",
+       blind,
+       Fault::none,
+       kBlind,
+       "M11, G5; v4l2: disconnected, until it is opened again",
+       [](W& s) { s.camera->unplug(); },
+       {.returns = [](W& s) { s.camera->plug_in(); },
+        .end_ms = kSeesAgain_ms,
+        .complaint = "stopped streaming"}},
+      {"camera",
+       "stream breaks down, is opened again",
+       blind,
+       Fault::none,
+       kBlind,
+       "M11, G5; v4l2: disconnected, until it is opened again",
+       [](W& s) { s.camera->vivid.set("Inject Fatal Streaming Error", 1); },
+       {.returns = [](W& s) { s.camera->may_be_back = true; },
+        .end_ms = kSeesAgain_ms,
+        .complaint = "stopped streaming"}},
+      {"camera",
+       "one damaged picture",
+       goes_on,
+       Fault::none,
+       0,
+       "v4l2: the next one counts; three of them are 50 ms",
+       [](W& s) { damage_pictures(s, kFault_ms); },
+       {.complaint = "damaged"}},
+      {"camera",
+       "two pictures lost, and again",
+       goes_on,
+       Fault::none,
+       0,
+       "v4l2: gaps in the count; three frames are 50 ms",
+       [](W& s) {
+         for (const double from_ms : {kFault_ms, kFault_ms + 75}) {
+           s.at(from_ms);
+           drop_pictures(s, 100);
+           s.at(from_ms + 35);
+           drop_pictures(s, 0);
+         }
+       },
+       {.lost = 4}},
+
       // ---- the core ----
       {"core",
        "overloaded: 3.6 of each 5 ms taken",
@@ -477,8 +562,8 @@ class MatrixLoopback : public testing::TestWithParam<Cell> {
 
   static Measured run(const Cell& cell) {
     Measured m;
-    WiredServo s;
-    s.rests_ms = kRests_ms;
+    WiredServo s(cell.device == std::string_view("camera"));
+    s.rests_ms = cell.safe == Safe::blind ? 1e9 : kRests_ms;
     s.run(static_cast<std::uint64_t>(cell.also.end_ms), [&] {
       s.at(kFault_ms);
       cell.fails(s);
@@ -504,17 +589,68 @@ class MatrixLoopback : public testing::TestWithParam<Cell> {
       m.left = "did not run";
       return m;
     }
-    judge(cell, s.ticks, m);
+    if (s.camera && s.camera->complaint().find(cell.also.complaint) == std::string::npos) {
+      m.left = "the camera says '" + s.camera->complaint() + "'";
+    }
+    leave(m, s.camera && s.camera->lost() < cell.also.lost, "no pictures were lost");
+    if (cell.safe == Safe::blind) {
+      judge_blind(s.ticks, m);
+    } else {
+      judge(cell, s.ticks, m);
+    }
     return m;
+  }
+
+  static void leave(Measured& m, bool is, const char* what) {
+    if (is && m.left.find(what) == std::string::npos) {
+      m.left += std::string(m.left.empty() ? "" : ", ") + what;
+    }
+  }
+
+  // The station runs on, blind from the alarm until vision is back.
+  static void judge_blind(const std::vector<WiredTick>& ticks, Measured& m) {
+    constexpr auto kBefore = static_cast<std::uint64_t>(kFault_ms);
+    constexpr auto kBack = static_cast<std::uint64_t>(kReturns_ms);
+    std::uint64_t blind_from = 0;
+    double follows_um = 0;
+    for (std::size_t i = 1; i < ticks.size(); ++i) {
+      const WiredTick& was = ticks[i - 1];
+      const WiredTick& now = ticks[i];
+      const bool stale = (now.alarms & rt::alarm_vision_stale) != 0;
+      leave(m, now.stage != StopStage::running || now.fault != Fault::none, "stopped");
+      if (now.index <= kBefore) {
+        leave(m, stale && now.phase == rt::Phase::injection, "blind before the fault");
+        leave(m, now.index == kBefore && (now.phase != rt::Phase::injection || !now.gate),
+              "no injection before");
+        continue;
+      }
+      leave(m, now.level == was.level && now.index == was.index + 1, "no heartbeat");
+      if (stale && blind_from == 0) {
+        blind_from = now.index;
+        m.reached = static_cast<int>(now.index - m.from);
+        leave(m, m.reached < kSeesUntil, "blind too early");
+      }
+      if (blind_from == 0) {
+        continue;
+      }
+      leave(m, now.gate, "gate open");
+      m.rest = now.gate ? static_cast<int>(now.index - m.from) : std::max(m.rest, m.reached);
+      const Vec3 way = 1e6 * (now.tip_m - was.tip_m);
+      const double not_outward_um = std::max(0.0, -way.x()) + std::hypot(way.y(), way.z());
+      if (now.index <= kBack) {
+        leave(m, !stale, "sees by itself");
+        m.moved_um += now.index > blind_from + kBraked ? not_outward_um : 0;
+      } else if (now.index > kBack + kSees) {
+        leave(m, stale, "does not see again");
+        follows_um += not_outward_um;
+      }
+    }
+    leave(m, follows_um < 1, "does not follow the hand again");
   }
 
   static void judge(const Cell& cell, const std::vector<WiredTick>& ticks, Measured& m) {
     constexpr auto kBefore = static_cast<std::uint64_t>(kFault_ms);
-    const auto left = [&m](bool is, const char* what) {
-      if (is && m.left.find(what) == std::string::npos) {
-        m.left += std::string(m.left.empty() ? "" : ", ") + what;
-      }
-    };
+    const auto left = [&m](bool is, const char* what) { leave(m, is, what); };
     // At least the very next one: what takes the kernel some time may be noticed before it is over.
     const auto after = [&m](std::uint64_t index) {
       return std::max(1, static_cast<int>(index) - static_cast<int>(m.from));
@@ -602,7 +738,7 @@ class MatrixLoopback : public testing::TestWithParam<Cell> {
 TEST_P(MatrixLoopback, leads_to_the_state_that_is_written_down) {
   const Cell& cell = GetParam();
   const Measured m = run(cell);
-  const bool stops = cell.safe != Safe::goes_on;
+  const bool acts = cell.safe != Safe::goes_on;
   const std::string state = std::string(kSafeNames[static_cast<std::size_t>(cell.safe)]) +
                             (m.first != Fault::none ? std::string(" ") + rt::name(m.first) : "");
   std::array<char, 300> line;
@@ -613,11 +749,11 @@ TEST_P(MatrixLoopback, leads_to_the_state_that_is_written_down) {
   table += line.data();
   EXPECT_EQ(rt::name(m.first), std::string(rt::name(cell.cause)));
   EXPECT_LE(m.reached, cell.within);
-  EXPECT_EQ(m.reached > 0, stops);
+  EXPECT_EQ(m.reached > 0, acts);
   EXPECT_EQ(m.broken, "") << "invariants";
   EXPECT_EQ(m.left, "");
   EXPECT_LE(m.missed, static_cast<std::uint64_t>(cell.also.missed));
-  if (stops) {
+  if (acts) {
     EXPECT_LE(m.rest, m.reached + cell.also.rest);
     EXPECT_LE(m.moved_um, cell.also.may_move_um) << "the needle stands";
   }

@@ -4,7 +4,8 @@
 // note it for the invariants (tests/support/invariants.hpp).
 //
 // The hand goes by a plan, whatever it feels; a sphere is the cell, and the test tells what a microscope
-// would see of it. After 280 ms the needle is inside, the gate open, and the hand trembles, so that a needle
+// would see of it: of pictures of its own, or of those that a real camera gives (vivid), each when it was
+// exposed. After 280 ms the needle is inside, the gate open, and the hand trembles, so that a needle
 // that still follows it shows.
 #pragma once
 
@@ -19,12 +20,15 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <numbers>
 #include <optional>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
+#include "hal/v4l2/v4l2_camera.hpp"
 #include "rt/control/servo.hpp"
 #include "rt/executive/executive.hpp"
 #include "rt/executive/monotonic_clock.hpp"
@@ -33,6 +37,7 @@
 #include "tests/loopback/can_wires.hpp"
 #include "tests/loopback/falcon_on_usb.hpp"
 #include "tests/loopback/gpiod_wiring.hpp"
+#include "tests/loopback/vivid_loop.hpp"
 #include "tests/support/invariants.hpp"
 #include "tests/support/watched_devices.hpp"
 #include "tools/core/assembly.hpp"
@@ -42,12 +47,104 @@ namespace punctum::loopback {
 
 using hal::Vec3;
 
+// The camera's part of a vision program: it takes every picture, and opens a camera that is lost again once
+// it may be back.
+class WatchedCamera {
+ public:
+  explicit WatchedCamera(const hal::Clock& clock) : camera_(params(), settings(), clock) {
+    const auto opened = camera_.open();
+    EXPECT_TRUE(opened) << opened.error();
+    thread_ = std::thread([this] { run(); });
+  }
+  ~WatchedCamera() {
+    over_ = true;
+    thread_.join();
+    camera_.close();
+    if (!unplugged_) {
+      vivid.set("Percentage of Dropped Buffers", 0);
+    }
+  }
+  WatchedCamera(const WatchedCamera&) = delete;
+  WatchedCamera& operator=(const WatchedCamera&) = delete;
+
+  void unplug() {
+    unplugged_ = true;
+    vivid.set("Disconnect", 1);
+  }
+  // The kernel has it back once nobody has it open any more.
+  void plug_in() {
+    vivid.close();
+    may_be_back = true;
+  }
+
+  // Exposures since the last call; none while one is being noted.
+  [[nodiscard]] std::vector<std::int64_t> taken() {
+    const std::unique_lock lock(mutex_, std::try_to_lock);
+    return lock ? std::exchange(exposures_ns_, {}) : std::vector<std::int64_t>();
+  }
+  [[nodiscard]] std::string complaint() {
+    const std::lock_guard lock(mutex_);
+    return complaint_;
+  }
+  [[nodiscard]] std::uint64_t lost() {
+    const std::lock_guard lock(mutex_);
+    return lost_;
+  }
+
+  VividNode vivid{V4L2_CAP_VIDEO_CAPTURE};
+  std::atomic<bool> may_be_back{false};
+
+ private:
+  [[nodiscard]] v4l2::V4l2Params params() const {
+    v4l2::V4l2Params params;
+    params.path = vivid.path();
+    return params;
+  }
+  [[nodiscard]] static hal::CameraSettings settings() {
+    hal::CameraSettings settings;
+    settings.width = 320;
+    settings.height = 180;
+    settings.fps = 60;
+    return settings;
+  }
+  void run() {
+    while (!over_) {
+      hal::Frame frame;
+      const hal::Status status = camera_.next(frame, 10'000'000);
+      const std::lock_guard lock(mutex_);
+      lost_ = camera_.counts().lost;
+      if (status == hal::Status::ok) {
+        exposures_ns_.push_back(frame.exposure_ns);
+      } else if (status != hal::Status::no_data && complaint_.empty()) {
+        complaint_ = camera_.last_error();
+      }
+      camera_.release(frame);
+      if (status == hal::Status::disconnected) {
+        if (may_be_back) {
+          (void)camera_.open();
+        }
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      }
+    }
+  }
+
+  v4l2::V4l2Camera camera_;
+  std::mutex mutex_;  // of what follows
+  std::vector<std::int64_t> exposures_ns_;
+  std::string complaint_;  // the first
+  std::uint64_t lost_ = 0;
+  std::atomic<bool> over_{false};
+  bool unplugged_ = false;
+  std::thread thread_;
+};
+
 // What one tick left: of the servo, and of the world.
 struct WiredTick {
   std::uint64_t index;
   rt::Fault fault;
   rt::StopStage stage;
   rt::Phase phase;
+  std::uint32_t alarms;
   bool level;                     // of the heartbeat's wire
   bool gate;                      // of the gate's wire
   bool moves;                     // a drive
@@ -55,6 +152,7 @@ struct WiredTick {
   std::array<bool, 3> follows;    // a drive its set-points
   std::array<bool, 3> has_power;  // a drive's motor
   Vec3 tip_m;                     // in truth
+  bool punctured;                 // likewise
 };
 
 class WiredServo {
@@ -64,7 +162,12 @@ class WiredServo {
   static constexpr double kPowerOffAfter_s = 0.1;
   static constexpr double kFalconAhead_m = 0.12;  // of the middle of its base: the origin of the hand
 
-  WiredServo() {
+  static constexpr double kStaleAfter_s = 0.1;  // of pictures of the camera
+
+  explicit WiredServo(bool with_camera = false) {
+    if (with_camera) {
+      camera.emplace(clock);
+    }
     wait_for_falcon(true);
     auto loaded = tools::load_scene(
         "free",
@@ -88,7 +191,7 @@ class WiredServo {
     c.axis.emplace();
     c.guard.emplace();
     c.phases.emplace();
-    c.local_model.emplace();
+    c.local_model.emplace().stale_after_s = with_camera ? kStaleAfter_s : c.local_model->stale_after_s;
     c.injector->max_open_s = 60;
     c.estop.power_off_after_s = kPowerOffAfter_s;
     c.mapping.tremor_cutoff_Hz = 10;
@@ -169,6 +272,7 @@ class WiredServo {
   std::unique_ptr<GpioSim> board = std::make_unique<GpioSim>();
   std::optional<CanInterface> can0{std::in_place, "can0"}, can1{std::in_place, "can1"};
   std::optional<DrivesOnBus> drives{std::in_place, "can1", 3};
+  std::optional<WatchedCamera> camera;
   std::unique_ptr<FalconOnUsb> falcon =
       std::make_unique<FalconOnUsb>(emulator::FalconParams{.booted = true, .homed = true});
   rt::ServoConfig config;
@@ -182,6 +286,7 @@ class WiredServo {
   static constexpr double kForceSteps_N = 0.05;  // of motors, where the hand is
   static constexpr std::int64_t kRelay_ns = 50'000'000;
   static constexpr std::uint64_t kFrameEvery = 10, kFrameLate = 20;  // ticks
+  static constexpr std::uint64_t kPictureLate = 10;                  // the same of a camera of 60 Hz
   static constexpr double kR_m = 60e-6, kPuncture_m = 4e-6, kIn_m = 12e-6, kTremble_m = 0.25e-3;
   inline static const Vec3 kStart_m{24e-6, 2e-6, 0}, kCentre_m{-40e-6, 0, 0};
 
@@ -215,28 +320,45 @@ class WiredServo {
     return x;
   }
 
-  void look(const Vec3& tip_m, std::uint64_t index, std::int64_t now_ns) {
+  [[nodiscard]] static double gap_m(const Vec3& tip_m) {
     const double beside2 = tip_m.y() * tip_m.y() + tip_m.z() * tip_m.z();
-    const double gap_m = tip_m.x() - (kCentre_m.x() + std::sqrt(std::max(0.0, kR_m * kR_m - beside2)));
-    punctured_ = gap_m <= 10e-6 && (punctured_ || -gap_m > kPuncture_m);
-    if (index >= next_frame_) {
+    return tip_m.x() - (kCentre_m.x() + std::sqrt(std::max(0.0, kR_m * kR_m - beside2)));
+  }
+  // The needle as it was then.
+  [[nodiscard]] rt::Observation seen(const WiredTick& then, std::int64_t exposure_ns) {
+    const double gap = gap_m(then.tip_m);
+    rt::Observation o;
+    o.frame = ++frames_;
+    o.exposure_ns = exposure_ns;
+    o.flags = rt::Observation::tip_ok | rt::Observation::outer_ok |
+              (then.punctured ? rt::Observation::punctured : 0U) | (gap < 0 ? rt::Observation::contact : 0U);
+    for (int i = 0; i < 2; ++i) {
+      o.tip_m[i] = then.tip_m[i];
+      o.centre_m[i] = kCentre_m[i];
+    }
+    o.R_m = kR_m;
+    o.gap_m = gap;
+    if (gap < 0) {
+      o.wd_m = then.punctured ? 0 : -gap;
+      o.a_m = 3.8e-6 + 0.45 * std::sqrt(2 * kR_m * -gap);
+    }
+    return o;
+  }
+  void look(WiredTick& now, std::int64_t now_ns) {
+    const std::uint64_t index = now.index;
+    const double gap = gap_m(now.tip_m);
+    punctured_ = now.punctured = gap <= 10e-6 && (punctured_ || -gap > kPuncture_m);
+    if (camera) {
+      for (const std::int64_t exposure_ns : camera->taken()) {
+        const auto then = std::find_if(ticks.rbegin(), ticks.rend(), [&](const WiredTick& tick) {
+          return static_cast<std::int64_t>(tick.index) * kPeriod_ns <= exposure_ns - first_ns_;
+        });
+        on_their_way_.emplace_back(index + kPictureLate,
+                                   seen(then != ticks.rend() ? *then : now, exposure_ns));
+      }
+    } else if (index >= next_frame_) {
       next_frame_ = index + kFrameEvery;
-      rt::Observation o;
-      o.frame = ++frames_;
-      o.exposure_ns = now_ns;
-      o.flags = rt::Observation::tip_ok | rt::Observation::outer_ok |
-                (punctured_ ? rt::Observation::punctured : 0U) | (gap_m < 0 ? rt::Observation::contact : 0U);
-      for (int i = 0; i < 2; ++i) {
-        o.tip_m[i] = tip_m[i];
-        o.centre_m[i] = kCentre_m[i];
-      }
-      o.R_m = kR_m;
-      o.gap_m = gap_m;
-      if (gap_m < 0) {
-        o.wd_m = punctured_ ? 0 : -gap_m;
-        o.a_m = 3.8e-6 + 0.45 * std::sqrt(2 * kR_m * -gap_m);
-      }
-      on_their_way_.emplace_back(index + kFrameLate, o);
+      on_their_way_.emplace_back(index + kFrameLate, seen(now, now_ns));
     }
     while (!on_their_way_.empty() && on_their_way_.front().first <= index) {
       const rt::Observation& o = on_their_way_.front().second;
@@ -276,7 +398,7 @@ class WiredServo {
     }
     row.moves = speed_m_s > 0;
     row.pushes = acts_N.norm() > 0;
-    look(row.tip_m, tick.index, tick.wake_ns);
+    look(row, tick.wake_ns);
 
     rt::test::Seen& seen = watched_->seen;
     seen = {};
@@ -321,6 +443,7 @@ class WiredServo {
     row.fault = servo_->fault();
     row.stage = servo_->stop_stage();
     row.phase = servo_->phase();
+    row.alarms = servo_->sample().alarms;
     ticks.push_back(row);
     if (const double stall = stall_ms.exchange(0); stall > 0) {
       clock.sleep_until_ns(clock.now_ns() + std::llround(stall * 1e6));

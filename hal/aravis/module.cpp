@@ -515,6 +515,19 @@ void AravisCamera::release(const hal::Frame&) { give_back(std::move(held_)); }
 }  // namespace
 }  // namespace punctum::aravis
 
+void punctum_list_network_cameras(std::vector<punctum::aravis::NetworkCamera>& out) {
+  ArvInterface* const network = arv_gv_interface_get_instance();  // that of USB would open its cameras
+  arv_interface_update_device_list(network);
+  const auto text = [](const char* said) { return std::string(said == nullptr ? "" : said); };
+  for (unsigned i = 0; i < arv_interface_get_n_devices(network); ++i) {
+    out.push_back({text(arv_interface_get_device_id(network, i)),
+                   text(arv_interface_get_device_vendor(network, i)),
+                   text(arv_interface_get_device_model(network, i)),
+                   text(arv_interface_get_device_serial_nbr(network, i)),
+                   text(arv_interface_get_device_address(network, i))});
+  }
+}
+
 punctum::hal::LiveCamera* punctum_make_aravis_camera(const punctum::aravis::AravisParams& params,
                                                      const punctum::hal::CameraSettings& settings,
                                                      const punctum::hal::Clock& clock) {

@@ -75,6 +75,23 @@ TEST_F(PluggedCamera, one_that_is_unplugged_is_looked_for_and_used_again_when_it
   EXPECT_EQ(r["vision_restarts"].size(), 0U) << run.output();
 }
 
+TEST_F(PluggedCamera, check_says_whether_it_is_there_and_devices_how_to_use_it) {
+  const tests::NetworkCameraLock one_at_a_time;
+  EXPECT_EQ(punctum({"check", scene()}), 2) << said_;
+  EXPECT_NE(said_.find("FAIL camera             aravis: 127.0.0.1 is not on USB and does not answer"),
+            std::string::npos)
+      << said_;
+  const tests::NetworkCamera camera = tests::plug_in_network_camera();
+  EXPECT_EQ(punctum({"check", scene()}), 0) << said_;
+  EXPECT_NE(said_.find("ok   camera             aravis: Aravis "), std::string::npos) << said_;
+  EXPECT_NE(said_.find("serial number GV01, at 127.0.0.1)"), std::string::npos) << said_;
+  EXPECT_EQ(punctum({"devices"}), 0) << said_;
+  EXPECT_NE(said_.find("GigE Vision cameras\n"), std::string::npos) << said_;
+  EXPECT_NE(said_.find("      device = \"aravis\"\n      [aravis]\n      name = \"Aravis-Fake-GV01\"\n"),
+            std::string::npos)
+      << said_;
+}
+
 TEST_F(PluggedCamera, one_that_is_not_there_ends_the_run_before_anything_moves) {
   EXPECT_EQ(punctum({"run", scene(), "--set", "aravis.name=Fake_7"}), 2) << said_;
   EXPECT_NE(said_.find("no such camera is found"), std::string::npos) << said_;

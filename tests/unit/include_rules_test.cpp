@@ -143,7 +143,7 @@ std::vector<Room> house() {
        kTools},
       {"tools/punctum/",
        station + Names{"hal/gpiod/config", "hal/gpiod/", "hal/cia402/", "hal/zaber/config", "hal/zaber/",
-                       "hal/v4l2/config", "hal/v4l2/", "hal/evdev/"},
+                       "hal/v4l2/config", "hal/v4l2/", "hal/aravis/", "hal/evdev/"},
        kTools},
       {"tools/vision/", pictures + Names{"hal/v4l2/", "hal/aravis/"}, kTools},
       {"tools/report/", pictures, kTools},

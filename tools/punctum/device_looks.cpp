@@ -40,17 +40,57 @@ hal::Findings look_at_v4l2(const Scene& scene, const Machine& machine, std::stri
   return v4l2::V4l2Camera(*scene.v4l2, *scene.camera, clock, *machine.video).look();
 }
 
-// The library that speaks to these cameras looks for them in the network, and opens them to know more.
+std::string names_of(const std::vector<PluggedIn>& cameras) {
+  std::string names;
+  for (const PluggedIn& camera : cameras) {
+    names += (names.empty() ? "" : ", ") + camera.place;
+  }
+  return names;
+}
+
 hal::Findings look_at_aravis(const Scene& scene, const Machine& machine, std::string_view) {
   const std::string& name = scene.aravis->name;
-  const std::vector<PluggedIn> cameras = usb_vision_cameras(machine);
-  const auto one = std::ranges::find_if(
-      cameras, [&name](const PluggedIn& camera) { return name.empty() || camera.place == name; });
-  if (one == cameras.end()) {
-    return {{Is::note, fmt::format("{}is not on USB; a GigE camera shows when it is opened",
-                                   name.empty() ? "" : name + " ")}};
+  if (name.starts_with("Fake")) {
+    return {{Is::note, name + " is a camera inside libaravis: it shows when it is opened"}};
   }
-  return {{one->remedy.empty() ? Is::found : Is::missing, one->remedy.empty() ? one->what : one->remedy}};
+  const auto found = [](const PluggedIn& camera) -> hal::Findings {
+    return {{camera.remedy.empty() ? Is::found : Is::missing,
+             camera.remedy.empty() ? camera.what : camera.remedy}};
+  };
+  std::vector<PluggedIn> cameras = usb_vision_cameras(machine);
+  if (const auto one = std::ranges::find(cameras, name, &PluggedIn::place); one != cameras.end()) {
+    return found(*one);
+  }
+  const NetworkCameras asked = machine.ask_network();
+  if (!asked) {
+    return {{Is::missing, asked.error()}};
+  }
+  const std::vector<PluggedIn> on_network = gige_vision_cameras(asked.value());
+  if (name.empty()) {
+    cameras.insert(cameras.end(), on_network.begin(), on_network.end());
+    if (cameras.size() == 1) {
+      return found(cameras.front());
+    }
+    return {{Is::missing, cameras.empty() ? "no camera is plugged in on USB, and none answers on the network"
+                                          : "there are several cameras, allowed: aravis.name = one of " +
+                                                names_of(cameras)}};
+  }
+  for (std::size_t i = 0; i < asked->size(); ++i) {
+    const aravis::NetworkCamera& camera = (*asked)[i];
+    if (name == camera.name || name == camera.maker + "-" + camera.serial || name == camera.address) {
+      return found(on_network[i]);
+    }
+  }
+  // The library shortens some makers' names, and knows cameras by names that their users gave them.
+  cameras.insert(cameras.end(), on_network.begin(), on_network.end());
+  if (const bool address = name.find_first_not_of("0123456789.") == std::string::npos;
+      !cameras.empty() && !address) {
+    return {{Is::note, fmt::format("{} is not seen, but {}: whether it is the same shows when it is opened",
+                                   name, names_of(cameras))}};
+  }
+  return {{Is::missing, fmt::format("{} is not on USB and does not answer on the network, allowed for "
+                                    "aravis.name: one that `punctum devices` shows",
+                                    name)}};
 }
 
 hal::Findings one_of(const std::vector<PluggedIn>& there, std::string missing) {

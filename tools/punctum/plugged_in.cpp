@@ -17,6 +17,7 @@
 #include "tools/punctum/kernel_watchdog.hpp"
 #include "tools/scene/messages.hpp"
 #include "tools/scene/scene.hpp"
+#include "tools/shared/module.hpp"
 
 namespace punctum::tools {
 namespace {
@@ -207,6 +208,33 @@ std::vector<PluggedIn> usb_vision_cameras(const Machine& machine) {
   return found;
 }
 
+NetworkCameras network_cameras() {
+  const auto list = function_of_module(aravis::kModule, aravis::kListNetworkCameras);
+  if (!list) {
+    return tl::unexpected(fmt::format("{} ({})", aravis::kNotInstalled, list.error()));
+  }
+  std::vector<aravis::NetworkCamera> cameras;
+  reinterpret_cast<aravis::ListNetworkCameras>(*list)(cameras);
+  return cameras;
+}
+
+std::vector<PluggedIn> gige_vision_cameras(const Machine& machine) {
+  const NetworkCameras cameras = machine.ask_network();
+  return cameras ? gige_vision_cameras(*cameras) : std::vector<PluggedIn>{{"", cameras.error(), ""}};
+}
+
+std::vector<PluggedIn> gige_vision_cameras(const std::vector<aravis::NetworkCamera>& cameras) {
+  std::vector<PluggedIn> found;
+  for (const aravis::NetworkCamera& camera : cameras) {
+    found.push_back({printable(camera.name, 100),
+                     printable(fmt::format("{} {} (GigE, serial number {}, at {})", camera.maker,
+                                           camera.model, camera.serial, camera.address),
+                               200),
+                     ""});
+  }
+  return found;
+}
+
 std::vector<PluggedIn> falcons(const Machine& machine) {
   std::vector<PluggedIn> found;
   for (const UsbDevice& usb : usb_devices(machine)) {
@@ -306,7 +334,7 @@ const std::vector<PluggedKind>& plugged_kinds() {
        "max_tilt_rad = 0\n"
        "[cia402]\n"
        "interface = \"{}\"\n"
-       "# and its drives, three to six, each a [[cia402.axis]] or here:\n"
+       "# and its drives, one to six, each a [[cia402.axis]] or here:\n"
        "# axis = [{node = 1, count_um = [0.04, 0, 0]}, {node = 2, count_um = [0, 0.04, 0]}, "
        "{node = 3, count_um = [0, 0, 0.04]}]\n"},
       {"V4L2 cameras", v4l2_cameras, "camera", "v4l2",
@@ -315,6 +343,12 @@ const std::vector<PluggedKind>& plugged_kinds() {
        "[v4l2]\n"
        "path = \"{}\"\n"},
       {"USB3 Vision cameras", usb_vision_cameras, "camera", "aravis",
+       "[camera]\n"
+       "device = \"aravis\"\n"
+       "[aravis]\n"
+       "name = \"{}\"\n"},
+      {"GigE Vision cameras", [](const Machine& machine) { return gige_vision_cameras(machine); }, "camera",
+       "aravis",
        "[camera]\n"
        "device = \"aravis\"\n"
        "[aravis]\n"
@@ -353,6 +387,10 @@ std::string plugged_in(const Machine& machine) {
         *kind.table == '\0' || (device != known_backends().end() &&
                                 std::ranges::find(device->second, kind.backend) != device->second.end());
     for (const PluggedIn& one : found) {
+      if (one.place.empty()) {
+        text += fmt::format("  {}\n", one.what);
+        continue;
+      }
       text += fmt::format("  {}  {}\n", one.place, one.what);
       if (!one.remedy.empty()) {
         text += fmt::format("      first: {}\n", one.remedy);

@@ -1,5 +1,6 @@
 // What is plugged in to this machine, and the lines of a scene that would use it. Reads, and asks the kernel;
-// opens no watchdog (that would arm it), claims nothing, sends nothing.
+// opens no watchdog (that would arm it), claims nothing, sends nothing but the question to cameras on a
+// network who they are.
 #pragma once
 
 #include <unistd.h>
@@ -9,8 +10,10 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <tl/expected.hpp>
 #include <vector>
 
+#include "hal/aravis/module.hpp"
 #include "hal/cia402/look.hpp"
 #include "hal/evdev/which_hand.hpp"
 #include "hal/gpiod/lines.hpp"
@@ -18,12 +21,17 @@
 
 namespace punctum::tools {
 
+using NetworkCameras = tl::expected<std::vector<aravis::NetworkCamera>, std::string>;
+// Those that answer within a second, or why nobody can be asked. Loads libaravis.
+[[nodiscard]] NetworkCameras network_cameras();
+
 // Where to look; a test puts folders and answers of its own in their place.
 struct Machine {
   std::filesystem::path root = "/";
   gpiod::OpenChip open_chip = gpiod::open_chip;
   std::function<std::optional<cia402::CanLink>(const std::string&)> can_link = cia402::can_link;
   v4l2::Kernel* video = &v4l2::this_kernel();
+  std::function<NetworkCameras()> ask_network = network_cameras;
 
   // Of the path on the machine.
   [[nodiscard]] std::filesystem::path at(const std::filesystem::path& path) const {
@@ -32,7 +40,7 @@ struct Machine {
 };
 
 struct PluggedIn {
-  std::string place;  // path or name, as a scene says it
+  std::string place;  // path or name, as a scene says it; empty: nobody could look, and `what` says why
   std::string what;
   std::string remedy;  // what keeps this user from it, and what to do; empty: nothing
 };
@@ -49,6 +57,8 @@ struct UsbDevice {
 [[nodiscard]] std::vector<PluggedIn> v4l2_cameras(const Machine& machine);
 [[nodiscard]] std::vector<UsbDevice> usb_devices(const Machine& machine);
 [[nodiscard]] std::vector<PluggedIn> usb_vision_cameras(const Machine& machine);
+[[nodiscard]] std::vector<PluggedIn> gige_vision_cameras(const std::vector<aravis::NetworkCamera>& cameras);
+[[nodiscard]] std::vector<PluggedIn> gige_vision_cameras(const Machine& machine);
 [[nodiscard]] std::vector<PluggedIn> falcons(const Machine& machine);
 // Every input device, event2 before event10, as sysfs tells it; `number` is that of its file, major:minor.
 struct NumberedInput {

@@ -1,10 +1,10 @@
 #include "tools/vision/live_camera.hpp"
 
-#include <dlfcn.h>
 #include <fmt/format.h>
 
 #include "hal/aravis/module.hpp"
 #include "hal/v4l2/v4l2_camera.hpp"
+#include "tools/shared/module.hpp"
 
 namespace punctum::tools {
 
@@ -14,17 +14,13 @@ tl::expected<std::unique_ptr<hal::LiveCamera>, std::string> make_live_camera(con
     return std::make_unique<v4l2::V4l2Camera>(*scene.v4l2, *scene.camera, clock);
   }
   // Its library and what that needs take longer to load than all the rest of this program.
-  void* const module = dlopen(aravis::kModule, RTLD_NOW | RTLD_LOCAL);
-  const auto make =
-      module == nullptr ? nullptr : reinterpret_cast<aravis::MakeCamera>(dlsym(module, aravis::kMakeCamera));
-  if (make == nullptr) {
-    const char* const why = dlerror();
+  const auto make = function_of_module(aravis::kModule, aravis::kMakeCamera);
+  if (!make) {
     return tl::unexpected(
-        fmt::format("camera.device = \"aravis\" is not part of this installation ({}): it is built where "
-                    "libaravis-dev is installed",
-                    why == nullptr ? aravis::kModule : why));
+        fmt::format("camera.device = \"aravis\" is {} ({})", aravis::kNotInstalled, make.error()));
   }
-  return std::unique_ptr<hal::LiveCamera>(make(*scene.aravis, *scene.camera, clock));
+  return std::unique_ptr<hal::LiveCamera>(
+      reinterpret_cast<aravis::MakeCamera>(*make)(*scene.aravis, *scene.camera, clock));
 }
 
 }  // namespace punctum::tools

@@ -184,6 +184,38 @@ TEST_F(AravisTest, what_it_cannot_do_is_one_line) {
 
 // ---- over the network ----
 
+TEST_F(AravisTest, a_camera_on_the_network_is_listed_and_whoever_streams_from_it_goes_on) {
+  const tests::NetworkCameraLock one_at_a_time;
+  const auto here = [] {
+    std::vector<NetworkCamera> found;
+    punctum_list_network_cameras(found);
+    std::erase_if(found, [](const NetworkCamera& one) { return one.address != "127.0.0.1"; });
+    return found;
+  };
+  EXPECT_TRUE(here().empty());
+  tests::NetworkCamera there = tests::plug_in_network_camera();
+  params.name = "127.0.0.1";
+  settings.fps = 25;
+  ASSERT_EQ(opened(), "");
+  ASSERT_EQ(good_frame(), Status::ok) << camera->last_error();
+  const auto found = here();
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].name, "Aravis-Fake-GV01");
+  EXPECT_EQ(found[0].maker, "Aravis");
+  EXPECT_EQ(found[0].serial, "GV01");
+  EXPECT_EQ(found[0].model, "Fake");
+  for (int i = 0; i < 5; ++i) {
+    ASSERT_EQ(good_frame(), Status::ok) << camera->last_error();
+  }
+  for (const char* name : {"Aravis-Fake-GV01", "Aravis-GV01"}) {
+    params.name = name;
+    ASSERT_EQ(opened(), "") << "with the model in its name and without";
+  }
+  camera.reset();
+  there.reset();
+  EXPECT_TRUE(here().empty()) << "of one that has gone nothing is kept";
+}
+
 TEST_F(AravisTest, a_camera_on_the_network_is_lost_when_it_goes_and_can_be_opened_when_it_is_back) {
   const tests::NetworkCameraLock one_at_a_time;
   tests::NetworkCamera there = tests::plug_in_network_camera();

@@ -147,6 +147,9 @@ class DeviceLooks : public testing::Test {
       return link && link->name == name_of_it ? link : std::nullopt;
     };
     machine.video = &video;
+    machine.ask_network = [this]() -> NetworkCameras {
+      return has_library ? NetworkCameras(network) : tl::unexpected(std::string("no library"));
+    };
     video.width = 640;
     video.height = 480;
   }
@@ -181,6 +184,8 @@ class DeviceLooks : public testing::Test {
   std::map<unsigned, gpiod::LineFacts> lines;
   std::optional<cia402::CanLink> link;
   tests::FakeVideo video;
+  bool has_library = true;
+  std::vector<aravis::NetworkCamera> network;
 };
 
 testing::AssertionResult says(const std::string& text, const std::string& words) {
@@ -325,8 +330,9 @@ TEST_F(DeviceLooks, a_usb_camera_of_genicam_is_found_by_maker_and_serial_number)
       kSmallest +
       "[camera]\ndevice = \"aravis\"\n[aravis]\nname = \"Basler-77\"\n[vision]\nmethod = "
       "\"paper\"\ninner = false\n";
-  EXPECT_TRUE(
-      says(look(scene), "camera: note aravis: Basler-77 is not on USB; a GigE camera shows when it is"));
+  EXPECT_TRUE(says(look(scene),
+                   "camera: MISSING aravis: Basler-77 is not on USB and does not answer on the "
+                   "network, allowed for aravis.name: one that `punctum devices` shows\n"));
   for (const auto& [name, text] :
        {std::pair{"idVendor", "2676"}, std::pair{"idProduct", "ba02"}, std::pair{"manufacturer", "Basler"},
         std::pair{"product", "acA1300"}, std::pair{"serial", "77"}, std::pair{"busnum", "2"},
@@ -335,7 +341,43 @@ TEST_F(DeviceLooks, a_usb_camera_of_genicam_is_found_by_maker_and_serial_number)
   }
   file("/sys/bus/usb/devices/2-1:1.0/bInterfaceClass", "ef");
   file("/sys/bus/usb/devices/2-1:1.0/bInterfaceSubClass", "05");
+  has_library = false;  // it is not asked
   EXPECT_TRUE(says(look(scene), "camera: ok aravis: Basler acA1300 (USB 2676:ba02, serial number 77)"));
+}
+
+TEST_F(DeviceLooks, a_camera_on_the_network_is_found_by_its_name_or_address_or_missing_in_a_line) {
+  const auto scene = [](const std::string& name) {
+    return kSmallest + "[camera]\ndevice = \"aravis\"\n[aravis]\n" + name +
+           "[vision]\nmethod = \"paper\"\ninner = false\n";
+  };
+  const std::string by_name = scene("name = \"FLIR-9\"\n"), the_only_one = scene("");
+  EXPECT_TRUE(
+      says(look(the_only_one),
+           "camera: MISSING aravis: no camera is plugged in on USB, and none answers on the network\n"));
+  network.push_back({"FLIR-BFS-9", "FLIR", "BFS", "9", "192.168.1.20"});
+  const std::string found = "camera: ok aravis: FLIR BFS (GigE, serial number 9, at 192.168.1.20)\n";
+  EXPECT_TRUE(says(look(by_name), found));
+  EXPECT_TRUE(says(look(scene("name = \"FLIR-BFS-9\"\n")), found));
+  EXPECT_TRUE(says(look(scene("name = \"192.168.1.20\"\n")), found));
+  EXPECT_TRUE(says(look(scene("name = \"left\"\n")),
+                   "camera: note aravis: left is not seen, but FLIR-BFS-9: "
+                   "whether it is the same shows when it is opened\n"));
+  EXPECT_TRUE(says(look(the_only_one), found));
+  EXPECT_TRUE(says(look(scene("name = \"192.168.1.2\"\n")),
+                   "camera: MISSING aravis: 192.168.1.2 is not on USB and does not answer on the network"));
+  EXPECT_TRUE(says(look(scene("name = \"Fake_1\"\n")), "camera: note aravis: Fake_1 is a camera inside"));
+  network.push_back({"Basler-3", "Basler", "acA640", "3", "192.168.1.21"});
+  EXPECT_TRUE(says(look(the_only_one),
+                   "camera: MISSING aravis: there are several cameras, allowed: "
+                   "aravis.name = one of FLIR-BFS-9, Basler-3\n"));
+  const std::string listed = plugged_in(machine);
+  EXPECT_TRUE(says(listed,
+                   "GigE Vision cameras\n  FLIR-BFS-9  FLIR BFS (GigE, serial number 9, at 192.168.1.20)\n"
+                   "      [camera]\n      device = \"aravis\"\n      [aravis]\n      name = \"FLIR-BFS-9\"\n"
+                   "  Basler-3  Basler acA640"));
+  has_library = false;
+  EXPECT_TRUE(says(look(by_name), "camera: MISSING aravis: no library\n"));
+  EXPECT_TRUE(says(plugged_in(machine), "GigE Vision cameras\n  no library\nNovint Falcons: none\n"));
 }
 
 TEST_F(DeviceLooks, a_watchdog_is_asked_for_by_its_folder_and_never_opened) {
@@ -414,7 +456,8 @@ TEST_F(DeviceLooks, a_watchdog_that_cannot_be_disarmed_is_not_opened) {
 TEST_F(DeviceLooks, what_is_plugged_in_is_listed_with_the_lines_that_would_use_it) {
   EXPECT_EQ(plugged_in(machine),
             "GPIO chips: none\nCAN interfaces: none\nV4L2 cameras: none\nUSB3 Vision cameras: none\n"
-            "Novint Falcons: none\nmice, gamepads, SpaceMice: none\nserial ports: none\nwatchdogs: none\n");
+            "GigE Vision cameras: none\nNovint Falcons: none\nmice, gamepads, SpaceMice: none\nserial ports: "
+            "none\nwatchdogs: none\n");
   file("/dev/gpiochip2");
   lines[1] = {"STOP_B", true, "punctum"};
   file("/sys/class/net/can0/type", "280");

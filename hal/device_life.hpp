@@ -24,6 +24,7 @@ struct Served {
   HoldingVacuum* vacuum = nullptr;
   ForceSensor* force_sensor = nullptr;
   QueuedPositioner* positioner = nullptr;
+  EnablingSwitch* enabling = nullptr;
 };
 
 // What can be seen of a device while nothing of it is claimed, set, or sent anything: one line each. A

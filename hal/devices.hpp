@@ -134,6 +134,22 @@ class EstopChain {
   ~EstopChain() = default;
 };
 
+// A three-position enabling switch beside the handle: two contacts, both closed in its middle position only.
+struct EnablingState {
+  bool contact_a_closed = false;  // false = let go or squeezed; a cut wire reads false
+  bool contact_b_closed = false;
+  bool pulse_seen = false;  // a contact has opened and closed again since the last reading
+  std::int64_t sample_ns = 0;
+};
+
+class EnablingSwitch {
+ public:
+  [[nodiscard]] virtual Status read(EnablingState& out) NONBLOCKING = 0;
+
+ protected:
+  ~EnablingSwitch() = default;
+};
+
 struct InjectorState {
   bool open = false;  // by the valve's own contact
   std::int64_t sample_ns = 0;

@@ -1,4 +1,4 @@
-// Which GPIO lines the safety chain and the injector are wired to: table [gpiod] of a scene.
+// Which GPIO lines the devices are wired to: table [gpiod] of a scene.
 #pragma once
 
 #include <cstdint>
@@ -30,6 +30,8 @@ struct GpiodParams {
   int gate = kNotWired;
   Gate gate_opens_at = Gate::high;
   int valve_contact = kNotWired;  // closed while the valve is shut; not wired: the gate's line is read back
+  int enabling_a = kNotWired;     // of the enabling switch: closed in its middle position only
+  int enabling_b = kNotWired;
 };
 constexpr auto keys_of(const GpiodParams*) {
   return hal::keys(hal::text("chip", &GpiodParams::chip),
@@ -41,7 +43,9 @@ constexpr auto keys_of(const GpiodParams*) {
                    hal::whole("heartbeat", &GpiodParams::heartbeat, kNotWired, 1023),
                    hal::whole("gate", &GpiodParams::gate, kNotWired, 1023),
                    hal::choice("gate_opens_at", &GpiodParams::gate_opens_at, "high", "low"),
-                   hal::whole("valve_contact", &GpiodParams::valve_contact, kNotWired, 1023));
+                   hal::whole("valve_contact", &GpiodParams::valve_contact, kNotWired, 1023),
+                   hal::whole("enabling_a", &GpiodParams::enabling_a, kNotWired, 1023),
+                   hal::whole("enabling_b", &GpiodParams::enabling_b, kNotWired, 1023));
 }
 
 }  // namespace punctum::gpiod

@@ -27,14 +27,17 @@ std::string no_line(const GpiodParams& params, const char* key, int offset, unsi
 
 }  // namespace
 
-std::array<WiredLine, 6> wired_lines(const GpiodParams& params, GpiodParts parts) {
+std::array<WiredLine, kWiredLines> wired_lines(const GpiodParams& params, GpiodParts parts) {
+  const bool gate_low = params.gate_opens_at == GpiodParams::Gate::low;
   return {{{parts.estop, "heartbeat", params.heartbeat, Use::output},
-           {parts.injector, "gate", params.gate, Use::output},
+           {parts.injector, "gate", params.gate, Use::output, gate_low},
            {parts.estop, "contact_a", params.contact_a, Use::watched_input},
            {parts.estop, "contact_b", params.contact_b, Use::watched_input},
            {parts.estop, "reset", params.reset, Use::input},
            {parts.injector && params.valve_contact != kNotWired, "valve_contact", params.valve_contact,
-            Use::input}}};
+            Use::input},
+           {parts.enabling, "enabling_a", params.enabling_a, Use::watched_input},
+           {parts.enabling, "enabling_b", params.enabling_b, Use::watched_input}}};
 }
 
 hal::Findings look(const GpiodParams& params, GpiodParts parts, const OpenChip& open_chip_at) {
@@ -71,7 +74,7 @@ hal::Findings look(const GpiodParams& params, GpiodParts parts, const OpenChip& 
 }
 
 // The level first, then the changes: one that comes in between is in this reading, not lost.
-Status GpiodEstop::read_contact(Contact& contact, bool& closed, bool& pulse) NONBLOCKING {
+static Status read_contact(Contact& contact, bool& closed, bool& pulse) NONBLOCKING {
   if (const Status read = contact.line->read(closed); read != Status::ok) {
     return read;
   }
@@ -105,6 +108,19 @@ Status GpiodEstop::read(hal::EstopState& out) NONBLOCKING {
 
 void GpiodEstop::heartbeat(bool level) NONBLOCKING { written_ = heartbeat_->write(level); }
 
+Status GpiodEnabling::read(hal::EnablingState& out) NONBLOCKING {
+  hal::EnablingState state;
+  state.sample_ns = clock_.now_ns();
+  Status status = read_contact(a_, state.contact_a_closed, state.pulse_seen);
+  if (status == Status::ok) {
+    status = read_contact(b_, state.contact_b_closed, state.pulse_seen);
+  }
+  if (status == Status::ok) {
+    out = state;
+  }
+  return status;
+}
+
 void GpiodInjector::gate(bool open) NONBLOCKING { written_ = gate_->write(open); }
 
 Status GpiodInjector::read(hal::InjectorState& out) NONBLOCKING {
@@ -128,6 +144,7 @@ GpiodDevices::GpiodDevices(GpiodParams params, GpiodParts parts, const hal::Cloc
       parts_(parts),
       open_chip_at_(std::move(open_chip_at)),
       estop_(clock),
+      enabling_(clock),
       injector_(clock) {}
 
 tl::expected<void, std::string> GpiodDevices::open() {
@@ -144,16 +161,13 @@ tl::expected<void, std::string> GpiodDevices::open() {
 }
 
 tl::expected<void, std::string> GpiodDevices::claim_all() {
-  const std::array<std::unique_ptr<Line>*, 6> into = {&estop_.heartbeat_, &injector_.gate_,
-                                                      &estop_.a_.line,    &estop_.b_.line,
-                                                      &estop_.reset_,     &injector_.valve_};
-  const auto lines = wired_lines(params_, parts_);
-  for (std::size_t i = 0; i < lines.size(); ++i) {
-    const WiredLine& line = lines[i];
-    if (!line.there) {
+  const auto into = lines();
+  const auto wired = wired_lines(params_, parts_);
+  for (std::size_t i = 0; i < wired.size(); ++i) {
+    if (!wired[i].there) {
       continue;
     }
-    if (std::string error = claim(line.key, line.offset, line.use, *into[i]); !error.empty()) {
+    if (std::string error = claim(wired[i], *into[i]); !error.empty()) {
       return tl::unexpected(std::move(error));
     }
   }
@@ -161,32 +175,36 @@ tl::expected<void, std::string> GpiodDevices::claim_all() {
 }
 
 // Empty, or the line that says why not.
-std::string GpiodDevices::claim(const char* key, int offset, Use use, std::unique_ptr<Line>& into) {
-  if (std::string error = no_line(params_, key, offset, chip_->line_count()); !error.empty()) {
+std::string GpiodDevices::claim(const WiredLine& line, std::unique_ptr<Line>& into) {
+  if (std::string error = no_line(params_, line.key, line.offset, chip_->line_count()); !error.empty()) {
     return error;
   }
   const bool closed_low = params_.contacts_closed == GpiodParams::Closed::low;
-  LineRequest request{static_cast<unsigned>(offset), use};
-  if (use != Use::output) {
+  LineRequest request{static_cast<unsigned>(line.offset), line.use, line.active_low};
+  if (line.use != Use::output) {
     request.active_low = closed_low;
     if (params_.pull == GpiodParams::Pull::internal) {
       request.bias = closed_low ? Bias::pull_up : Bias::pull_down;
     }
-  } else if (&into == &injector_.gate_) {
-    request.active_low = params_.gate_opens_at == GpiodParams::Gate::low;
   }
-  auto line = chip_->claim(request);
-  if (!line) {
-    return title(key, offset) + line.error() + ", allowed: a line of " + params_.chip +
+  auto claimed = chip_->claim(request);
+  if (!claimed) {
+    return title(line.key, line.offset) + claimed.error() + ", allowed: a line of " + params_.chip +
            " that nothing else uses and that can do this (gpioinfo lists them)";
   }
-  into = std::move(*line);
+  into = std::move(*claimed);
   return {};
+}
+
+std::array<std::unique_ptr<Line>*, kWiredLines> GpiodDevices::lines() noexcept {
+  return {&estop_.heartbeat_, &injector_.gate_,  &estop_.a_.line,    &estop_.b_.line,
+          &estop_.reset_,     &injector_.valve_, &enabling_.a_.line, &enabling_.b_.line};
 }
 
 hal::Served GpiodDevices::served() noexcept {
   hal::Served served;
   served.estop = parts_.estop ? &estop_ : nullptr;
+  served.enabling = parts_.enabling ? &enabling_ : nullptr;
   served.injector = parts_.injector ? &injector_ : nullptr;
   return served;
 }
@@ -204,8 +222,7 @@ void GpiodDevices::safe_state() noexcept {
 
 void GpiodDevices::close() noexcept {
   safe_state();
-  for (std::unique_ptr<Line>* line : {&injector_.gate_, &injector_.valve_, &estop_.heartbeat_,
-                                      &estop_.a_.line, &estop_.b_.line, &estop_.reset_}) {
+  for (std::unique_ptr<Line>* line : lines()) {
     line->reset();
   }
   chip_.reset();

@@ -1,4 +1,4 @@
-// The e-stop chain and the injector on the GPIO lines of one chip. Wiring: README.md.
+// The e-stop chain, the enabling switch and the injector on the GPIO lines of one chip. Wiring: README.md.
 #pragma once
 
 #include <array>
@@ -13,8 +13,13 @@
 
 namespace punctum::gpiod {
 
-// Two contacts, the reset button and the heartbeat. The level decides; the changes that the kernel kept only
-// add pulses which no reading saw.
+// The level decides; the changes that the kernel kept only add pulses which no reading saw.
+struct Contact {
+  std::unique_ptr<Line> line;
+  bool closed = false;  // when it was read last
+};
+
+// Two contacts, the reset button and the heartbeat.
 class GpiodEstop final : public hal::EstopChain {
  public:
   explicit GpiodEstop(const hal::Clock& clock) : clock_(clock) {}
@@ -25,16 +30,23 @@ class GpiodEstop final : public hal::EstopChain {
 
  private:
   friend class GpiodDevices;
-  struct Contact {
-    std::unique_ptr<Line> line;
-    bool closed = false;  // when it was read last
-  };
-  [[nodiscard]] static hal::Status read_contact(Contact& contact, bool& closed, bool& pulse) NONBLOCKING;
-
   const hal::Clock& clock_;
   Contact a_, b_;
   std::unique_ptr<Line> reset_, heartbeat_;
   hal::Status written_ = hal::Status::ok;
+};
+
+// Two contacts that are closed in the middle position.
+class GpiodEnabling final : public hal::EnablingSwitch {
+ public:
+  explicit GpiodEnabling(const hal::Clock& clock) : clock_(clock) {}
+
+  [[nodiscard]] hal::Status read(hal::EnablingState& out) NONBLOCKING override;
+
+ private:
+  friend class GpiodDevices;
+  const hal::Clock& clock_;
+  Contact a_, b_;
 };
 
 // The gate, and the contact of its valve; where that is not wired, the gate's own line is read back.
@@ -56,6 +68,7 @@ class GpiodInjector final : public hal::Injector {
 struct GpiodParts {
   bool estop = false;
   bool injector = false;
+  bool enabling = false;
 };
 
 // The lines that these parts use, outputs first: they are to be in their safe state before anything else.
@@ -64,8 +77,10 @@ struct WiredLine {
   const char* key;
   int offset;
   Use use;
+  bool active_low = false;  // of an output; inputs are as contacts_closed says
 };
-[[nodiscard]] std::array<WiredLine, 6> wired_lines(const GpiodParams& params, GpiodParts parts);
+inline constexpr std::size_t kWiredLines = 8;
+[[nodiscard]] std::array<WiredLine, kWiredLines> wired_lines(const GpiodParams& params, GpiodParts parts);
 
 // Chip, lines, their names and users; claims none.
 [[nodiscard]] hal::Findings look(const GpiodParams& params, GpiodParts parts,
@@ -85,13 +100,15 @@ class GpiodDevices final : public hal::Device {
 
  private:
   [[nodiscard]] tl::expected<void, std::string> claim_all();
-  [[nodiscard]] std::string claim(const char* key, int offset, Use use, std::unique_ptr<Line>& into);
+  [[nodiscard]] std::string claim(const WiredLine& line, std::unique_ptr<Line>& into);
+  [[nodiscard]] std::array<std::unique_ptr<Line>*, kWiredLines> lines() noexcept;  // as wired_lines()
 
   const GpiodParams params_;
   const GpiodParts parts_;
   const OpenChip open_chip_at_;
   std::unique_ptr<Chip> chip_;
   GpiodEstop estop_;
+  GpiodEnabling enabling_;
   GpiodInjector injector_;
 };
 

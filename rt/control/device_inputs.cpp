@@ -12,10 +12,9 @@ namespace {
 constexpr double kRounding_s = 1e-9;
 constexpr double kLongest_s = 1e6;  // times that are only compared with limits count no further
 
-constexpr double kEstopSilent_s = 0.02;  // an e-stop chain without data for longer: estop_lost
-// A contact that chatters disagrees with the other one again and again: agreement makes up for a tenth of it.
-constexpr double kAgreementCounts = 0.1;
-constexpr double kResetHeld_s = 0.02;  // a finger is on the button for longer, interference is not
+constexpr double kEstopSilent_s = 0.02;     // an e-stop chain without data for longer: estop_lost
+constexpr double kEnablingSilent_s = 0.02;  // an enabling switch without data for longer: enabling_fault
+constexpr double kResetHeld_s = 0.02;       // a finger is on the button for longer, interference is not
 
 constexpr double kStageReach_m = 1;  // no stage that carries a needle travels as far
 constexpr double kUnit = 1e-3;       // the axis' length is as near to 1
@@ -57,8 +56,11 @@ DeviceInputs::DeviceInputs(const ServoConfig& config, const Devices& devices) NO
       hand_clock_(config.hand_timeout_s),
       hand_check_(config.hand_jump_m / 1e-3, config.velocity.d_m),
       stage_clock_(config.stage_timeout_s),
+      enabling_clock_(kEnablingSilent_s),
+      enabling_contacts_(config.estop.discrepancy_s),
       following_(config.stage_timeout_s),
       estop_clock_(kEstopSilent_s),
+      estop_contacts_(config.estop.discrepancy_s),
       vacuum_clock_(config.vacuum ? config.vacuum->window_s : 0),
       injector_clock_(kContactSilent_s),
       sensor_clock_(kSensorSilent_s) {
@@ -112,21 +114,12 @@ Fault DeviceInputs::read_estop(const TickTime& time) NONBLOCKING {
   }
   const bool a = readings_.estop.contact_a_closed;
   const bool b = readings_.estop.contact_b_closed;
-  const double longest_s = config_.estop.discrepancy_s;
-  contacts_differ_s_ += a != b ? time.elapsed_s : -kAgreementCounts * time.elapsed_s;
-  if (contacts_differ_s_ > longest_s) {
-    discrepancy_ = true;
-  }
-  contacts_differ_s_ = std::clamp(contacts_differ_s_, 0.0, 2 * longest_s);
-  if (!a && !b) {
-    discrepancy_ = false;  // both contacts have shown that they open
-    contacts_differ_s_ = 0;
-  }
+  estop_contacts_.step(a, b, time.elapsed_s);
   if (!a || !b || (answered && read.pulse_seen)) {
-    readings_.estop_discrepancy = discrepancy_;
+    readings_.estop_discrepancy = estop_contacts_.discrepancy();
     return Fault::estop;
   }
-  return discrepancy_ ? Fault::estop_discrepancy : Fault::none;
+  return estop_contacts_.discrepancy() ? Fault::estop_discrepancy : Fault::none;
 }
 
 Fault DeviceInputs::read_hand(const TickTime& time, const LastOutput& last) NONBLOCKING {
@@ -213,16 +206,51 @@ Fault DeviceInputs::judge_enabling(const TickTime& time, const LastOutput& last)
   if (!enabling_) {
     return Fault::none;
   }
-  if (readings_.hand_fresh) {
+  Fault fault = Fault::none;
+  if (devices_.enabling) {
+    fault = read_enabling_switch(time);
+  } else if (readings_.hand_fresh) {
     enabling_->read(readings_.hand.buttons, readings_.between_hand_s);
   }
-  const Fault fault = enabling_->step(last.running, time.elapsed_s);
+  fault = first_of(fault, enabling_->step(last.running, time.elapsed_s));
   readings_.enabled = enabling_->enabled();
   readings_.pressed_anew = enabling_->pressed_anew();
   if (last.running && !readings_.enabled) {
     readings_.alarms |= alarm_not_enabled;
   }
   return fault;
+}
+
+// Held means: both contacts closed, and no pulse between two readings. A switch that cannot be read, or whose
+// contacts disagree, counts as squeezed: it is to be seen let go altogether before its next press.
+Fault DeviceInputs::read_enabling_switch(const TickTime& time) NONBLOCKING {
+  hal::EnablingState read;
+  const hal::Status status = devices_.enabling->read(read);
+  enabling_clock_.step(time.elapsed_s);
+  const bool answered = status == hal::Status::ok;
+  const SampleIs sample = answered ? enabling_clock_.take(read.sample_ns, time.now_ns) : SampleIs::untimely;
+  if (sample == SampleIs::untimely) {
+    readings_.alarms |= alarm_sensor;
+  }
+  if (answered) {
+    const bool a = read.contact_a_closed, b = read.contact_b_closed;
+    enabling_contacts_.step(a, b, time.elapsed_s);
+    const bool held = a && b && !read.pulse_seen;
+    if (sample == SampleIs::fresh) {
+      enabling_->read(held ? hal::kButtonEnable : 0,
+                      1e-9 * static_cast<double>(read.sample_ns - enabling_ns_));
+      enabling_ns_ = read.sample_ns;
+    } else if (!held) {  // an open contact counts, whatever its time
+      enabling_->read(0, 0);
+    }
+  }
+  const bool lost = (!answered && status != hal::Status::no_data) || enabling_clock_.timed_out();
+  if (!lost && !enabling_contacts_.discrepancy()) {
+    return Fault::none;
+  }
+  readings_.alarms |= alarm_sensor;
+  enabling_->read(hal::kButtonPanic, 0);
+  return Fault::enabling_fault;
 }
 
 Fault DeviceInputs::read_stage(const TickTime& time, const LastOutput& last) NONBLOCKING {

@@ -7,6 +7,7 @@
 #include "hal/devices.hpp"
 #include "hal/realtime.hpp"
 #include "rt/control/config.hpp"
+#include "rt/control/contact_pair.hpp"
 #include "rt/control/devices.hpp"
 #include "rt/control/enabling_device.hpp"
 #include "rt/control/following.hpp"
@@ -88,6 +89,7 @@ class DeviceInputs {
   [[nodiscard]] Fault read_estop(const TickTime& time) NONBLOCKING;
   [[nodiscard]] Fault read_hand(const TickTime& time, const LastOutput& last) NONBLOCKING;
   [[nodiscard]] Fault judge_enabling(const TickTime& time, const LastOutput& last) NONBLOCKING;
+  [[nodiscard]] Fault read_enabling_switch(const TickTime& time) NONBLOCKING;
   [[nodiscard]] Fault read_stage(const TickTime& time, const LastOutput& last) NONBLOCKING;
   void take_hand(const hal::HandState& read, const LastOutput& last) NONBLOCKING;
   void release_buttons() NONBLOCKING;
@@ -114,12 +116,14 @@ class DeviceInputs {
   hal::Vec3 mounted_axis_ = -hal::Vec3::UnitX();  // before the station moved
   hal::Vec3 last_told_axis_ = hal::Vec3::Zero();  // believed or not; zero before the first
   std::optional<EnablingDevice> enabling_;
+  SampleClock enabling_clock_;  // of a switch of its own
+  ContactPair enabling_contacts_;
+  std::int64_t enabling_ns_ = 0;
   FollowingCheck following_;
   bool stage_was_enabled_ = false;
   double not_enabled_s_ = 0;
   SampleClock estop_clock_;
-  double contacts_differ_s_ = 0;
-  bool discrepancy_ = false;  // until both contacts were seen open together
+  ContactPair estop_contacts_;
   double reset_held_s_ = 0;
   SampleClock vacuum_clock_;
   double vacuum_low_s_ = 0;

@@ -13,6 +13,7 @@ struct Devices {
   hal::Injector* injector = nullptr;
   hal::HoldingVacuum* vacuum = nullptr;
   hal::ForceSensor* force_sensor = nullptr;
+  hal::EnablingSwitch* enabling = nullptr;  // null: the enabling device, if any, is a button of the hand
 };
 
 }  // namespace punctum::rt

@@ -19,7 +19,7 @@
 namespace punctum::rt {
 
 struct EstopParams {
-  double discrepancy_s = 0.05;     // contacts may differ this long
+  double discrepancy_s = 0.05;     // contacts may differ this long, those of an enabling switch too
   double hand_ramp_s = 0.02;       // hand force to zero
   double power_off_after_s = 0.5;  // drive power off at standstill or after this
 };
@@ -83,6 +83,7 @@ inline constexpr auto kSafetyRules = [] {
       {Fault::stage_not_stopping, stop_and_relay, release_and_reset},
       {Fault::stage_not_enabled, stop, release_and_reset},
       {Fault::enabling_released, stop, release_and_press},
+      {Fault::enabling_fault, stop, release_and_reset},
   }};
 }();
 

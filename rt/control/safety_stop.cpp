@@ -42,6 +42,10 @@ SafetyOutput SafetyStop::step(const Causes& causes, const hal::Vec3& hand_force_
   if (readings.estop_discrepancy) {
     remember(Fault::estop_discrepancy);
   }
+  // A contact that does not open shows only when the switch is let go, and that is the first cause.
+  if ((causes.all & 1U << static_cast<unsigned>(Fault::enabling_fault)) != 0) {
+    remember(Fault::enabling_fault);
+  }
   out.faults_latched = faults_latched_;
 
   if (out.latch.cleared) {

@@ -27,8 +27,9 @@ enum class Fault : std::uint8_t {
   stage_not_stopping,  // the drive moves, keeps its power or cannot be read although it was told to stop
   stage_not_enabled,   // the drive was told to take up operation and does not
   enabling_released,   // the enabling device was let go or squeezed
+  enabling_fault,      // the enabling switch cannot be read, or its two contacts disagreed for too long
 };
-inline constexpr int kFaults = 18;
+inline constexpr int kFaults = 19;
 [[nodiscard]] constexpr const char* name(Fault f) NONBLOCKING {
   constexpr const char* names[] = {"none",
                                    "estop",
@@ -47,7 +48,8 @@ inline constexpr int kFaults = 18;
                                    "injector_open",
                                    "stage_not_stopping",
                                    "stage_not_enabled",
-                                   "enabling_released"};
+                                   "enabling_released",
+                                   "enabling_fault"};
   static_assert(sizeof names == kFaults * sizeof names[0]);
   return names[static_cast<int>(f)];
 }

@@ -99,7 +99,7 @@ class Random {
 struct Draw {
   Lie lie;
   int group;  // 0 hand's motion, 1 buttons, 2 hand, 3 stage, 4 e-stop, 5 vision, 6 other devices, 7 clock, 8
-              // commands
+              // commands, 9 the switch that only set-up 3 has
   double low, high;
   bool both_signs;
   int shortest, longest;
@@ -156,6 +156,12 @@ inline constexpr std::array<Draw, kLies> kDraws{{
     {Lie::estop_gone, 4, 1, 1, false, 1, 900},
     {Lie::estop_time, 4, 1e-4, 10, true, 1, 300},
     {Lie::reset, 4, 1, 1, false, 1, 300},
+    {Lie::switch_a, 9, 1, 1, false, 1, 300},
+    {Lie::switch_b, 9, 1, 1, false, 1, 300},
+    {Lie::switch_welded, 9, 1, 1, false, 1, 600},
+    {Lie::switch_pulse, 9, 1, 1, false, 1, 3},
+    {Lie::switch_no_data, 9, 1, 1, false, 1, 300},
+    {Lie::switch_gone, 9, 1, 1, false, 1, 300},
     {Lie::vision_gone, 5, 1, 1, false, 40, 1200},
     {Lie::vision_late, 5, 1e-3, 1, false, 40, 800},
     {Lie::vision_jumps, 5, 1e-6, 100e-6, true, 40, 800},
@@ -207,7 +213,7 @@ inline Schedule random_schedule(std::uint64_t seed, std::uint64_t number) {
   Schedule s;
   s.from = static_cast<From>(random.below(static_cast<int>(kFroms)));
   const double setup = random.uniform();
-  s.setup = setup < 0.2 ? 1 : setup < 0.4 ? 2 : setup < 0.55 ? 3 : 0;
+  s.setup = setup < 0.1 ? 3 : setup < 0.2 ? 1 : setup < 0.4 ? 2 : setup < 0.55 ? 4 : 0;
   s.events.reserve(16);
   s.ticks = random.duration(300, 2000);
   // Most schedules keep to two or three groups: what is combined is then combined often.
@@ -246,6 +252,15 @@ inline Schedule random_schedule(std::uint64_t seed, std::uint64_t number) {
     s.setup = 0;
     s.from = From::start;
     s.events.push_back({0, s.ticks, Lie::stage_never_enables, 1, 0});
+  }
+  if (s.setup == 3) {
+    constexpr auto kFirst = static_cast<std::size_t>(Lie::switch_a);
+    constexpr int kSwitchLies = static_cast<int>(Lie::switch_gone) - static_cast<int>(Lie::switch_a) + 1;
+    for (int i = random.below(4); i > 0; --i) {
+      const Draw& draw = kDraws[kFirst + static_cast<std::size_t>(random.below(kSwitchLies))];
+      s.events.push_back(
+          {random.below(s.ticks), random.duration(draw.shortest, draw.longest), draw.lie, 1, 0});
+    }
   }
   // A real hand is never still.
   if (random.chance(0.4)) {
@@ -336,7 +351,7 @@ struct Coverage {
 class Search {
  public:
   explicit Search(int setup = 0)
-      : station_(searched_config(setup)),
+      : station_(searched_config(setup), setup == 3),
         rate_Hz_(searched_config(setup).rate_Hz),
         inner_membrane_(searched_config(setup).inner_membrane) {
     prepare();

@@ -198,6 +198,20 @@ struct FakeEstop final : hal::EstopChain {
   }
 };
 
+struct FakeEnabling final : hal::EnablingSwitch {
+  hal::EnablingState state;
+  Status status = Status::ok;
+  std::int64_t now_ns = 0;
+  void hold(bool held) { state.contact_a_closed = state.contact_b_closed = held; }
+  Status read(hal::EnablingState& out) noexcept override {
+    if (status == Status::ok) {
+      out = state;
+      out.sample_ns = now_ns;
+    }
+    return status;
+  }
+};
+
 struct FakeInjector final : hal::Injector {
   bool open = false;
   int open_ticks = 0;

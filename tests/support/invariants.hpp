@@ -179,6 +179,7 @@ struct Bounds {
   // What one false reading of up to 20 ms may move the needle by, there and again back: less than a pixel.
   double false_motion_m = 0.5e-6;
   double brief_s = 0.02;
+  double switch_timeout_s = 0.02;
   double filter_s = 0.3;         // the tremor filter has settled
   double vision_sum_m = 8.5e-6;  // from first contact on
   double clear_m = c.phases.value_or(PhaseParams{}).clear_m;
@@ -227,6 +228,11 @@ struct Seen {
   hal::Status estop_status = hal::Status::ok;
   hal::EstopState estop;
   bool level = false;  // of the heartbeat
+
+  // The enabling device, where it is a switch of its own.
+  bool has_switch = false;
+  hal::Status switch_status = hal::Status::ok;
+  hal::EnablingState enabling;
 
   // Vision: exposure of the newest observation that was delivered, of those that a core may believe.
   std::int64_t seen_ns = 0;
@@ -335,8 +341,9 @@ class Invariants {
     } else {
       buttons_were_ = buttons_;
     }
-    const bool held = (buttons_ & hal::kButtonEnable) != 0;
-    const bool was_held = (buttons_were_ & hal::kButtonEnable) != 0;
+    watch_enabling(s);
+    const bool held = (enabling_ & hal::kButtonEnable) != 0;
+    const bool was_held = (enabling_were_ & hal::kButtonEnable) != 0;
     press_edge_ = !was_running_ && held && (press_edge_ || !was_held);
     if (s.stage_status == hal::Status::ok && s.stage.sample_ns > stage_sample_ns_) {
       stage_sample_ns_ = s.stage.sample_ns;
@@ -361,6 +368,33 @@ class Invariants {
     reset_edge_ = reset_edge_ && !was_running_ && !(s.estop_status == hal::Status::ok && open(s.estop));
     unseen_s_ = 1e-9 * static_cast<double>(s.now_ns - s.seen_ns);
     blind_s_ = s.seen_ns > 0 && unseen_s_ > b_.stale_s + 2 * b_.nominal_s ? blind_s_ + dt : 0;
+  }
+
+  // Its buttons are those of the hand, or both contacts of a switch that has one: it is never told to be
+  // squeezed. One of them that is told to be open is let go, whatever its time.
+  void watch_enabling(const Seen& s) {
+    if (!s.has_switch) {
+      enabling_ = buttons_;
+      enabling_were_ = buttons_were_;
+      return;
+    }
+    switch_silent_s_ += told_s_;
+    enabling_were_ = enabling_;
+    if (s.switch_status != hal::Status::ok) {
+      return;
+    }
+    const bool held = s.enabling.contact_a_closed && s.enabling.contact_b_closed && !s.enabling.pulse_seen;
+    if (s.enabling.sample_ns != switch_sample_ns_ || !held) {
+      enabling_ = held ? hal::kButtonEnable : 0;
+    }
+    if (!switch_known_) {
+      enabling_were_ = enabling_;
+    }
+    if (s.enabling.sample_ns != switch_sample_ns_) {
+      switch_sample_ns_ = s.enabling.sample_ns;
+      switch_silent_s_ = 0;
+      switch_known_ = true;
+    }
   }
 
   // The scale may change only while hand and needle are uncoupled; when exactly is not known.
@@ -496,6 +530,9 @@ class Invariants {
     if (estop_silent_s_ > 0.05 + two) {
       must(I::stops_on_silence, !running, estop_silent_s_);
     }
+    if (switch_known_ && switch_silent_s_ > 0.05 + two) {
+      must(I::stops_on_silence, !running, switch_silent_s_);
+    }
     commanded_ticks_ = s.stop_commanded || commanded_ticks_ > 0 ? commanded_ticks_ + 1 : 0;
     if (commanded_ticks_ > 2) {
       must(I::stops_on_command, !running);
@@ -530,8 +567,8 @@ class Invariants {
   void enabling(const Seen& s, bool running, double two_ticks_s) {
     const auto squeezed = [](std::uint32_t buttons) { return (buttons & hal::kButtonPanic) != 0; };
     const auto enable = [](std::uint32_t buttons) { return (buttons & hal::kButtonEnable) != 0; };
-    const bool held = enable(buttons_) && !squeezed(buttons_);
-    const bool press = held && !enable(buttons_were_) && !squeezed(buttons_were_);
+    const bool held = enable(enabling_) && !squeezed(enabling_);
+    const bool press = held && !enable(enabling_were_) && !squeezed(enabling_were_);
     // A press that began in the stop counts as soon as its sample is believed.
     pressed_ = running && (press || (was_running_ ? pressed_ : press_edge_));
     if (running && !pressed_) {
@@ -543,8 +580,8 @@ class Invariants {
     const bool acts = s.power || s.commands != 0 || s.asked_N.norm() != 0;
     const bool on = running && was_running_ && pressed_ && acts;
     let_go_s_ = on && !held ? let_go_s_ + s.elapsed_s : 0;
-    squeezed_s_ = on && squeezed(buttons_) ? squeezed_s_ + s.elapsed_s : 0;
-    const double unseen_s = b_.c.hand_timeout_s + two_ticks_s;
+    squeezed_s_ = on && squeezed(enabling_) ? squeezed_s_ + s.elapsed_s : 0;
+    const double unseen_s = (s.has_switch ? b_.switch_timeout_s : b_.c.hand_timeout_s) + two_ticks_s;
     at_most(I::stops_when_let_go, let_go_s_, b_.c.enabling->release_s + unseen_s);
     at_most(I::stops_when_let_go, squeezed_s_, unseen_s);
   }
@@ -872,6 +909,10 @@ class Invariants {
   double told_s_ = 0;  // of this tick, as the servo may count it
   double hand_silent_s_ = 0, stage_silent_s_ = 0, estop_silent_s_ = 0;
   std::uint32_t buttons_ = 0, buttons_were_ = 0;
+  std::uint32_t enabling_ = 0, enabling_were_ = 0;
+  bool switch_known_ = false;
+  std::int64_t switch_sample_ns_ = -1;
+  double switch_silent_s_ = 0;
   hal::StageState stage_told_;
   Vec3 stage_told_before_m_ = Vec3::Zero();
   bool reset_ = true, reset_edge_ = false;

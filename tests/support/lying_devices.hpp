@@ -84,6 +84,13 @@ enum class Lie : std::uint8_t {
   estop_gone,
   estop_time,  // s, added to the sample's time
   reset,
+  // The enabling switch.
+  switch_a,
+  switch_b,
+  switch_welded,  // contact a stays closed
+  switch_pulse,
+  switch_no_data,
+  switch_gone,
   // Vision.
   vision_gone,
   vision_late,     // s
@@ -175,6 +182,12 @@ inline constexpr std::array<const char*, kLies> kLieNames{"moves",
                                                           "estop_gone",
                                                           "estop_time",
                                                           "reset",
+                                                          "switch_a",
+                                                          "switch_b",
+                                                          "switch_welded",
+                                                          "switch_pulse",
+                                                          "switch_no_data",
+                                                          "switch_gone",
                                                           "vision_gone",
                                                           "vision_late",
                                                           "vision_jumps",
@@ -220,8 +233,9 @@ struct Event {
 
 // Icsi with everything that has a place in the servo, and cells without end. Set-up 1: twice as fast, with
 // real actuators, an enabling device and a force sensor. Set-up 2: a dish floor and a holding pipette that
-// the hand reaches, beside the way to the cell, and a position scale that commands may change. Set-up 3: a
-// cell with an inner membrane, for which an injection waits.
+// the hand reaches, beside the way to the cell, and a position scale that commands may change. Set-up 3: as
+// 1, with a switch of its own as the enabling device. Set-up 4: a cell with an inner membrane, for which an
+// injection waits.
 inline ServoConfig searched_config(int setup = 0) {
   ServoConfig c;
   c.membrane.emplace();
@@ -235,13 +249,13 @@ inline ServoConfig searched_config(int setup = 0) {
   // Near enough that a hand reaches its edges.
   c.mapping.workspace_min_m = {-100e-6, -30e-6, -25e-6};
   c.mapping.workspace_max_m = {100e-6, 30e-6, 25e-6};
-  if (setup == 1) {
+  if (setup == 1 || setup == 3) {
     c.rate_Hz = 2000;
     c.real_actuators = true;
     c.enabling.emplace();
     c.force_sensor = true;
   }
-  c.inner_membrane = setup == 3;
+  c.inner_membrane = setup == 4;
   if (setup == 2) {
     c.forbidden.emplace();
     c.forbidden->clearance_m = 2e-6;
@@ -259,18 +273,20 @@ class LyingStation {
   using Vec3 = hal::Vec3;
 
  public:
-  explicit LyingStation(const ServoConfig& config)
+  explicit LyingStation(const ServoConfig& config, bool with_switch = false)
       : config_(config),
         dt_s_(1 / config.rate_Hz),
         lag_(std::exp(-dt_s_ / 0.004)),
         frame_ticks_(std::llround(0.04 / dt_s_)),
         station_(std::make_unique<LocalStation>()),
+        with_switch_(with_switch),
         checker_(config) {
     truth.on = config.enabling.has_value();  // as another program left it
     new (servo_bytes_.data())
         Servo(config,
               Devices{hand_, &stage_, &estop_, config.injector ? &injector_ : nullptr,
-                      config.vacuum ? &vacuum_ : nullptr, config.force_sensor ? &sensor_ : nullptr},
+                      config.vacuum ? &vacuum_ : nullptr, config.force_sensor ? &sensor_ : nullptr,
+                      with_switch ? &switch_ : nullptr},
               station_->station);
   }
   ~LyingStation() { servo().~Servo(); }
@@ -324,6 +340,7 @@ class LyingStation {
 
   // What these devices tell in place of their readings, for faults that no lie above is.
   std::function<hal::Status(hal::EstopState&)> tell_estop;
+  std::function<hal::Status(hal::EnablingState&)> tell_switch;
   std::function<hal::Status(hal::InjectorState&)> tell_injector;
   std::function<hal::Status(hal::VacuumState&)> tell_vacuum;
   std::function<hal::Status(hal::ForceState&)> tell_sensor;
@@ -663,7 +680,8 @@ class LyingStation {
     seen_.inner_punctured_frames = std::exchange(inner_punctured_frames_, 0);
     seen_.hand_hidden = on(Lie::hand_stuck);
     seen_.hand_false_m = on(Lie::hand_absurd) ? 1 : w.told_false_m;
-    seen_.hand_status = seen_.stage_status = seen_.estop_status = hal::Status::no_data;
+    seen_.hand_status = seen_.stage_status = seen_.estop_status = seen_.switch_status = hal::Status::no_data;
+    seen_.has_switch = with_switch_;
   }
 
   // ---- what the servo is told, and what it writes ----
@@ -827,6 +845,31 @@ class LyingStation {
     void heartbeat(bool level) noexcept override { at.truth.level = level; }
   };
 
+  // Held and let go by the same motion as the button of the handle.
+  struct Switch final : hal::EnablingSwitch {
+    explicit Switch(LyingStation& s) : at(s) {}
+    LyingStation& at;
+    hal::Status read(hal::EnablingState& out) noexcept override {
+      hal::Status status = at.on(Lie::switch_gone)      ? hal::Status::disconnected
+                           : at.on(Lie::switch_no_data) ? hal::Status::no_data
+                                                        : hal::Status::ok;
+      if (status == hal::Status::ok) {
+        const bool held =
+            (at.truth.buttons & hal::kButtonEnable) != 0 && (at.truth.buttons & hal::kButtonPanic) == 0;
+        out.contact_a_closed = (held || at.on(Lie::switch_welded)) && !at.on(Lie::switch_a);
+        out.contact_b_closed = held && !at.on(Lie::switch_b);
+        out.pulse_seen = at.on(Lie::switch_pulse);
+        out.sample_ns = at.truth.now;
+        status = at.tell_switch ? at.tell_switch(out) : status;
+      }
+      at.seen_.switch_status = status;
+      if (status == hal::Status::ok) {
+        at.seen_.enabling = out;
+      }
+      return status;
+    }
+  };
+
   struct Injector final : hal::Injector {
     explicit Injector(LyingStation& s) : at(s) {}
     LyingStation& at;
@@ -865,10 +908,12 @@ class LyingStation {
   Hand hand_{*this};
   Stage stage_{*this};
   Estop estop_{*this};
+  Switch switch_{*this};
   Injector injector_{*this};
   Vacuum vacuum_{*this};
   Sensor sensor_{*this};
   std::unique_ptr<LocalStation> station_;
+  const bool with_switch_;
   alignas(Servo) std::array<std::byte, sizeof(Servo)> servo_bytes_;
   Invariants checker_;
   Seen seen_;

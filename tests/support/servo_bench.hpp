@@ -28,19 +28,20 @@ inline ServoConfig icsi() {
 
 // The servo in closed loop: the fake devices, a sphere as the cell, and a microscope that sees it late.
 struct Bench {
-  explicit Bench(const ServoConfig& config, bool with_estop = true)
+  explicit Bench(const ServoConfig& config, bool with_estop = true, bool with_switch = false)
       : config_(config),
         station(std::make_unique<LocalStation>()),
         servo(std::make_unique<Servo>(
             config,
             Devices{hand, &stage, with_estop ? &estop : nullptr, &injector, config.vacuum ? &vacuum : nullptr,
-                    config.force_sensor ? &sensor : nullptr},
+                    config.force_sensor ? &sensor : nullptr, with_switch ? &enabling : nullptr},
             station->station)) {}
 
   const ServoConfig config_;
   FakeHand hand;
   FakeStage stage{Vec3(60e-6, 2e-6, 0)};
   FakeEstop estop;
+  FakeEnabling enabling;
   FakeInjector injector;
   FakeVacuum vacuum;
   FakeSensor sensor;
@@ -121,7 +122,8 @@ struct Bench {
     }
   }
   void tell_time() {
-    hand.now_ns = stage.now_ns = estop.now_ns = injector.now_ns = vacuum.now_ns = sensor.now_ns = now;
+    hand.now_ns = stage.now_ns = estop.now_ns = injector.now_ns = vacuum.now_ns = sensor.now_ns =
+        enabling.now_ns = now;
   }
   void tick() {
     now += std::llround(1e9 * dt());

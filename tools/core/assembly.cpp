@@ -27,6 +27,7 @@ struct RoleName {
 };
 constexpr std::array<RoleName, kRoles> kNames = {{
     {"estop", &DeviceNames::estop},
+    {"enabling", &DeviceNames::enabling},
     {"vacuum", &DeviceNames::vacuum},
     {"force_sensor", &DeviceNames::force_sensor},
     {"injector", &DeviceNames::injector},
@@ -35,8 +36,9 @@ constexpr std::array<RoleName, kRoles> kNames = {{
     {"positioner", &DeviceNames::positioner},
     {"camera", &DeviceNames::camera},
 }};
-constexpr std::array<Role, kRoles> kAllRoles = {Role::estop, Role::vacuum, Role::force_sensor, Role::injector,
-                                                Role::stage, Role::haptic, Role::positioner,   Role::camera};
+constexpr std::array<Role, kRoles> kAllRoles = {Role::estop,        Role::enabling,   Role::vacuum,
+                                                Role::force_sensor, Role::injector,   Role::stage,
+                                                Role::haptic,       Role::positioner, Role::camera};
 
 const std::string& device_of(const DeviceNames& names, Role role) {
   return names.*kNames[static_cast<std::size_t>(role)].device;
@@ -72,9 +74,11 @@ std::unique_ptr<hal::Device> make_simulated_positioner(const Surroundings& aroun
 }
 
 std::unique_ptr<hal::Device> make_gpiod(const Surroundings& around, const Roles& wanted) {
-  return std::make_unique<gpiod::GpiodDevices>(
-      around.scene.gpiod.value_or(gpiod::GpiodParams{}),
-      gpiod::GpiodParts{wanted.has(Role::estop), wanted.has(Role::injector)}, around.clock);
+  return std::make_unique<gpiod::GpiodDevices>(around.scene.gpiod.value_or(gpiod::GpiodParams{}),
+                                               gpiod::GpiodParts{.estop = wanted.has(Role::estop),
+                                                                 .injector = wanted.has(Role::injector),
+                                                                 .enabling = wanted.has(Role::enabling)},
+                                               around.clock);
 }
 
 std::unique_ptr<hal::Device> make_cia402(const Surroundings& around, const Roles&) {
@@ -115,7 +119,7 @@ std::span<const Backend> backends() {
                Role::camera},
               make_simulated_devices},
       Backend{kSimulated, {Role::positioner}, make_simulated_positioner},
-      Backend{kGpiod, {Role::estop, Role::injector}, make_gpiod},
+      Backend{kGpiod, {Role::estop, Role::enabling, Role::injector}, make_gpiod},
       Backend{kCia402, {Role::stage, Role::force_sensor}, make_cia402},
       Backend{kFalcon, {Role::haptic}, make_falcon},
       Backend{kEvdev, {Role::haptic}, make_evdev},
@@ -225,6 +229,7 @@ std::string Assembly::take(const hal::Served& served, const Roles& wanted, const
     into = from;
   };
   one(Role::estop, served.estop, served_.estop);
+  one(Role::enabling, served.enabling, served_.enabling);
   one(Role::vacuum, served.vacuum, served_.vacuum);
   one(Role::force_sensor, served.force_sensor, served_.force_sensor);
   one(Role::injector, served.injector, served_.injector);
@@ -261,6 +266,7 @@ rt::Devices Assembly::devices() noexcept {
   devices.estop = served_.estop;
   devices.injector = served_.injector;
   devices.vacuum = served_.vacuum;
+  devices.enabling = served_.enabling;
   devices.force_sensor = served_.force_sensor;
   return devices;
 }

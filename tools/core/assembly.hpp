@@ -26,6 +26,7 @@ namespace punctum::tools {
 // started: the safety chain first, what can move or push last. They are closed in reverse.
 enum class Role : std::uint8_t {
   estop,
+  enabling,
   vacuum,
   force_sensor,
   injector,
@@ -34,7 +35,7 @@ enum class Role : std::uint8_t {
   positioner,
   camera,  // of the core's devices only the simulated plant has one: it exposes the pictures
 };
-inline constexpr int kRoles = 8;
+inline constexpr int kRoles = 9;
 [[nodiscard]] std::string_view name_of(Role role) noexcept;
 
 class Roles {

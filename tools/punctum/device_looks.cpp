@@ -20,12 +20,19 @@ using Is = hal::Finding::Is;
 
 hal::Findings look_at_simulated(const Scene&, const Machine&, std::string_view) { return {{Is::found, ""}}; }
 
+hal::Findings look_at_handle(const Scene&, const Machine&, std::string_view) {
+  return {{Is::found, "a button of the handle"}};
+}
+
 hal::Findings look_at_recorded(const Scene& scene, const Machine&, std::string_view) {
   return {{Is::found, fmt::format("{:g} per s", scene.recorded->fps)}};
 }
 
 hal::Findings look_at_gpiod(const Scene& scene, const Machine& machine, std::string_view device) {
-  return gpiod::look(*scene.gpiod, {device == "estop", device == "injector"}, machine.open_chip);
+  return gpiod::look(
+      *scene.gpiod,
+      {.estop = device == "estop", .injector = device == "injector", .enabling = device == "enabling"},
+      machine.open_chip);
 }
 
 hal::Findings look_at_cia402(const Scene& scene, const Machine& machine, std::string_view device) {
@@ -198,14 +205,18 @@ const std::vector<DeviceLook>& device_looks() {
   static const std::vector<DeviceLook> looks = {
       {kSimulated, look_at_simulated}, {kRecorded, look_at_recorded}, {kGpiod, look_at_gpiod},
       {kCia402, look_at_cia402},       {kV4l2, look_at_v4l2},         {kAravis, look_at_aravis},
-      {kFalcon, look_at_falcon},       {kEvdev, look_at_evdev},       {kZaber, look_at_zaber}};
+      {kFalcon, look_at_falcon},       {kEvdev, look_at_evdev},       {kZaber, look_at_zaber},
+      {kHandle, look_at_handle}};
   return looks;
 }
 
 std::vector<DeviceFinding> look_at_devices(const Scene& scene, const Machine& machine) {
   std::vector<DeviceFinding> all;
   for (const NamedDevice& device : scene_devices()) {
-    const std::string& backend = scene.devices.*device.backend;
+    std::string backend = scene.devices.*device.backend;
+    if (backend.empty() && device.table == "enabling" && scene.servo.enabling) {
+      backend = kHandle;
+    }
     if (backend.empty()) {
       continue;
     }

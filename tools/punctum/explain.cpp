@@ -210,7 +210,8 @@ std::string tick_text(const Scene& s) {
     line("  the simulated plant steps to now");
   }
   line(std::string("  read devices          hand, stage, e-stop contacts") +
-       (servo.vacuum ? ", holding vacuum" : "") + (servo.force_sensor ? ", force sensor" : ""));
+       (s.devices.enabling.empty() ? "" : ", enabling switch") + (servo.vacuum ? ", holding vacuum" : "") +
+       (servo.force_sensor ? ", force sensor" : ""));
   if (s.vision) {
     line("  newest observation    from vision, compared with the pose at its exposure");
   }

@@ -52,6 +52,8 @@ inline constexpr auto kFaultAdvice = [] {
        "check the drive's power, its enable input and its error code"},
       {enabling_released, "the enabling device was let go or squeezed",
        "take the handle again and press the enabling device to its middle position"},
+      {enabling_fault, "the enabling switch cannot be read, or its two contacts disagree",
+       "check the switch, its plug and its wires; let it go, so that both contacts are seen open"},
   }};
 }();
 static_assert([] {

@@ -322,7 +322,7 @@ const std::vector<PluggedKind>& plugged_kinds() {
        "device = \"gpiod\"\n"
        "[gpiod]\n"
        "chip = \"{}\"\n"
-       "# and its lines, as they are wired (of an injector gate too):\n"
+       "# and its lines, as they are wired (hal/gpiod/README.md has those of other devices):\n"
        "# contact_a = 0\n"
        "# contact_b = 1\n"
        "# reset = 2\n"

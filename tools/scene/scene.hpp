@@ -52,10 +52,12 @@ constexpr auto keys_of(const WatchdogParams*) {
 
 inline constexpr std::string_view kSimulated = "simulated";
 
-// Which backend stands behind each device: its name; empty where the scene has no such device.
+// Which backend stands behind each device: its name; empty where the scene has no such device. Of the
+// enabling device also where it is a button of the handle, which is none of its own.
 struct DeviceNames {
-  std::string haptic, stage, estop, injector, vacuum, force_sensor, camera, positioner;
+  std::string haptic, stage, estop, injector, vacuum, force_sensor, camera, positioner, enabling;
 };
+inline constexpr std::string_view kHandle = "haptic";
 inline constexpr std::string_view kRecorded = "recorded";
 inline constexpr std::string_view kGpiod = "gpiod";
 inline constexpr std::string_view kCia402 = "cia402";
@@ -84,7 +86,7 @@ struct Scene {
   std::optional<sim::SimConfig> sim;             // absent: no device is simulated
   std::optional<RecordedFrames> recorded;        // camera = recorded frames
   std::optional<cia402::CanStageParams> cia402;  // stage = drives on a CAN bus
-  std::optional<gpiod::GpiodParams> gpiod;       // lines of e-stop chain and injector
+  std::optional<gpiod::GpiodParams> gpiod;       // lines of e-stop chain, enabling switch and injector
   std::optional<WatchdogParams> watchdog;        // of the machine
   std::optional<hal::CameraSettings> camera;     // camera = one that is plugged in
   std::optional<v4l2::V4l2Params> v4l2;

@@ -117,19 +117,23 @@ Found check_live_camera(const Scene& s) {
 
 // The lines of [gpiod], and what its devices need of them.
 Found check_gpiod(const Scene& s) {
-  const bool estop = s.devices.estop == kGpiod, injector = s.devices.injector == kGpiod;
+  const auto needed_by = [&s](const char* table, std::string DeviceNames::* device) {
+    return s.devices.*device == kGpiod ? table : nullptr;
+  };
+  const char* const estop = needed_by("estop", &DeviceNames::estop);
+  const char* const enabling = needed_by("enabling", &DeviceNames::enabling);
+  const char* const injector = needed_by("injector", &DeviceNames::injector);
+  const char* const any = estop != nullptr ? estop : enabling != nullptr ? enabling : injector;
   if (!s.gpiod) {
-    const char* device = estop ? "estop.device" : "injector.device";
-    return estop || injector ? Found{Problem{device,
-                                             "\"gpiod\" needs [gpiod] (it says which lines), allowed: "
-                                             "add [gpiod]"}}
-                             : std::nullopt;
+    return any != nullptr
+               ? Found{Problem{fmt::format("{}.device", any),
+                               "\"gpiod\" needs [gpiod] (it says which lines), allowed: add [gpiod]"}}
+               : std::nullopt;
   }
-  if (!estop && !injector) {
-    return Problem{
-        "gpiod",
-        "no device uses it, allowed: with device = \"gpiod\" in [estop] or [injector], or leave it "
-        "out"};
+  if (any == nullptr) {
+    return Problem{"gpiod",
+                   "no device uses it, allowed: with device = \"gpiod\" in [estop], [enabling] or "
+                   "[injector], or leave it out"};
   }
   const gpiod::GpiodParams& p = *s.gpiod;
   if (!p.chip.starts_with('/')) {
@@ -140,13 +144,14 @@ Found check_gpiod(const Scene& s) {
     int offset;
     const char* needed_by;  // null: by nothing
   };
-  const char* const chain = estop ? "estop" : nullptr;
-  const Line lines[] = {{"gpiod.contact_a", p.contact_a, chain},
-                        {"gpiod.contact_b", p.contact_b, chain},
-                        {"gpiod.reset", p.reset, chain},
-                        {"gpiod.heartbeat", p.heartbeat, chain},
-                        {"gpiod.gate", p.gate, injector ? "injector" : nullptr},
-                        {"gpiod.valve_contact", p.valve_contact, nullptr}};
+  const Line lines[] = {{"gpiod.contact_a", p.contact_a, estop},
+                        {"gpiod.contact_b", p.contact_b, estop},
+                        {"gpiod.reset", p.reset, estop},
+                        {"gpiod.heartbeat", p.heartbeat, estop},
+                        {"gpiod.gate", p.gate, injector},
+                        {"gpiod.valve_contact", p.valve_contact, nullptr},
+                        {"gpiod.enabling_a", p.enabling_a, enabling},
+                        {"gpiod.enabling_b", p.enabling_b, enabling}};
   for (const Line& line : lines) {
     if (line.needed_by != nullptr && line.offset == gpiod::kNotWired) {
       return Problem{line.key,

@@ -123,6 +123,18 @@ KeyList device_key(Scene& s, const char* table, std::string DeviceNames::* devic
                                     }}}};
 }
 
+// The button of the handle is no device of its own.
+KeyList enabling_device_key(Scene& s) {
+  static const std::string handle(kHandle);
+  return {Key{"device", BackendName{known_backends().at("enabling"),
+                                    [&s]() -> const std::string& {
+                                      return s.devices.enabling.empty() ? handle : s.devices.enabling;
+                                    },
+                                    [&s](const std::string& name) {
+                                      s.devices.enabling = name == kHandle ? "" : name;
+                                    }}}};
+}
+
 // ---- tables ----
 
 using Keys = std::function<KeyList(Scene&)>;
@@ -288,7 +300,15 @@ void add_effects(std::vector<Table>& t) {
                },
                [](Scene& s) { return bound(*s.servo.forbidden->holder); }});
   t.push_back(thing("guard", [](Scene& s) -> auto& { return s.servo.guard; }));
-  t.push_back(thing("enabling", [](Scene& s) -> auto& { return s.servo.enabling; }));
+  t.push_back(thing(
+      "enabling", [](Scene& s) -> auto& { return s.servo.enabling; },
+      [](Scene& s) { return enabling_device_key(s) + bound(*s.servo.enabling); }));
+  t.back().put = [](Scene& s, bool on) {
+    have(s.servo.enabling, on);
+    if (!on) {
+      s.devices.enabling.clear();
+    }
+  };
 }
 
 // What only the simulation has.
@@ -405,6 +425,7 @@ const Backends& known_backends() {
     b["camera"].emplace_back(kV4l2);
     b["camera"].emplace_back(kAravis);
     b["estop"].emplace_back(kGpiod);
+    b["enabling"] = {std::string(kHandle), std::string(kGpiod)};
     b["injector"].emplace_back(kGpiod);
     b["stage"].emplace_back(kCia402);
     b["force_sensor"].emplace_back(kCia402);
@@ -417,11 +438,15 @@ const Backends& known_backends() {
 }
 
 const std::vector<NamedDevice>& scene_devices() {
-  static const std::vector<NamedDevice> list = {
-      {"haptic", &DeviceNames::haptic}, {"stage", &DeviceNames::stage},
-      {"estop", &DeviceNames::estop},   {"injector", &DeviceNames::injector},
-      {"vacuum", &DeviceNames::vacuum}, {"force_sensor", &DeviceNames::force_sensor},
-      {"camera", &DeviceNames::camera}, {"positioner", &DeviceNames::positioner}};
+  static const std::vector<NamedDevice> list = {{"haptic", &DeviceNames::haptic},
+                                                {"stage", &DeviceNames::stage},
+                                                {"estop", &DeviceNames::estop},
+                                                {"enabling", &DeviceNames::enabling},
+                                                {"injector", &DeviceNames::injector},
+                                                {"vacuum", &DeviceNames::vacuum},
+                                                {"force_sensor", &DeviceNames::force_sensor},
+                                                {"camera", &DeviceNames::camera},
+                                                {"positioner", &DeviceNames::positioner}};
   return list;
 }
 

@@ -91,7 +91,8 @@ struct StandingTime final : hal::Clock {
   std::int64_t t_ns = 77;
 };
 
-constexpr unsigned kA = 1, kB = 2, kReset = 3, kHeartbeat = 4, kGate = 5, kValve = 6;
+constexpr unsigned kA = 1, kB = 2, kReset = 3, kHeartbeat = 4, kGate = 5, kValve = 6, kEnablingA = 7,
+                   kEnablingB = 8;
 
 class GpiodTest : public testing::Test {
  protected:
@@ -102,11 +103,13 @@ class GpiodTest : public testing::Test {
     params.heartbeat = kHeartbeat;
     params.gate = kGate;
     params.valve_contact = kValve;
+    params.enabling_a = kEnablingA;
+    params.enabling_b = kEnablingB;
   }
   // With contacts that are closed, for either wiring.
-  tl::expected<void, std::string> open(GpiodParts parts = {true, true}) {
+  tl::expected<void, std::string> open(GpiodParts parts = {true, true, true}) {
     const bool high = params.contacts_closed == GpiodParams::Closed::high;
-    for (const unsigned line : {kA, kB, kValve}) {
+    for (const unsigned line : {kA, kB, kValve, kEnablingA, kEnablingB}) {
       board.wires[line].level = high;
     }
     board.wires[kReset].level = !high;
@@ -124,6 +127,11 @@ class GpiodTest : public testing::Test {
   hal::EstopState read() {
     hal::EstopState state;
     EXPECT_EQ(devices->served().estop->read(state), Status::ok);
+    return state;
+  }
+  hal::EnablingState read_switch() {
+    hal::EnablingState state;
+    EXPECT_EQ(devices->served().enabling->read(state), Status::ok);
     return state;
   }
   Status estop_status() {
@@ -179,13 +187,13 @@ TEST_F(GpiodTest, tells_the_contacts_and_the_button_apart) {
 
 TEST_F(GpiodTest, pulls_a_cut_wire_to_open_with_either_wiring) {
   ASSERT_TRUE(open());
-  for (const unsigned input : {kA, kB, kReset, kValve}) {
+  for (const unsigned input : {kA, kB, kReset, kValve, kEnablingA, kEnablingB}) {
     EXPECT_EQ(board.wires[input].request.bias, Bias::pull_down);
     EXPECT_FALSE(board.wires[input].request.active_low);
   }
   params.contacts_closed = GpiodParams::Closed::low;
   ASSERT_TRUE(open());
-  for (const unsigned input : {kA, kB, kReset, kValve}) {
+  for (const unsigned input : {kA, kB, kReset, kValve, kEnablingA, kEnablingB}) {
     EXPECT_EQ(board.wires[input].request.bias, Bias::pull_up);
     EXPECT_TRUE(board.wires[input].request.active_low);
   }
@@ -197,7 +205,7 @@ TEST_F(GpiodTest, pulls_a_cut_wire_to_open_with_either_wiring) {
 TEST_F(GpiodTest, leaves_the_bias_to_the_resistors_of_the_board_where_there_are_some) {
   params.pull = GpiodParams::Pull::external;
   ASSERT_TRUE(open());
-  for (const unsigned input : {kA, kB, kReset, kValve}) {
+  for (const unsigned input : {kA, kB, kReset, kValve, kEnablingA, kEnablingB}) {
     EXPECT_EQ(board.wires[input].request.bias, Bias::as_it_is);
   }
 }
@@ -253,6 +261,48 @@ TEST_F(GpiodTest, gives_no_reading_when_a_line_of_the_chain_fails) {
       board.wires[line].status = Status::ok;
       devices->served().estop->heartbeat(false);
       EXPECT_EQ(estop_status(), Status::ok);
+    }
+  }
+}
+
+TEST_F(GpiodTest, reads_the_two_contacts_of_the_enabling_switch_with_the_time_of_the_reading) {
+  ASSERT_TRUE(open());
+  hal::EnablingState state = read_switch();
+  EXPECT_TRUE(state.contact_a_closed);
+  EXPECT_TRUE(state.contact_b_closed);
+  EXPECT_FALSE(state.pulse_seen);
+  EXPECT_EQ(state.sample_ns, 77);
+  board.wires[kEnablingA].level = false;
+  state = read_switch();
+  EXPECT_FALSE(state.contact_a_closed);
+  EXPECT_TRUE(state.contact_b_closed);
+  board.wires[kEnablingA].level = true;
+  board.wires[kEnablingB].level = false;
+  state = read_switch();
+  EXPECT_TRUE(state.contact_a_closed);
+  EXPECT_FALSE(state.contact_b_closed);
+}
+
+TEST_F(GpiodTest, sees_a_pulse_of_the_enabling_switch_between_two_readings_once) {
+  ASSERT_TRUE(open());
+  (void)read_switch();
+  for (const unsigned contact : {kEnablingA, kEnablingB}) {
+    EXPECT_EQ(board.wires[contact].request.use, Use::watched_input);
+    board.wires[contact].changes = 1;
+    EXPECT_TRUE(read_switch().pulse_seen) << contact;
+    EXPECT_FALSE(read_switch().pulse_seen);
+  }
+}
+
+TEST_F(GpiodTest, gives_no_reading_of_the_enabling_switch_when_one_of_its_lines_fails) {
+  ASSERT_TRUE(open());
+  for (const unsigned line : {kEnablingA, kEnablingB}) {
+    for (const Status status : {Status::disconnected, Status::fault}) {
+      board.wires[line].status = status;
+      hal::EnablingState state;
+      EXPECT_EQ(devices->served().enabling->read(state), status) << line;
+      EXPECT_FALSE(state.contact_a_closed || state.contact_b_closed);
+      board.wires[line].status = Status::ok;
     }
   }
 }
@@ -335,16 +385,23 @@ TEST_F(GpiodTest, returns_to_the_safe_state_and_gives_the_lines_back) {
 }
 
 TEST_F(GpiodTest, claims_only_what_it_serves) {
-  ASSERT_TRUE(open({true, false}));
+  ASSERT_TRUE(open({.estop = true}));
   EXPECT_NE(devices->served().estop, nullptr);
   EXPECT_EQ(devices->served().injector, nullptr);
   EXPECT_FALSE(board.wires[kGate].claimed);
   EXPECT_FALSE(board.wires[kValve].claimed);
   devices->close();
-  ASSERT_TRUE(open({false, true}));
+  ASSERT_TRUE(open({.injector = true}));
   EXPECT_EQ(devices->served().estop, nullptr);
   EXPECT_NE(devices->served().injector, nullptr);
-  for (const unsigned line : {kA, kB, kReset, kHeartbeat}) {
+  for (const unsigned line : {kA, kB, kReset, kHeartbeat, kEnablingA, kEnablingB}) {
+    EXPECT_FALSE(board.wires[line].claimed);
+  }
+  devices->close();
+  ASSERT_TRUE(open({.enabling = true}));
+  EXPECT_EQ(devices->served().estop, nullptr);
+  EXPECT_NE(devices->served().enabling, nullptr);
+  for (const unsigned line : {kA, kB, kReset, kHeartbeat, kGate, kValve}) {
     EXPECT_FALSE(board.wires[line].claimed);
   }
 }
@@ -367,7 +424,7 @@ TEST_F(GpiodTest, says_in_one_line_why_it_does_not_open_and_holds_nothing) {
   EXPECT_TRUE(nothing_is_held());
   board.refused_offset = kNotWired;
   board.lines = kValve;
-  result = open();
+  result = open({true, true});
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error(), "gpiod.valve_contact = 6: no line of /dev/gpiochip0, allowed: 0 to 5");
   EXPECT_TRUE(nothing_is_held());

@@ -14,8 +14,10 @@ namespace {
 using namespace test;
 
 struct Inputs {
-  explicit Inputs(const ServoConfig& with = all_devices())
-      : config(with), inputs(config, {hand, &stage, &estop, &injector, &vacuum, &sensor}) {
+  explicit Inputs(const ServoConfig& with = all_devices(), bool with_switch = false)
+      : config(with),
+        inputs(config,
+               {hand, &stage, &estop, &injector, &vacuum, &sensor, with_switch ? &enabling : nullptr}) {
     stage.on = true;
   }
   static ServoConfig all_devices() {
@@ -28,6 +30,7 @@ struct Inputs {
   const Readings& read(double elapsed_s = 1e-3) {
     now_ns += std::llround(1e9 * elapsed_s);
     hand.now_ns = stage.now_ns = estop.now_ns = injector.now_ns = vacuum.now_ns = sensor.now_ns = now_ns;
+    enabling.now_ns = now_ns - enabling_late_ns;
     return inputs.read({.now_ns = now_ns, .elapsed_s = elapsed_s, .dt_s = elapsed_s}, last);
   }
   void settle() {
@@ -40,11 +43,13 @@ struct Inputs {
   FakeHand hand;
   FakeStage stage{Vec3(60e-6, 2e-6, 0)};
   FakeEstop estop;
+  FakeEnabling enabling;
   FakeInjector injector;
   FakeVacuum vacuum;
   FakeSensor sensor;
   LastOutput last;
   std::int64_t now_ns = 5'000'000'000;
+  std::int64_t enabling_late_ns = 0;
   DeviceInputs inputs;
 };
 
@@ -657,6 +662,128 @@ TEST(DeviceInputs, forgets_a_force_sensor_that_gives_no_number_for_longer_than_i
     (void)in.read();
   }
   EXPECT_FALSE(in.inputs.readings().sensor_fresh);
+}
+
+// A switch of its own as the enabling device, on a station that runs.
+struct Enabled : Inputs {
+  explicit Enabled(double release_s = 0.02) : Inputs(with_enabling(release_s), true) {
+    (void)read();
+    hold(true);
+  }
+  static ServoConfig with_enabling(double release_s) {
+    ServoConfig config = all_devices();
+    config.enabling.emplace().release_s = release_s;
+    return config;
+  }
+  void hold(bool held) {  // for as long as a finger
+    enabling.hold(held);
+    for (int k = 0; k < 25; ++k) {
+      (void)read();
+    }
+  }
+  [[nodiscard]] bool enabled() const { return inputs.readings().enabled; }
+  // Ticks until the fault, at most so many.
+  int ticks_to(Fault fault, int most = 200) {
+    for (int k = 1; k <= most; ++k) {
+      if (read().device_faults.first == fault) {
+        return k;
+      }
+    }
+    return -1;
+  }
+};
+
+TEST(DeviceInputs, takes_a_switch_for_held_while_both_contacts_are_closed_and_were_seen_open_before) {
+  Enabled in;
+  EXPECT_FALSE(in.enabled()) << "held from the start";
+  in.hold(false);
+  in.hold(true);
+  EXPECT_TRUE(in.enabled());
+  EXPECT_EQ(in.inputs.readings().alarms, 0U);
+  EXPECT_EQ(in.inputs.readings().device_faults.first, Fault::none);
+  in.hand.buttons = hal::kButtonPanic;  // the button of the handle says nothing beside a switch
+  EXPECT_EQ(in.ticks_to(Fault::enabling_released, 50), -1);
+  in.enabling.hold(false);
+  EXPECT_NEAR(in.ticks_to(Fault::enabling_released), 20.5, 0.5) << "release_ms, and no more";
+}
+
+TEST(DeviceInputs, takes_either_contact_of_the_switch_that_opens_for_let_go) {
+  for (const bool a : {true, false}) {
+    Enabled in;
+    in.hold(false);
+    in.hold(true);
+    (a ? in.enabling.state.contact_a_closed : in.enabling.state.contact_b_closed) = false;
+    EXPECT_NEAR(in.ticks_to(Fault::enabling_released), 20.5, 0.5);
+  }
+}
+
+TEST(DeviceInputs, takes_a_pulse_of_the_switch_for_let_go) {
+  Enabled in;
+  in.hold(false);
+  in.enabling.hold(true);
+  in.enabling.state.pulse_seen = true;
+  for (int k = 0; k < 100; ++k) {
+    (void)in.read();
+  }
+  EXPECT_FALSE(in.enabled());
+  in.enabling.state.pulse_seen = false;
+  in.hold(true);
+  EXPECT_TRUE(in.enabled());
+  in.enabling.state.pulse_seen = true;
+  EXPECT_NEAR(in.ticks_to(Fault::enabling_released), 20.5, 0.5);
+}
+
+TEST(DeviceInputs, calls_a_switch_that_is_lost_or_silent_a_fault_and_takes_no_press_that_it_had_before) {
+  const struct {
+    Status status;
+    int within;
+  } cases[] = {{Status::disconnected, 1}, {Status::fault, 1}, {Status::no_data, 21}};
+  for (const auto& c : cases) {
+    Enabled in;
+    in.hold(false);
+    in.hold(true);
+    in.enabling.status = c.status;
+    EXPECT_EQ(in.ticks_to(Fault::enabling_fault), c.within);
+    EXPECT_NE(in.inputs.readings().alarms & alarm_sensor, 0U);
+    EXPECT_FALSE(in.enabled());
+    in.enabling.status = Status::ok;
+    in.hold(true);
+    EXPECT_EQ(in.inputs.readings().device_faults.first, Fault::none);
+    EXPECT_FALSE(in.enabled());
+    in.hold(false);
+    in.hold(true);
+    EXPECT_TRUE(in.enabled());
+  }
+}
+
+TEST(DeviceInputs, calls_a_switch_whose_clock_is_wrong_silent_and_believes_its_open_contact) {
+  for (const bool open : {false, true}) {
+    Enabled in(0.005);
+    in.hold(false);
+    in.hold(true);
+    in.enabling.state.contact_b_closed = !open;
+    in.enabling_late_ns = 1'000'000'000;
+    EXPECT_EQ(in.ticks_to(open ? Fault::enabling_released : Fault::enabling_fault), open ? 6 : 21);
+    EXPECT_FALSE(in.enabled());
+  }
+}
+
+TEST(DeviceInputs, calls_contacts_of_the_switch_that_disagree_for_too_long_a_fault_until_both_were_open) {
+  Enabled in;
+  in.hold(false);
+  in.enabling.state.contact_a_closed = true;
+  for (int k = 0; k < 49; ++k) {
+    EXPECT_EQ(in.read().device_faults.first, Fault::none);
+  }
+  EXPECT_LE(in.ticks_to(Fault::enabling_fault), 2) << "discrepancy_ms";
+  EXPECT_NE(in.inputs.readings().alarms & alarm_sensor, 0U);
+  in.hold(true);
+  EXPECT_EQ(in.inputs.readings().device_faults.first, Fault::enabling_fault) << "contact a never opened";
+  EXPECT_FALSE(in.enabled());
+  in.hold(false);
+  EXPECT_EQ(in.inputs.readings().device_faults.first, Fault::none);
+  in.hold(true);
+  EXPECT_TRUE(in.enabled());
 }
 
 }  // namespace

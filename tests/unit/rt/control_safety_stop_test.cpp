@@ -79,6 +79,14 @@ TEST(SafetyStop, remembers_a_discrepancy_behind_an_open_contact) {
   EXPECT_EQ(out.faults_latched, bit(Fault::estop) | bit(Fault::estop_discrepancy));
 }
 
+TEST(SafetyStop, remembers_contacts_that_disagree_behind_a_switch_that_was_let_go) {
+  SafetyStop stop{EstopParams{}};
+  (void)stop.step(Fault::enabling_released, kForce, chain(), 1e-3);
+  const SafetyOutput out = stop.step(Fault::enabling_fault, kForce, chain(), 1e-3);
+  EXPECT_EQ(out.cause, Fault::enabling_released);
+  EXPECT_EQ(out.faults_latched, bit(Fault::enabling_released) | bit(Fault::enabling_fault));
+}
+
 TEST(SafetyStop, does_not_take_an_old_reading_for_a_standstill) {
   for (const bool fresh : {true, false}) {
     SafetyStop stop{EstopParams{}};

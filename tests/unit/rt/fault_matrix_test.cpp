@@ -40,9 +40,9 @@ constexpr int kFails = 10;
 constexpr const char* kFailNames[kFails] = {"absent", "silent",  "late",      "wrong",     "NaN",
                                             "frozen", "garbage", "half rate", "unplugged", "returns"};
 
-enum class Part : std::uint8_t { hand, stage, estop, injector, vacuum, sensor, camera, vision };
-constexpr int kParts = 8;
-constexpr const char* kPartNames[kParts] = {"hand",   "stage",        "e-stop", "injector",
+enum class Part : std::uint8_t { hand, stage, estop, enabling, injector, vacuum, sensor, camera, vision };
+constexpr int kParts = 9;
+constexpr const char* kPartNames[kParts] = {"hand",   "stage",        "e-stop", "enabling", "injector",
                                             "vacuum", "force sensor", "camera", "vision"};
 
 // The state that a cell must lead to.
@@ -112,6 +112,23 @@ constexpr Cell kCells[] = {
     {Part::estop, Fails::half_rate, Safe::goes_on, kNone, 0, 0, "hal/README"},
     {Part::estop, Fails::unplugged, Safe::relay, Fault::estop_lost, 0, 1, "safety_latch.hpp"},
     {Part::estop, Fails::returns, Safe::relay, Fault::estop_lost, 0, 1,
+     "safety_latch.hpp: release_and_reset"},
+
+    {Part::enabling, Fails::absent, Safe::stop, Fault::enabling_fault, 0, 1, "fault.hpp: cannot be read"},
+    {Part::enabling, Fails::silent, Safe::stop, Fault::enabling_fault, 0, 22, "L4"},
+    {Part::enabling, Fails::late, Safe::stop, Fault::enabling_fault, 0, 22,
+     "sample_clock.hpp: older than the time-out is silent"},
+    {Part::enabling, Fails::wrong, Safe::stop, Fault::enabling_released, 0, 22,
+     "L9: one contact told open for release_ms"},
+    {Part::enabling, Fails::nan, Safe::stop, Fault::enabling_fault, 0, 1,
+     "it has no numbers: it reports a fault"},
+    {Part::enabling, Fails::frozen, Safe::stop, Fault::enabling_fault, 0, 22,
+     "hal/README: its old time shows it; L4"},
+    {Part::enabling, Fails::garbage, Safe::stop, Fault::enabling_released, 0, 1000,
+     "let go on 7 of 8 readings: for release_ms in a row about every 107 ticks"},
+    {Part::enabling, Fails::half_rate, Safe::goes_on, kNone, 0, 0, "hal/README"},
+    {Part::enabling, Fails::unplugged, Safe::stop, Fault::enabling_fault, 0, 1, "fault.hpp: cannot be read"},
+    {Part::enabling, Fails::returns, Safe::stop, Fault::enabling_fault, 0, 1,
      "safety_latch.hpp: release_and_reset"},
 
     {Part::injector, Fails::absent, Safe::alarm, kNone, alarm_sensor, 1,
@@ -256,10 +273,13 @@ std::uint64_t random_bits(int tick) {
   return z ^ (z >> 27);
 }
 
-ServoConfig whole_station() {
+ServoConfig whole_station(bool with_switch) {
   ServoConfig c = searched_config();
   c.force_sensor = true;
   c.injector->max_open_s = 60;
+  if (with_switch) {
+    c.enabling.emplace();
+  }
   return c;
 }
 
@@ -271,6 +291,7 @@ class FaultMatrix : public testing::Test {
 
   // In phase injection, the gate open.
   void prepare() {
+    from_start = std::make_unique<LyingStation::State>(station->state());
     LyingStation& s = *station;
     const std::vector<Event> in = {{1000, 3500, Lie::moves, kHandIn_m, 0}, {5200, 400, Lie::injects, 1, 0}};
     for (int k = 0; k < 5600; ++k) {
@@ -350,6 +371,16 @@ class FaultMatrix : public testing::Test {
                                      },
                                      60};
         break;
+      case Part::enabling:
+        s.tell_switch =
+            Failing<hal::EnablingState>{fails, [](hal::EnablingState& r, int) { r.contact_a_closed = false; },
+                                        [](hal::EnablingState& r, int tick) {
+                                          r.contact_a_closed = (random_bits(tick) & 1) != 0;
+                                          r.contact_b_closed = (random_bits(tick) & 2) != 0;
+                                          r.pulse_seen = (random_bits(tick) & 4) != 0;
+                                        },
+                                        60};
+        break;
       case Part::injector:
         s.tell_injector = Failing<hal::InjectorState>{
             fails, [](hal::InjectorState& r, int) { r.open = true; },
@@ -402,13 +433,14 @@ class FaultMatrix : public testing::Test {
     LyingStation& s = *station;
     Measured m;
     s.tell_estop = {};
+    s.tell_switch = {};
     s.tell_injector = {};
     s.tell_vacuum = {};
     s.tell_sensor = {};
     s.frame_divisor = 1;
     std::vector<Event> events = begin(cell.part, cell.fails);
     if (cell.fails == Fails::absent) {
-      station->restore(from_start);
+      station->restore(*from_start);
     } else {
       station->restore(*injecting);
     }
@@ -500,19 +532,24 @@ class FaultMatrix : public testing::Test {
     return m;
   }
 
-  std::unique_ptr<LyingStation> station = std::make_unique<LyingStation>(whole_station());
-  LyingStation::State from_start = station->state();
-  std::unique_ptr<LyingStation::State> injecting;
+  bool has_switch = false;
+  std::unique_ptr<LyingStation> station;
+  std::unique_ptr<LyingStation::State> from_start, injecting;
 };
 
 TEST_F(FaultMatrix, every_fault_of_every_device_leads_to_the_state_that_is_written_down) {
-  ASSERT_NO_FATAL_FAILURE(prepare());
   std::printf("%-13s%-10s %-27s%6s %6s  %9s  %s\n", "device", "fault", "state", "ticks", "within", "moved/um",
               "invariants, what is left");
   std::array<std::array<bool, kFails>, kParts> seen{};
   constexpr const char* kSafeNames[] = {"stop", "stop, relay", "withdraw", "alarm", "goes on", ""};
   for (const Cell& cell : kCells) {
     const auto part = static_cast<std::size_t>(cell.part), fails = static_cast<std::size_t>(cell.fails);
+    const bool with_switch = cell.part == Part::enabling;
+    if (!station || with_switch != has_switch) {
+      has_switch = with_switch;
+      station = std::make_unique<LyingStation>(whole_station(with_switch), with_switch);
+      ASSERT_NO_FATAL_FAILURE(prepare());
+    }
     EXPECT_FALSE(seen[part][fails]);
     seen[part][fails] = true;
     const std::string title = std::string(kPartNames[part]) + ", " + kFailNames[fails];

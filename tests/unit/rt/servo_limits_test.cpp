@@ -256,6 +256,52 @@ TEST(Servo, stops_when_the_enabling_device_is_let_go_or_squeezed_and_goes_on_by_
   }
 }
 
+TEST(Servo, holds_when_a_switch_of_its_own_is_let_go_and_takes_the_reset_button_when_a_contact_stays_closed) {
+  for (const bool welded : {false, true}) {
+    ServoConfig config = icsi();
+    config.enabling.emplace();
+    Bench b(config, true, true);
+    b.run(0.1);
+    b.enabling.hold(true);
+    b.run(1);
+    EXPECT_TRUE(b.stage.on);
+    EXPECT_EQ(b.servo->fault(), Fault::none);
+    const int stops = b.stage.quick_stops;
+    b.enabling.state = {.contact_a_closed = welded};
+    b.run(0.03);
+    EXPECT_GT(b.stage.quick_stops, stops);
+    EXPECT_EQ(b.servo->fault(), Fault::enabling_released);
+    b.run(1);
+    EXPECT_FALSE(b.stage.on);
+    EXPECT_EQ(b.hand.force.norm(), 0);
+    b.enabling.hold(true);
+    b.run(1);
+    EXPECT_EQ(b.servo->fault(), welded ? Fault::enabling_released : Fault::none);
+    EXPECT_EQ(b.stage.on, !welded);
+    const std::uint64_t latched = b.station->core.status.faults_latched.load();
+    EXPECT_EQ((latched >> static_cast<int>(Fault::enabling_fault) & 1U) != 0, welded);
+    if (!welded) {
+      continue;
+    }
+    // Mended: both open, the reset button, and a new press.
+    b.enabling.hold(false);
+    b.run(0.1);
+    b.enabling.hold(true);
+    b.run(0.1);
+    EXPECT_FALSE(b.stage.on) << "no press ends this stop";
+    b.enabling.hold(false);
+    b.estop.state.reset_pressed = true;
+    b.run(0.1);
+    b.estop.state.reset_pressed = false;
+    b.run(0.1);
+    EXPECT_EQ(b.servo->fault(), Fault::none);
+    EXPECT_FALSE(b.stage.on);
+    b.enabling.hold(true);
+    b.run(0.5);
+    EXPECT_TRUE(b.stage.on);
+  }
+}
+
 TEST(Servo, never_sends_anything_beyond_a_limit_whatever_the_devices_say) {
   // Everything fails at random, all the time; resets are pressed at random too.
   for (unsigned seed = 0; seed < 8; ++seed) {

@@ -25,7 +25,8 @@ class Fake final : public hal::Device,
                    public hal::Injector,
                    public hal::HoldingVacuum,
                    public hal::ForceSensor,
-                   public hal::QueuedPositioner {
+                   public hal::QueuedPositioner,
+                   public hal::EnablingSwitch {
  public:
   Fake(Log& log, std::string name) : log_(log), name_(std::move(name)) {}
   ~Fake() { log_.push_back("destroy " + name_); }
@@ -35,7 +36,7 @@ class Fake final : public hal::Device,
     return answer(open_error);
   }
   hal::Served served() noexcept override {
-    return serves ? hal::Served{this, this, this, this, this, this, this} : hal::Served{};
+    return serves ? hal::Served{this, this, this, this, this, this, this, this} : hal::Served{};
   }
   tl::expected<void, std::string> start(std::int64_t first_tick_ns) override {
     log_.push_back("start " + name_ + " at " + std::to_string(first_tick_ns));
@@ -64,6 +65,7 @@ class Fake final : public hal::Device,
   void enable(bool on) noexcept override { enabled = on; }
   Status read(hal::EstopState&) noexcept override { return Status::ok; }
   void heartbeat(bool) noexcept override {}
+  Status read(hal::EnablingState&) noexcept override { return Status::ok; }
   void gate(bool) noexcept override {}
   Status read(hal::InjectorState&) noexcept override { return Status::ok; }
   Status read(hal::VacuumState&) noexcept override { return Status::ok; }
@@ -98,8 +100,8 @@ class StandingClock final : public hal::Clock {
   std::int64_t t_ns = 0;
 };
 
-constexpr Roles kEveryRole = {Role::estop, Role::vacuum, Role::force_sensor, Role::injector,
-                              Role::stage, Role::haptic, Role::positioner};
+constexpr Roles kEveryRole = {Role::estop,    Role::enabling, Role::vacuum, Role::force_sensor,
+                              Role::injector, Role::stage,    Role::haptic, Role::positioner};
 
 class AssemblyTest : public Test {
  protected:
@@ -127,7 +129,9 @@ class AssemblyTest : public Test {
   tl::expected<std::unique_ptr<Assembly>, std::string> open() {
     return Assembly::open({scene, clock, nullptr}, table);
   }
-  void all_from(const std::string& name) { scene.devices = {name, name, name, name, name, name, "", name}; }
+  void all_from(const std::string& name) {
+    scene.devices = {name, name, name, name, name, name, "", name, name};
+  }
 
   Scene scene;
   StandingClock clock;
@@ -220,6 +224,7 @@ TEST_F(AssemblyTest, makes_no_world_where_nothing_is_simulated) {
   EXPECT_EQ(&devices.hand, fakes[0]);
   EXPECT_EQ(devices.stage, fakes[0]);
   EXPECT_EQ(devices.force_sensor, fakes[0]);
+  EXPECT_EQ(devices.enabling, fakes[0]);
   EXPECT_EQ((*assembly)->positioner(), fakes[0]);
 }
 
@@ -284,7 +289,7 @@ TEST_F(AssemblyTest, serves_a_simulated_positioner_beside_any_other_device) {
 TEST_F(AssemblyTest, tries_every_device_and_names_each_that_fails) {
   add("dead", kEveryRole, "no answer on the bus");
   add("deaf", kEveryRole, "permission denied");
-  scene.devices = {"fake", "dead", "deaf", "nonsense", "fake", "fake", "", ""};
+  scene.devices = {"fake", "dead", "deaf", "nonsense", "fake", "fake", "", "", ""};
   const auto assembly = open();
   ASSERT_FALSE(assembly);
   const auto lines = lines_of(assembly.error());
@@ -304,7 +309,7 @@ TEST_F(AssemblyTest, starts_in_order_and_closes_in_reverse) {
   add("chain", {Role::estop});
   add("drive", {Role::stage, Role::force_sensor});
   add("handle", {Role::haptic});
-  scene.devices = {"handle", "drive", "chain", "", "", "drive", "", ""};
+  scene.devices = {"handle", "drive", "chain", "", "", "drive", "", "", ""};
   {
     const auto assembly = open();
     ASSERT_TRUE(assembly) << assembly.error();
@@ -321,7 +326,7 @@ TEST_F(AssemblyTest, stops_starting_at_the_first_failure_and_still_closes_all) {
   add("chain", {Role::estop});
   add("drive", {Role::stage}, "", "the drive does not leave its fault state");
   add("handle", {Role::haptic});
-  scene.devices = {"handle", "drive", "chain", "", "", "", "", ""};
+  scene.devices = {"handle", "drive", "chain", "", "", "", "", "", ""};
   {
     const auto assembly = open();
     ASSERT_TRUE(assembly) << assembly.error();

@@ -217,6 +217,17 @@ TEST_F(DeviceLooks, a_chip_is_found_with_its_label_and_the_names_of_the_lines_ea
   EXPECT_TRUE(says(found, "injector: ok gpiod: /dev/gpiochip0 (a board, 5 lines), gate 4 \"VALVE\"\n"));
 }
 
+TEST_F(DeviceLooks, an_enabling_device_is_a_button_of_the_handle_or_two_lines) {
+  EXPECT_TRUE(says(look(kSmallest + "[enabling]\n"), "\nenabling: ok haptic: a button of the handle\n"));
+  const std::string switch_on_line_3_and =
+      "[enabling]\ndevice = \"gpiod\"\n[gpiod]\nenabling_a = 3\nenabling_b = ";
+  EXPECT_TRUE(says(look(kSmallest + switch_on_line_3_and + "4\n"),
+                   "enabling: ok gpiod: /dev/gpiochip0 (a board, 5 lines), enabling_a 3, enabling_b 4\n"));
+  EXPECT_TRUE(says(look(kSmallest + switch_on_line_3_and + "5\n"),
+                   "enabling: MISSING gpiod: gpiod.enabling_b = 5: no line of /dev/gpiochip0, allowed: 0 to "
+                   "4\n"));
+}
+
 TEST_F(DeviceLooks, a_chip_a_line_and_a_free_line_that_are_not_there_are_a_line_each) {
   lines[3] = {"", true, "leds"};
   const std::string found = look(kWired + "valve_contact = 9\n");

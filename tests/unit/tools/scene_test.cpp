@@ -147,12 +147,26 @@ const std::vector<Broken>& broken() {
        "\"simulated\", \"recorded\", "
        "\"v4l2\" or \"aravis\""},
       {"lines without a device", kLeast + "[gpiod]\n",
-       "b.toml:5:2: gpiod: no device uses it, allowed: with device = \"gpiod\" in [estop] or [injector], or "
-       "leave it out"},
+       "b.toml:5:2: gpiod: no device uses it, allowed: with device = \"gpiod\" in [estop], [enabling] or "
+       "[injector], or leave it out"},
       {"a device without lines", kLeast + "[estop]\ndevice = \"gpiod\"\n",
        "b.toml:6:10: estop.device: \"gpiod\" needs [gpiod] (it says which lines), allowed: add [gpiod]"},
       {"an injector without lines", kLeast + "[injector]\ndevice = \"gpiod\"\n",
        "b.toml:6:10: injector.device: \"gpiod\" needs [gpiod] (it says which lines), allowed: add [gpiod]"},
+      {"an enabling switch without lines", kLeast + "[enabling]\ndevice = \"gpiod\"\n",
+       "b.toml:6:10: enabling.device: \"gpiod\" needs [gpiod] (it says which lines), allowed: add [gpiod]"},
+      {"an enabling switch with one contact",
+       kLeast + "[enabling]\ndevice = \"gpiod\"\n[gpiod]\nenabling_a = 5\n",
+       "b.toml:7:2: gpiod.enabling_b: is missing, which [enabling] needs, allowed: the offset of a line, "
+       "from "
+       "0 on"},
+      {"an enabling device that is neither", kLeast + "[enabling]\ndevice = \"simulated\"\n",
+       "b.toml:6:10: enabling.device: \"simulated\" is not one of the choices, allowed: \"haptic\" or "
+       "\"gpiod\""},
+      {"an enabling switch in virtual time",
+       "[scene]\nclock = \"virtual\"\n" + kLeast +
+           "[enabling]\ndevice = \"gpiod\"\n[gpiod]\nenabling_a = 5\nenabling_b = 6\n",
+       "b.toml:2:9: scene.clock: \"virtual\" cannot wait for enabling.device = \"gpiod\", allowed: \"real\""},
       {"a contact without a line", gpiod_scene + "contact_b = -1\n",
        "b.toml:10:13: gpiod.contact_b: is missing, which [estop] needs, allowed: the offset of a line, from "
        "0 on"},
@@ -670,6 +684,29 @@ TEST(Scene, overrides_are_read_and_checked_as_the_file_is) {
     scene = load_scene("icsi", {text});
     ASSERT_FALSE(scene.has_value()) << text;
     EXPECT_EQ(scene.error(), message);
+  }
+}
+
+TEST(Scene, an_enabling_device_is_a_button_of_the_handle_or_a_switch_of_its_own_and_written_again) {
+  const std::string lines = "[gpiod]\nenabling_a = 5\nenabling_b = 6\n";
+  for (const std::string device : {"", "haptic", "gpiod"}) {
+    const bool on_lines = device == "gpiod";
+    const auto scene =
+        parse_scene(kLeast + "[enabling]\nrelease_ms = 10\n" +
+                        (device.empty() ? "" : "device = \"" + device + "\"\n") + (on_lines ? lines : ""),
+                    "e.toml");
+    ASSERT_TRUE(scene) << scene.error();
+    EXPECT_EQ(scene->devices.enabling, on_lines ? "gpiod" : "");
+    EXPECT_EQ(scene->servo.enabling->release_s, 0.01);
+    EXPECT_FALSE(scene->servo.real_actuators) << "a switch moves nothing";
+    const std::string text = to_toml(*scene);
+    EXPECT_NE(text.find(on_lines ? "[enabling]\ndevice = \"gpiod\"" : "[enabling]\ndevice = \"haptic\""),
+              std::string::npos)
+        << text;
+    const auto again = parse_scene(text, "e.toml");
+    ASSERT_TRUE(again) << again.error();
+    EXPECT_EQ(to_toml(*again), text);
+    EXPECT_EQ(again->devices.enabling, scene->devices.enabling);
   }
 }
 

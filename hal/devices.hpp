@@ -116,7 +116,8 @@ class QueuedPositioner {
   ~QueuedPositioner() = default;
 };
 
-// Two normally closed contacts, a reset button, a heartbeat output that feeds a monitored relay.
+// Two normally closed contacts, a reset button, a heartbeat output that feeds a monitored relay, and where it
+// is wired an output that enables the drives.
 struct EstopState {
   bool contact_a_closed = true;  // false = stop; a cut wire reads false
   bool contact_b_closed = true;
@@ -129,6 +130,7 @@ class EstopChain {
  public:
   [[nodiscard]] virtual Status read(EstopState& out) NONBLOCKING = 0;
   virtual void heartbeat(bool level) NONBLOCKING = 0;
+  virtual void drive_power(bool /*on*/) NONBLOCKING {}  // whatever Stage::enable() is told
 
  protected:
   ~EstopChain() = default;

@@ -18,7 +18,7 @@ struct GpiodParams {
     low,   // contacts switch to ground, a resistor pulls the input up
   };
   enum class Pull : std::uint8_t { internal, external };  // whose resistor that is: the chip's or the board's
-  enum class Gate : std::uint8_t { high, low };           // the level that opens the injector
+  enum class Level : std::uint8_t { high, low };          // of an output, when it is active
 
   std::string chip = "/dev/gpiochip0";
   Closed contacts_closed = Closed::high;
@@ -27,8 +27,10 @@ struct GpiodParams {
   int contact_b = kNotWired;
   int reset = kNotWired;      // closed while it is pressed
   int heartbeat = kNotWired;  // to the relay that watches it
-  int gate = kNotWired;
-  Gate gate_opens_at = Gate::high;
+  int enable = kNotWired;     // to the drives: active while they are given power
+  Level enable_active_at = Level::high;
+  int gate = kNotWired;  // of the injector
+  Level gate_opens_at = Level::high;
   int valve_contact = kNotWired;  // closed while the valve is shut; not wired: the gate's line is read back
   int enabling_a = kNotWired;     // of the enabling switch: closed in its middle position only
   int enabling_b = kNotWired;
@@ -41,6 +43,8 @@ constexpr auto keys_of(const GpiodParams*) {
                    hal::whole("contact_b", &GpiodParams::contact_b, kNotWired, 1023),
                    hal::whole("reset", &GpiodParams::reset, kNotWired, 1023),
                    hal::whole("heartbeat", &GpiodParams::heartbeat, kNotWired, 1023),
+                   hal::whole("enable", &GpiodParams::enable, kNotWired, 1023),
+                   hal::choice("enable_active_at", &GpiodParams::enable_active_at, "high", "low"),
                    hal::whole("gate", &GpiodParams::gate, kNotWired, 1023),
                    hal::choice("gate_opens_at", &GpiodParams::gate_opens_at, "high", "low"),
                    hal::whole("valve_contact", &GpiodParams::valve_contact, kNotWired, 1023),

@@ -28,9 +28,11 @@ std::string no_line(const GpiodParams& params, const char* key, int offset, unsi
 }  // namespace
 
 std::array<WiredLine, kWiredLines> wired_lines(const GpiodParams& params, GpiodParts parts) {
-  const bool gate_low = params.gate_opens_at == GpiodParams::Gate::low;
+  const bool enable_low = params.enable_active_at == GpiodParams::Level::low;
+  const bool gate_low = params.gate_opens_at == GpiodParams::Level::low;
   return {{{parts.estop, "heartbeat", params.heartbeat, Use::output},
            {parts.injector, "gate", params.gate, Use::output, gate_low},
+           {parts.estop && params.enable != kNotWired, "enable", params.enable, Use::output, enable_low},
            {parts.estop, "contact_a", params.contact_a, Use::watched_input},
            {parts.estop, "contact_b", params.contact_b, Use::watched_input},
            {parts.estop, "reset", params.reset, Use::input},
@@ -90,8 +92,10 @@ static Status read_contact(Contact& contact, bool& closed, bool& pulse) NONBLOCK
 }
 
 Status GpiodEstop::read(hal::EstopState& out) NONBLOCKING {
-  if (written_ != Status::ok) {
-    return written_;
+  for (const Status written : {written_, enable_written_}) {
+    if (written != Status::ok) {
+      return written;
+    }
   }
   hal::EstopState state;
   state.sample_ns = clock_.now_ns();
@@ -107,6 +111,12 @@ Status GpiodEstop::read(hal::EstopState& out) NONBLOCKING {
 }
 
 void GpiodEstop::heartbeat(bool level) NONBLOCKING { written_ = heartbeat_->write(level); }
+
+void GpiodEstop::drive_power(bool on) NONBLOCKING {
+  if (enable_) {
+    enable_written_ = enable_->write(on);
+  }
+}
 
 Status GpiodEnabling::read(hal::EnablingState& out) NONBLOCKING {
   hal::EnablingState state;
@@ -197,7 +207,7 @@ std::string GpiodDevices::claim(const WiredLine& line, std::unique_ptr<Line>& in
 }
 
 std::array<std::unique_ptr<Line>*, kWiredLines> GpiodDevices::lines() noexcept {
-  return {&estop_.heartbeat_, &injector_.gate_,  &estop_.a_.line,    &estop_.b_.line,
+  return {&estop_.heartbeat_, &injector_.gate_,  &estop_.enable_,    &estop_.a_.line,   &estop_.b_.line,
           &estop_.reset_,     &injector_.valve_, &enabling_.a_.line, &enabling_.b_.line};
 }
 
@@ -218,6 +228,7 @@ void GpiodDevices::safe_state() noexcept {
   if (estop_.heartbeat_) {
     estop_.heartbeat(false);
   }
+  estop_.drive_power(false);
 }
 
 void GpiodDevices::close() noexcept {

@@ -19,21 +19,22 @@ struct Contact {
   bool closed = false;  // when it was read last
 };
 
-// Two contacts, the reset button and the heartbeat.
+// Two contacts, the reset button and the heartbeat; where it is wired, the line that enables the drives.
 class GpiodEstop final : public hal::EstopChain {
  public:
   explicit GpiodEstop(const hal::Clock& clock) : clock_(clock) {}
 
-  // fault, disconnected: also when the heartbeat could not be written last.
+  // fault, disconnected: also when the heartbeat or the enable line could not be written last.
   [[nodiscard]] hal::Status read(hal::EstopState& out) NONBLOCKING override;
   void heartbeat(bool level) NONBLOCKING override;
+  void drive_power(bool on) NONBLOCKING override;
 
  private:
   friend class GpiodDevices;
   const hal::Clock& clock_;
   Contact a_, b_;
-  std::unique_ptr<Line> reset_, heartbeat_;
-  hal::Status written_ = hal::Status::ok;
+  std::unique_ptr<Line> reset_, heartbeat_, enable_;
+  hal::Status written_ = hal::Status::ok, enable_written_ = hal::Status::ok;
 };
 
 // Two contacts that are closed in the middle position.
@@ -79,7 +80,7 @@ struct WiredLine {
   Use use;
   bool active_low = false;  // of an output; inputs are as contacts_closed says
 };
-inline constexpr std::size_t kWiredLines = 8;
+inline constexpr std::size_t kWiredLines = 9;
 [[nodiscard]] std::array<WiredLine, kWiredLines> wired_lines(const GpiodParams& params, GpiodParts parts);
 
 // Chip, lines, their names and users; claims none.
@@ -92,10 +93,11 @@ class GpiodDevices final : public hal::Device {
   GpiodDevices(GpiodParams params, GpiodParts parts, const hal::Clock& clock,
                OpenChip open_chip_at = open_chip);
 
-  [[nodiscard]] tl::expected<void, std::string> open() override;  // outputs: heartbeat low, gate shut
+  [[nodiscard]] tl::expected<void, std::string> open()
+      override;  // outputs: heartbeat low, drives disabled, gate shut
   [[nodiscard]] hal::Served served() noexcept override;
   [[nodiscard]] tl::expected<void, std::string> start(std::int64_t first_tick_ns) override;
-  void safe_state() noexcept override;  // heartbeat low, gate shut
+  void safe_state() noexcept override;  // heartbeat low, drives disabled, gate shut
   void close() noexcept override;
 
  private:

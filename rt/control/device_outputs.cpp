@@ -38,16 +38,16 @@ void DeviceOutputs::write_stage(const LatchOutput& latch, const Readings& readin
   if (latch.quick_stop) {
     stage.quick_stop();
     if (!latch.drive_power) {
-      stage.enable(false);
+      power(false);
     }
   } else if (!readings.enabled) {  // whatever power the drive came with
     stage.quick_stop();
     if (readings.at_standstill()) {
-      stage.enable(false);
+      power(false);
     }
   } else if (!readings.stage.enabled) {
     if (readings.stage_seen) {
-      stage.enable(true);
+      power(true);
     }
   } else if (until_command_ <= 0 && set_point != nullptr) {
     const hal::Status status = stage.command(*set_point);
@@ -61,6 +61,13 @@ void DeviceOutputs::write_stage(const LatchOutput& latch, const Readings& readin
     until_command_ = stage_divisor_;
   }
   until_command_ = std::max(until_command_ - 1, 0);
+}
+
+void DeviceOutputs::power(bool on) NONBLOCKING {
+  devices_.stage->enable(on);
+  if (devices_.estop) {
+    devices_.estop->drive_power(on);
+  }
 }
 
 }  // namespace punctum::rt

@@ -30,6 +30,9 @@ class DeviceOutputs {
   void write_stage(const LatchOutput& latch, const Readings& readings, const hal::StageCommand* set_point,
                    Written& written) NONBLOCKING;
 
+  // To the stage, and to the enable line of the chain: the drive's own word is not all that gives it power.
+  void power(bool on) NONBLOCKING;
+
   const Devices devices_;
   int stage_divisor_;
   double hand_timeout_s_;

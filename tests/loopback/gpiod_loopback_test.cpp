@@ -284,10 +284,10 @@ TEST_F(GpiodLoopback, shows_the_heartbeat_on_its_line) {
 }
 
 TEST_F(GpiodLoopback, shows_the_gate_on_its_line_with_either_level) {
-  for (const auto opens_at : {GpiodParams::Gate::high, GpiodParams::Gate::low}) {
+  for (const auto opens_at : {GpiodParams::Level::high, GpiodParams::Level::low}) {
     params.gate_opens_at = opens_at;
     open();
-    const bool high = opens_at == GpiodParams::Gate::high;
+    const bool high = opens_at == GpiodParams::Level::high;
     EXPECT_EQ(board.level(kGate), !high);
     devices->served().injector->gate(true);
     EXPECT_EQ(board.level(kGate), high);
@@ -312,7 +312,7 @@ TEST_F(GpiodLoopback, reads_the_valve_by_its_contact) {
 
 TEST_F(GpiodLoopback, reads_the_gate_back_where_the_valve_has_no_contact) {
   params.valve_contact = gpiod::kNotWired;
-  for (const auto opens_at : {GpiodParams::Gate::high, GpiodParams::Gate::low}) {
+  for (const auto opens_at : {GpiodParams::Level::high, GpiodParams::Level::low}) {
     params.gate_opens_at = opens_at;
     open();
     EXPECT_FALSE(valve_open());

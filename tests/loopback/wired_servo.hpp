@@ -428,6 +428,7 @@ class WiredServo {
     seen.asked_N = watched_->asked_N;
     seen.force_N = obeys ? seen.asked_N : acts_N;
     seen.power = watched_->power;
+    seen.enable_line = watched_->enable_line;
     // Of a chip that is gone nobody can ask the wires.
     seen.gate = row.gate = chip_gone_ ? watched_->gate : gate_wire_.level();
     seen.level = row.level = beat_wire_.level();

@@ -183,6 +183,8 @@ struct FakeEstop final : hal::EstopChain {
   std::int64_t now_ns = 0;
   int toggles = 0;
   bool level = false;
+  bool enable_line = false;
+  void drive_power(bool on) noexcept override { enable_line = on; }
   Status read(hal::EstopState& out) noexcept override {
     if (status == Status::ok) {
       out = state;

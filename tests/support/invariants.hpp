@@ -223,7 +223,8 @@ struct Seen {
   int commands = 0;
   hal::StageCommand command;
   int quick_stops = 0;
-  bool power = false;  // as last asked for
+  bool power = false;        // as last asked for
+  bool enable_line = false;  // of the e-stop chain, likewise
 
   hal::Status estop_status = hal::Status::ok;
   hal::EstopState estop;
@@ -562,6 +563,7 @@ class Invariants {
     if (s.power && !power_ && known_) {
       must(I::power_off_in_time, running);
     }
+    must(I::power_off_in_time, s.enable_line == s.power);
   }
 
   void enabling(const Seen& s, bool running, double two_ticks_s) {

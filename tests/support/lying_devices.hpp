@@ -315,7 +315,7 @@ class LyingStation {
     std::array<hal::HandState, kPast> hand_past{};
     // The stage, in the frame of the picture.
     Vec3 tip{60e-6, 2e-6, 0}, target{60e-6, 2e-6, 0}, speed = Vec3::Zero();
-    bool on = false, stopped = false, power = false;
+    bool on = false, stopped = false, power = false, enable_line = false;
     bool stage_true = true;
     hal::StageState told_stage;
     std::array<hal::StageState, kPast> stage_past{};
@@ -421,6 +421,7 @@ class LyingStation {
     seen_.sample = &sample();
     seen_.level = truth.level;
     seen_.power = truth.power;
+    seen_.enable_line = truth.enable_line;
     seen_.gate = truth.gate;
     seen_.force_N = truth.force;
     seen_.ending = truth.ending;
@@ -843,6 +844,7 @@ class LyingStation {
       return status;
     }
     void heartbeat(bool level) noexcept override { at.truth.level = level; }
+    void drive_power(bool power) noexcept override { at.truth.enable_line = power; }
   };
 
   // Held and let go by the same motion as the button of the handle.

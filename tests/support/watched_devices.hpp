@@ -19,7 +19,7 @@ class WatchedDevices {
 
   rt::test::Seen seen;
   hal::Vec3 asked_N = hal::Vec3::Zero();
-  bool power = false, gate = false;
+  bool power = false, enable_line = false, gate = false;
 
  private:
   struct Hand final : hal::HapticDevice {
@@ -67,6 +67,10 @@ class WatchedDevices {
       return at.seen.estop_status;
     }
     void heartbeat(bool level) noexcept override { at.real_.estop->heartbeat(level); }
+    void drive_power(bool on) noexcept override {
+      at.enable_line = on;
+      at.real_.estop->drive_power(on);
+    }
   };
   struct Injector final : hal::Injector {
     explicit Injector(WatchedDevices& w) : at(w) {}

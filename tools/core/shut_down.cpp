@@ -43,6 +43,9 @@ void stop_and_power_off(const rt::Devices& devices) NONBLOCKING {
   if (devices.stage != nullptr) {
     devices.stage->enable(false);
   }
+  if (devices.estop != nullptr) {
+    devices.estop->drive_power(false);
+  }
 }
 
 void ShutDown::run() noexcept {

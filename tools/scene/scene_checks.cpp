@@ -139,6 +139,12 @@ Found check_gpiod(const Scene& s) {
   if (!p.chip.starts_with('/')) {
     return Problem{"gpiod.chip", "is no path, allowed: the path of a GPIO chip, such as \"/dev/gpiochip0\""};
   }
+  if (p.enable != gpiod::kNotWired && estop == nullptr) {
+    return Problem{
+        "gpiod.enable",
+        "is driven with the emergency stop's lines, allowed: with device = \"gpiod\" in [estop], or "
+        "leave it out"};
+  }
   struct Line {
     const char* key;
     int offset;
@@ -148,6 +154,7 @@ Found check_gpiod(const Scene& s) {
                         {"gpiod.contact_b", p.contact_b, estop},
                         {"gpiod.reset", p.reset, estop},
                         {"gpiod.heartbeat", p.heartbeat, estop},
+                        {"gpiod.enable", p.enable, nullptr},
                         {"gpiod.gate", p.gate, injector},
                         {"gpiod.valve_contact", p.valve_contact, nullptr},
                         {"gpiod.enabling_a", p.enabling_a, enabling},

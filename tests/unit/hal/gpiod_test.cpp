@@ -92,7 +92,7 @@ struct StandingTime final : hal::Clock {
 };
 
 constexpr unsigned kA = 1, kB = 2, kReset = 3, kHeartbeat = 4, kGate = 5, kValve = 6, kEnablingA = 7,
-                   kEnablingB = 8;
+                   kEnablingB = 8, kEnable = 9;
 
 class GpiodTest : public testing::Test {
  protected:
@@ -105,6 +105,7 @@ class GpiodTest : public testing::Test {
     params.valve_contact = kValve;
     params.enabling_a = kEnablingA;
     params.enabling_b = kEnablingB;
+    params.enable = kEnable;
   }
   // With contacts that are closed, for either wiring.
   tl::expected<void, std::string> open(GpiodParts parts = {true, true, true}) {
@@ -308,14 +309,62 @@ TEST_F(GpiodTest, gives_no_reading_of_the_enabling_switch_when_one_of_its_lines_
 }
 
 TEST_F(GpiodTest, starts_with_every_output_off) {
-  for (const auto gate : {GpiodParams::Gate::high, GpiodParams::Gate::low}) {
+  for (const auto gate : {GpiodParams::Level::high, GpiodParams::Level::low}) {
     params.gate_opens_at = gate;
     ASSERT_TRUE(open());
     EXPECT_EQ(board.wires[kHeartbeat].request.use, Use::output);
     EXPECT_EQ(board.wires[kGate].request.use, Use::output);
     EXPECT_FALSE(board.wires[kHeartbeat].level);
-    EXPECT_EQ(board.wires[kGate].level, gate == GpiodParams::Gate::low);
+    EXPECT_EQ(board.wires[kGate].level, gate == GpiodParams::Level::low);
   }
+}
+
+TEST_F(GpiodTest, enables_the_drives_with_either_level_and_disables_them_in_the_safe_state) {
+  for (const auto active_at : {GpiodParams::Level::high, GpiodParams::Level::low}) {
+    params.enable_active_at = active_at;
+    const bool on = active_at == GpiodParams::Level::high;
+    board.wires[kEnable].level = on;  // as it was before
+    ASSERT_TRUE(open());
+    EXPECT_EQ(board.wires[kEnable].request.use, Use::output);
+    EXPECT_EQ(board.wires[kEnable].level, !on);
+    devices->served().estop->heartbeat(true);
+    EXPECT_EQ(board.wires[kEnable].level, !on);
+    devices->served().estop->drive_power(true);
+    EXPECT_EQ(board.wires[kEnable].level, on);
+    devices->served().estop->heartbeat(false);
+    EXPECT_EQ(board.wires[kEnable].level, on);
+    devices->served().estop->drive_power(false);
+    EXPECT_EQ(board.wires[kEnable].level, !on);
+    devices->served().estop->drive_power(true);
+    devices->safe_state();
+    EXPECT_EQ(board.wires[kEnable].level, !on);
+    devices->served().estop->drive_power(true);
+    devices->close();  // without safe_state() too
+    EXPECT_EQ(board.wires[kEnable].level, !on);
+    EXPECT_TRUE(nothing_is_held());
+  }
+}
+
+TEST_F(GpiodTest, has_no_enable_line_where_none_is_wired_or_another_chain_stands_in_the_scene) {
+  params.enable = kNotWired;
+  ASSERT_TRUE(open());
+  devices->served().estop->drive_power(true);
+  EXPECT_EQ(estop_status(), Status::ok);
+  params.enable = kEnable;
+  ASSERT_TRUE(open({.injector = true}));
+  EXPECT_FALSE(board.wires[kEnable].claimed);
+}
+
+TEST_F(GpiodTest, gives_no_reading_of_the_chain_when_the_enable_line_could_not_be_written) {
+  ASSERT_TRUE(open());
+  board.wires[kEnable].status = Status::disconnected;
+  devices->served().estop->drive_power(false);
+  EXPECT_EQ(estop_status(), Status::disconnected);
+  devices->served().estop->heartbeat(true);
+  EXPECT_EQ(estop_status(), Status::disconnected);
+  board.wires[kEnable].status = Status::ok;
+  devices->served().estop->drive_power(false);
+  EXPECT_EQ(estop_status(), Status::ok);
 }
 
 TEST_F(GpiodTest, drives_heartbeat_and_gate) {
@@ -346,7 +395,7 @@ TEST_F(GpiodTest, reads_the_valve_by_its_own_contact_whatever_the_gate_is) {
 
 TEST_F(GpiodTest, reads_the_gate_back_where_the_valve_has_no_contact) {
   params.valve_contact = kNotWired;
-  params.gate_opens_at = GpiodParams::Gate::low;
+  params.gate_opens_at = GpiodParams::Level::low;
   ASSERT_TRUE(open());
   EXPECT_FALSE(valve_open());
   devices->served().injector->gate(true);
@@ -369,7 +418,7 @@ TEST_F(GpiodTest, gives_no_reading_of_the_injector_when_one_of_its_lines_fails) 
 }
 
 TEST_F(GpiodTest, returns_to_the_safe_state_and_gives_the_lines_back) {
-  params.gate_opens_at = GpiodParams::Gate::low;
+  params.gate_opens_at = GpiodParams::Level::low;
   ASSERT_TRUE(open());
   devices->served().estop->heartbeat(true);
   devices->served().injector->gate(true);
@@ -423,6 +472,7 @@ TEST_F(GpiodTest, says_in_one_line_why_it_does_not_open_and_holds_nothing) {
       "and that can do this (gpioinfo lists them)");
   EXPECT_TRUE(nothing_is_held());
   board.refused_offset = kNotWired;
+  params.enable = kNotWired;
   board.lines = kValve;
   result = open({true, true});
   ASSERT_FALSE(result);

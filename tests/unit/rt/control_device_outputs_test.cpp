@@ -92,6 +92,32 @@ TEST(DeviceOutputs, brakes_during_a_stop_and_takes_the_power_when_the_latch_does
   EXPECT_EQ(o.stage.commands, 0);
 }
 
+TEST(DeviceOutputs, tells_the_enable_line_what_it_tells_the_stage_of_its_power) {
+  Outputs o;
+  o.stage.on = false;
+  o.readings.stage.enabled = false;
+  (void)o.write(&o.set_point);
+  EXPECT_TRUE(o.stage.on && o.estop.enable_line);
+  o.readings.stage.enabled = true;
+  (void)o.write(&o.set_point);
+  EXPECT_TRUE(o.estop.enable_line);
+  o.safety.latch.quick_stop = true;
+  (void)o.write(&o.set_point);
+  EXPECT_TRUE(o.estop.enable_line) << "it brakes under power";
+  o.safety.latch.drive_power = false;
+  (void)o.write(&o.set_point);
+  EXPECT_FALSE(o.estop.enable_line);
+  o.estop.enable_line = o.stage.on = true;
+  o.safety.latch = {};
+  o.readings.enabled = false;  // nobody has pressed the enabling device
+  o.readings.stage.at_standstill = false;
+  (void)o.write(&o.set_point);
+  EXPECT_TRUE(o.estop.enable_line);
+  o.readings.stage.at_standstill = true;
+  (void)o.write(&o.set_point);
+  EXPECT_FALSE(o.stage.on || o.estop.enable_line);
+}
+
 // A counter that goes on in a stop would overflow after days: nothing in it may have changed.
 TEST(DeviceOutputs, counts_nothing_while_a_stop_lasts) {
   Outputs o(4);

@@ -167,6 +167,13 @@ const std::vector<Broken>& broken() {
        "[scene]\nclock = \"virtual\"\n" + kLeast +
            "[enabling]\ndevice = \"gpiod\"\n[gpiod]\nenabling_a = 5\nenabling_b = 6\n",
        "b.toml:2:9: scene.clock: \"virtual\" cannot wait for enabling.device = \"gpiod\", allowed: \"real\""},
+      {"an enable line without its chain",
+       kLeast + "[injector]\ndevice = \"gpiod\"\n[gpiod]\ngate = 5\nenable = 6\n",
+       "b.toml:9:10: gpiod.enable: is driven with the emergency stop's lines, allowed: with device = "
+       "\"gpiod\" in "
+       "[estop], or leave it out"},
+      {"an enable line that is the heartbeat's", gpiod_scene + "contact_b = 2\nheartbeat = 4\nenable = 4\n",
+       "b.toml:12:10: gpiod.enable: 4 is the line of gpiod.heartbeat too, allowed: a line of its own"},
       {"a contact without a line", gpiod_scene + "contact_b = -1\n",
        "b.toml:10:13: gpiod.contact_b: is missing, which [estop] needs, allowed: the offset of a line, from "
        "0 on"},

@@ -33,12 +33,14 @@ constexpr std::int64_t kLongest_ns = 500'000'000;
 struct Station {
   rt::test::FakeHand hand;
   rt::test::FakeStage stage{Vec3::Zero()};
+  rt::test::FakeEstop estop;
   rt::test::FakeInjector injector;
   struct PassingClock final : hal::Clock {
     explicit PassingClock(Station& s) : station(s) {}
     [[nodiscard]] std::int64_t now_ns() const noexcept override { return t_ns; }
     void sleep_until_ns(std::int64_t until_ns) noexcept override {
       station.stage.step(1e-9 * static_cast<double>(until_ns - t_ns));
+      EXPECT_EQ(station.estop.enable_line, station.stage.on);
       if (!station.stage.on && !off_since_ns) {
         off_since_ns = t_ns;
       }
@@ -53,10 +55,12 @@ struct Station {
     stage.on = true;
     hand.force = Vec3(1, 2, 3);
     injector.open = true;
+    estop.enable_line = true;
   }
   [[nodiscard]] rt::Devices devices() {
     rt::Devices all{hand};
     all.stage = &stage;
+    all.estop = &estop;
     all.injector = &injector;
     return all;
   }
@@ -65,6 +69,7 @@ struct Station {
     EXPECT_FALSE(injector.open);
     EXPECT_GE(stage.quick_stops, 1);
     EXPECT_FALSE(stage.on);
+    EXPECT_FALSE(estop.enable_line);
   }
 };
 

@@ -31,6 +31,10 @@ struct GpiodParams {
   Level enable_active_at = Level::high;
   int gate = kNotWired;  // of the injector
   Level gate_opens_at = Level::high;
+  int vacuum_gate = kNotWired;  // the valve between pump and holding pipette: held while it is claimed
+  Level vacuum_holds_at = Level::high;
+  int vacuum_switch = kNotWired;  // closed at vacuum_switch_Pa below ambient, or more
+  double vacuum_switch_Pa = 0;
   int valve_contact = kNotWired;  // closed while the valve is shut; not wired: the gate's line is read back
   int enabling_a = kNotWired;     // of the enabling switch: closed in its middle position only
   int enabling_b = kNotWired;
@@ -47,6 +51,10 @@ constexpr auto keys_of(const GpiodParams*) {
                    hal::choice("enable_active_at", &GpiodParams::enable_active_at, "high", "low"),
                    hal::whole("gate", &GpiodParams::gate, kNotWired, 1023),
                    hal::choice("gate_opens_at", &GpiodParams::gate_opens_at, "high", "low"),
+                   hal::whole("vacuum_gate", &GpiodParams::vacuum_gate, kNotWired, 1023),
+                   hal::choice("vacuum_holds_at", &GpiodParams::vacuum_holds_at, "high", "low"),
+                   hal::whole("vacuum_switch", &GpiodParams::vacuum_switch, kNotWired, 1023),
+                   hal::kilo("vacuum_switch_kPa", &GpiodParams::vacuum_switch_Pa, 0, 100),
                    hal::whole("valve_contact", &GpiodParams::valve_contact, kNotWired, 1023),
                    hal::whole("enabling_a", &GpiodParams::enabling_a, kNotWired, 1023),
                    hal::whole("enabling_b", &GpiodParams::enabling_b, kNotWired, 1023));

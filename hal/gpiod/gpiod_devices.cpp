@@ -29,17 +29,21 @@ std::string no_line(const GpiodParams& params, const char* key, int offset, unsi
 
 std::array<WiredLine, kWiredLines> wired_lines(const GpiodParams& params, GpiodParts parts) {
   const bool enable_low = params.enable_active_at == GpiodParams::Level::low;
+  const bool holds_low = params.vacuum_holds_at == GpiodParams::Level::low;
   const bool gate_low = params.gate_opens_at == GpiodParams::Level::low;
   return {{{parts.estop, "heartbeat", params.heartbeat, Use::output},
            {parts.injector, "gate", params.gate, Use::output, gate_low},
            {parts.estop && params.enable != kNotWired, "enable", params.enable, Use::output, enable_low},
+           {parts.vacuum && params.vacuum_gate != kNotWired, "vacuum_gate", params.vacuum_gate,
+            Use::held_output, holds_low},
            {parts.estop, "contact_a", params.contact_a, Use::watched_input},
            {parts.estop, "contact_b", params.contact_b, Use::watched_input},
            {parts.estop, "reset", params.reset, Use::input},
            {parts.injector && params.valve_contact != kNotWired, "valve_contact", params.valve_contact,
             Use::input},
            {parts.enabling, "enabling_a", params.enabling_a, Use::watched_input},
-           {parts.enabling, "enabling_b", params.enabling_b, Use::watched_input}}};
+           {parts.enabling, "enabling_b", params.enabling_b, Use::watched_input},
+           {parts.vacuum, "vacuum_switch", params.vacuum_switch, Use::input}}};
 }
 
 hal::Findings look(const GpiodParams& params, GpiodParts parts, const OpenChip& open_chip_at) {
@@ -148,6 +152,18 @@ Status GpiodInjector::read(hal::InjectorState& out) NONBLOCKING {
   return Status::ok;
 }
 
+Status GpiodVacuum::read(hal::VacuumState& out) NONBLOCKING {
+  hal::VacuumState state;
+  state.sample_ns = clock_.now_ns();
+  bool closed = false;
+  const Status status = switch_->read(closed);
+  if (status == Status::ok) {
+    state.pressure_Pa = closed ? switch_Pa_ : 0;
+    out = state;
+  }
+  return status;
+}
+
 GpiodDevices::GpiodDevices(GpiodParams params, GpiodParts parts, const hal::Clock& clock,
                            OpenChip open_chip_at)
     : params_(std::move(params)),
@@ -155,7 +171,8 @@ GpiodDevices::GpiodDevices(GpiodParams params, GpiodParts parts, const hal::Cloc
       open_chip_at_(std::move(open_chip_at)),
       estop_(clock),
       enabling_(clock),
-      injector_(clock) {}
+      injector_(clock),
+      vacuum_(params_.vacuum_switch_Pa, clock) {}
 
 tl::expected<void, std::string> GpiodDevices::open() {
   auto chip = open_chip_at_(params_.chip);
@@ -191,7 +208,7 @@ std::string GpiodDevices::claim(const WiredLine& line, std::unique_ptr<Line>& in
   }
   const bool closed_low = params_.contacts_closed == GpiodParams::Closed::low;
   LineRequest request{static_cast<unsigned>(line.offset), line.use, line.active_low};
-  if (line.use != Use::output) {
+  if (!is_output(line.use)) {
     request.active_low = closed_low;
     if (params_.pull == GpiodParams::Pull::internal) {
       request.bias = closed_low ? Bias::pull_up : Bias::pull_down;
@@ -207,14 +224,16 @@ std::string GpiodDevices::claim(const WiredLine& line, std::unique_ptr<Line>& in
 }
 
 std::array<std::unique_ptr<Line>*, kWiredLines> GpiodDevices::lines() noexcept {
-  return {&estop_.heartbeat_, &injector_.gate_,  &estop_.enable_,    &estop_.a_.line,   &estop_.b_.line,
-          &estop_.reset_,     &injector_.valve_, &enabling_.a_.line, &enabling_.b_.line};
+  return {&estop_.heartbeat_, &injector_.gate_,   &estop_.enable_, &vacuum_.gate_,
+          &estop_.a_.line,    &estop_.b_.line,    &estop_.reset_,  &injector_.valve_,
+          &enabling_.a_.line, &enabling_.b_.line, &vacuum_.switch_};
 }
 
 hal::Served GpiodDevices::served() noexcept {
   hal::Served served;
   served.estop = parts_.estop ? &estop_ : nullptr;
   served.enabling = parts_.enabling ? &enabling_ : nullptr;
+  served.vacuum = parts_.vacuum ? &vacuum_ : nullptr;
   served.injector = parts_.injector ? &injector_ : nullptr;
   return served;
 }

@@ -1,4 +1,5 @@
-// The e-stop chain, the enabling switch and the injector on the GPIO lines of one chip. Wiring: README.md.
+// The e-stop chain, the enabling switch, the injector and the holding vacuum on the GPIO lines of one chip.
+// Wiring: README.md.
 #pragma once
 
 #include <array>
@@ -66,10 +67,26 @@ class GpiodInjector final : public hal::Injector {
   hal::Status written_ = hal::Status::ok;
 };
 
+// A pressure switch, and where it is wired the valve between pump and pipette: it holds from the moment it is
+// claimed on and is never written again, whatever becomes of the run.
+class GpiodVacuum final : public hal::HoldingVacuum {
+ public:
+  GpiodVacuum(double switch_Pa, const hal::Clock& clock) : switch_Pa_(switch_Pa), clock_(clock) {}
+
+  [[nodiscard]] hal::Status read(hal::VacuumState& out) NONBLOCKING override;
+
+ private:
+  friend class GpiodDevices;
+  const double switch_Pa_;
+  const hal::Clock& clock_;
+  std::unique_ptr<Line> gate_, switch_;
+};
+
 struct GpiodParts {
   bool estop = false;
   bool injector = false;
   bool enabling = false;
+  bool vacuum = false;
 };
 
 // The lines that these parts use, outputs first: they are to be in their safe state before anything else.
@@ -80,7 +97,7 @@ struct WiredLine {
   Use use;
   bool active_low = false;  // of an output; inputs are as contacts_closed says
 };
-inline constexpr std::size_t kWiredLines = 9;
+inline constexpr std::size_t kWiredLines = 11;
 [[nodiscard]] std::array<WiredLine, kWiredLines> wired_lines(const GpiodParams& params, GpiodParts parts);
 
 // Chip, lines, their names and users; claims none.
@@ -94,10 +111,10 @@ class GpiodDevices final : public hal::Device {
                OpenChip open_chip_at = open_chip);
 
   [[nodiscard]] tl::expected<void, std::string> open()
-      override;  // outputs: heartbeat low, drives disabled, gate shut
+      override;  // heartbeat low, drives disabled, gate shut, vacuum held
   [[nodiscard]] hal::Served served() noexcept override;
   [[nodiscard]] tl::expected<void, std::string> start(std::int64_t first_tick_ns) override;
-  void safe_state() noexcept override;  // heartbeat low, drives disabled, gate shut
+  void safe_state() noexcept override;  // heartbeat low, drives disabled, gate shut; the vacuum as it is
   void close() noexcept override;
 
  private:
@@ -112,6 +129,7 @@ class GpiodDevices final : public hal::Device {
   GpiodEstop estop_;
   GpiodEnabling enabling_;
   GpiodInjector injector_;
+  GpiodVacuum vacuum_;
 };
 
 }  // namespace punctum::gpiod

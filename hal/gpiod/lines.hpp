@@ -18,7 +18,9 @@ enum class Use : std::uint8_t {
   input,
   watched_input,  // the kernel keeps its changes until they are taken
   output,         // inactive from the first moment on
+  held_output,    // active from the first moment on
 };
+[[nodiscard]] constexpr bool is_output(Use use) { return use == Use::output || use == Use::held_output; }
 enum class Bias : std::uint8_t { as_it_is, pull_up, pull_down };
 
 struct LineRequest {

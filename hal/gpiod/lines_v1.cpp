@@ -60,6 +60,7 @@ int type_of(Use use) {
     case Use::watched_input:
       return GPIOD_LINE_REQUEST_EVENT_BOTH_EDGES;
     case Use::output:
+    case Use::held_output:
       break;
   }
   return GPIOD_LINE_REQUEST_DIRECTION_OUTPUT;
@@ -83,7 +84,7 @@ class ChipV1 final : public Chip {
   [[nodiscard]] tl::expected<std::unique_ptr<Line>, std::string> claim(const LineRequest& request) override {
     gpiod_line* line = gpiod_chip_get_line(chip_, request.offset);
     const gpiod_line_request_config config{"punctum", type_of(request.use), flags_of(request)};
-    if (line == nullptr || gpiod_line_request(line, &config, 0) != 0) {
+    if (line == nullptr || gpiod_line_request(line, &config, request.use == Use::held_output ? 1 : 0) != 0) {
       return tl::unexpected(std::string(std::strerror(errno)));
     }
     auto claimed = std::make_unique<LineV1>(line);

@@ -88,10 +88,11 @@ class ChipV2 final : public Chip {
     gpiod_request_config_set_consumer(config.get(), "punctum");
     gpiod_request_config_set_event_buffer_size(config.get(), kAtOnce);
     gpiod_line_settings_set_active_low(settings.get(), wanted.active_low);
-    gpiod_line_settings_set_output_value(settings.get(), GPIOD_LINE_VALUE_INACTIVE);
+    gpiod_line_settings_set_output_value(
+        settings.get(), wanted.use == Use::held_output ? GPIOD_LINE_VALUE_ACTIVE : GPIOD_LINE_VALUE_INACTIVE);
     const bool set = gpiod_line_settings_set_direction(
-                         settings.get(), wanted.use == Use::output ? GPIOD_LINE_DIRECTION_OUTPUT
-                                                                   : GPIOD_LINE_DIRECTION_INPUT) == 0 &&
+                         settings.get(), is_output(wanted.use) ? GPIOD_LINE_DIRECTION_OUTPUT
+                                                               : GPIOD_LINE_DIRECTION_INPUT) == 0 &&
                      gpiod_line_settings_set_edge_detection(
                          settings.get(), wanted.use == Use::watched_input ? GPIOD_LINE_EDGE_BOTH
                                                                           : GPIOD_LINE_EDGE_NONE) == 0 &&

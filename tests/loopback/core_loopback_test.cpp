@@ -121,5 +121,112 @@ TEST_F(CoreLoopback, stops_within_two_ticks_of_a_chip_that_is_gone_and_stays_sto
   EXPECT_EQ(seen.back().stage, StopStage::stopped);
 }
 
+// With an enabling switch, an enable line and the holding vacuum on the chip too.
+class WholeBoard : public CoreRun {
+ protected:
+  WholeBoard()
+      : CoreRun([](tools::Scene& s) {
+          s.devices.enabling = tools::kGpiod;
+          s.devices.vacuum = tools::kGpiod;
+          s.servo.enabling.emplace();
+          s.servo.vacuum.emplace().min_Pa = 1000;
+          s.servo.vacuum->still_s = 0;
+          s.gpiod->enabling_a = kEnablingA;
+          s.gpiod->enabling_b = kEnablingB;
+          s.gpiod->enable = kEnable;
+          s.gpiod->vacuum_gate = kVacuumGate;
+          s.gpiod->vacuum_switch = kVacuumSwitch;
+          s.gpiod->vacuum_switch_Pa = 20'000;
+        }) {
+    board->drive(kVacuumSwitch, true);
+  }
+  void hold(bool a, bool b) {
+    board->drive(kEnablingA, a);
+    board->drive(kEnablingB, b);
+  }
+  // Until then: the level of the enable line, after each tick.
+  void watch_until(double to_ms) {
+    for (; watched_ms < to_ms; watched_ms += 1) {
+      at(watched_ms + 0.9);
+      enable.push_back(board->level(kEnable));
+      held = held && board->level(kVacuumGate);
+    }
+  }
+  double watched_ms = 0;
+  std::vector<bool> enable;
+  bool held = true;
+};
+
+TEST_F(WholeBoard, enables_its_drives_while_the_switch_is_held_and_until_they_stand_after_it_was_let_go) {
+  run(1200, [&] {
+    watch_until(100);
+    hold(true, true);
+    watch_until(500);
+    hold(false, false);
+    watch_until(800);
+    hold(true, true);
+    watch_until(1199);
+  });
+  EXPECT_EQ(missed, 0U);
+  EXPECT_TRUE(held) << "the vacuum";
+  EXPECT_EQ(at_ms(499).fault, Fault::none);
+  EXPECT_EQ(at_ms(560).fault, Fault::enabling_released);
+  EXPECT_EQ(at_ms(1190).fault, Fault::none);
+  int braking = 0;
+  for (std::size_t k = 0; k < enable.size(); ++k) {
+    const bool pressed = (k >= 125 && k < 800) || k >= 825;
+    const bool waits = k >= 100 && k < 125;  // until the press has lasted
+    if (!waits && !(k >= 800 && k < 825)) {
+      EXPECT_EQ(enable[k], pressed && seen[k].stage != StopStage::stopped) << k;
+    }
+    braking += enable[k] && seen[k].stage == StopStage::stopping ? 1 : 0;
+  }
+  EXPECT_GE(braking, 10) << "it brakes under power";
+}
+
+TEST_F(WholeBoard,
+       holds_when_one_contact_of_the_switch_opens_and_is_not_pressed_on_while_the_other_never_did) {
+  run(1000, [&] {
+    at(100);
+    hold(true, true);
+    at(300);
+    hold(true, false);  // contact a is welded
+    at(500);
+    hold(true, true);
+    press_reset(600, 700);
+    at(750);
+    hold(false, false);
+    press_reset(800, 850);
+    at(900);
+    hold(true, true);
+  });
+  EXPECT_EQ(at_ms(299).stage, StopStage::running);
+  EXPECT_EQ(at_ms(330).fault, Fault::enabling_released);
+  EXPECT_EQ(at_ms(599).stage, StopStage::stopped) << "a press alone";
+  EXPECT_EQ(at_ms(740).stage, StopStage::stopped) << "the reset button, contact a never opened";
+  EXPECT_EQ(at_ms(860).stage, StopStage::running);
+  EXPECT_NE(
+      station->station.core.status.faults_latched.load() >> static_cast<int>(Fault::enabling_fault) & 1U, 0U);
+  EXPECT_EQ(at_ms(999).fault, Fault::none);
+  EXPECT_TRUE(board->level(kEnable));
+  assembly.reset();
+  EXPECT_FALSE(board->level(kEnable));
+}
+
+TEST_F(WholeBoard, stops_when_the_vacuum_switch_opens_and_leaves_the_valve_holding) {
+  run(600, [&] {
+    at(300);
+    board->drive(kVacuumSwitch, false);
+    watched_ms = 300;
+    watch_until(599);
+  });
+  EXPECT_EQ(at_ms(299).fault, Fault::none);
+  EXPECT_EQ(at_ms(450).fault, Fault::vacuum_lost);
+  EXPECT_TRUE(held);
+  board->drive(kVacuumGate, true);
+  assembly.reset();
+  EXPECT_TRUE(board->level(kVacuumGate));
+}
+
 }  // namespace
 }  // namespace punctum::loopback

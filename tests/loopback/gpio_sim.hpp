@@ -60,7 +60,7 @@ class Watched {
 
 class GpioSim {
  public:
-  static constexpr int kLines = 8;
+  static constexpr int kLines = 16;
 
   explicit GpioSim(const std::string& name = "board") : config_(fs::path(kGpioSim) / name) {
     fs::create_directory(config_);

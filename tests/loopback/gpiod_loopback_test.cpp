@@ -1,5 +1,8 @@
 // The backend gpiod against the kernel's GPIO code and the simulated chip behind it.
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <memory>
 #include <string>
@@ -16,20 +19,23 @@ using gpiod::GpiodDevices;
 using gpiod::GpiodParams;
 using hal::Status;
 
+constexpr gpiod::GpiodParts kAll{true, true, true, true};
+
 class GpiodLoopback : public testing::Test {
  protected:
   // Opened, with contacts that are closed.
   void open() {
     devices.reset();
-    devices = std::make_unique<GpiodDevices>(params, gpiod::GpiodParts{true, true}, clock);
+    devices = std::make_unique<GpiodDevices>(params, kAll, clock);
     const auto opened = devices->open();
     ASSERT_TRUE(opened) << opened.error();
     ASSERT_TRUE(devices->start(0));
-    for (const int contact : {kContactA, kContactB, kValve}) {
+    for (const int contact : {kContactA, kContactB, kValve, kEnablingA, kEnablingB, kVacuumSwitch}) {
       close_contact(contact);
     }
     let_the_kernel_note_it();
     (void)read();
+    (void)read_switch();
   }
   ~GpiodLoopback() override {
     if (devices) {
@@ -56,13 +62,23 @@ class GpiodLoopback : public testing::Test {
     hal::EstopState state;
     return devices->served().estop->read(state);
   }
+  hal::EnablingState read_switch() {
+    hal::EnablingState state;
+    EXPECT_EQ(devices->served().enabling->read(state), Status::ok);
+    return state;
+  }
+  double vacuum_Pa() {
+    hal::VacuumState state;
+    EXPECT_EQ(devices->served().vacuum->read(state), Status::ok);
+    return state.pressure_Pa;
+  }
   bool valve_open() {
     hal::InjectorState state;
     EXPECT_EQ(devices->served().injector->read(state), Status::ok);
     return state.open;
   }
   std::string refusal(const GpiodParams& of) {
-    GpiodDevices refused(of, {true, true}, clock);
+    GpiodDevices refused(of, kAll, clock);
     const auto opened = refused.open();
     return opened ? "it opened" : opened.error();
   }
@@ -110,13 +126,16 @@ TEST_F(GpiodLoopback, reads_a_cut_wire_as_open_with_either_wiring) {
     for (int line = 0; line < GpioSim::kLines; ++line) {
       board.drive(line, closed_level());  // what the wires were before
     }
-    devices = std::make_unique<GpiodDevices>(params, gpiod::GpiodParts{true, true}, clock);
+    devices = std::make_unique<GpiodDevices>(params, kAll, clock);
     ASSERT_TRUE(devices->open());
     const hal::EstopState state = read();
     EXPECT_FALSE(state.contact_a_closed);
     EXPECT_FALSE(state.contact_b_closed);
     EXPECT_FALSE(state.reset_pressed);
     EXPECT_TRUE(valve_open());
+    EXPECT_FALSE(read_switch().contact_a_closed);
+    EXPECT_FALSE(read_switch().contact_b_closed);
+    EXPECT_EQ(vacuum_Pa(), 0);
     devices->close();
   }
 }
@@ -125,7 +144,7 @@ TEST_F(GpiodLoopback, leaves_the_level_to_the_resistors_of_the_board) {
   params.pull = GpiodParams::Pull::external;
   board.drive(kContactA, true);
   board.drive(kContactB, false);
-  devices = std::make_unique<GpiodDevices>(params, gpiod::GpiodParts{true, true}, clock);
+  devices = std::make_unique<GpiodDevices>(params, kAll, clock);
   ASSERT_TRUE(devices->open());
   EXPECT_TRUE(read().contact_a_closed);
   EXPECT_FALSE(read().contact_b_closed);
@@ -323,6 +342,103 @@ TEST_F(GpiodLoopback, reads_the_gate_back_where_the_valve_has_no_contact) {
   }
 }
 
+TEST_F(GpiodLoopback, reads_each_contact_of_the_enabling_switch_by_itself) {
+  for (const auto closed : {GpiodParams::Closed::high, GpiodParams::Closed::low}) {
+    params.contacts_closed = closed;
+    open();
+    for (unsigned i = 0; i < 4; ++i) {
+      const bool a = (i & 1U) != 0, b = (i & 2U) != 0;
+      board.drive(kEnablingA, a == closed_level());
+      board.drive(kEnablingB, b == closed_level());
+      const hal::EnablingState state = read_switch();
+      EXPECT_EQ(state.contact_a_closed, a) << i;
+      EXPECT_EQ(state.contact_b_closed, b) << i;
+    }
+  }
+}
+
+TEST_F(GpiodLoopback, sees_the_enabling_switch_let_go_for_less_than_the_time_between_readings_once) {
+  open();
+  for (const int contact : {kEnablingA, kEnablingB}) {
+    pulse(contact);
+    let_the_kernel_note_it();
+    const hal::EnablingState state = read_switch();
+    EXPECT_TRUE(state.pulse_seen) << contact;
+    EXPECT_TRUE(state.contact_a_closed && state.contact_b_closed);
+    EXPECT_FALSE(read_switch().pulse_seen);
+    EXPECT_FALSE(read().pulse_seen) << "of the emergency stop";
+  }
+}
+
+TEST_F(GpiodLoopback, shows_the_enable_line_with_either_level_and_disables_in_the_safe_state) {
+  for (const auto active_at : {GpiodParams::Level::high, GpiodParams::Level::low}) {
+    params.enable_active_at = active_at;
+    const bool high = active_at == GpiodParams::Level::high;
+    board.drive(kEnable, high);
+    open();
+    EXPECT_EQ(board.level(kEnable), !high);
+    devices->served().estop->drive_power(true);
+    EXPECT_EQ(board.level(kEnable), high);
+    EXPECT_FALSE(board.level(kHeartbeat));
+    devices->served().estop->drive_power(false);
+    EXPECT_EQ(board.level(kEnable), !high);
+    devices->served().estop->drive_power(true);
+    devices->safe_state();
+    EXPECT_EQ(board.level(kEnable), !high);
+  }
+}
+
+TEST_F(GpiodLoopback, reads_the_vacuum_by_its_switch) {
+  open();
+  EXPECT_EQ(vacuum_Pa(), 20'000);
+  open_contact(kVacuumSwitch);
+  EXPECT_EQ(vacuum_Pa(), 0);
+  close_contact(kVacuumSwitch);
+  EXPECT_EQ(vacuum_Pa(), 20'000);
+}
+
+TEST_F(GpiodLoopback, holds_the_vacuum_from_the_moment_it_opens_through_the_safe_state_and_past_the_end) {
+  for (const auto holds_at : {GpiodParams::Level::high, GpiodParams::Level::low}) {
+    params.vacuum_holds_at = holds_at;
+    const bool held = holds_at == GpiodParams::Level::high;
+    board.drive(kVacuumGate, !held);
+    open();
+    EXPECT_EQ(board.level(kVacuumGate), held) << "against the resistor";
+    devices->safe_state();
+    EXPECT_EQ(board.level(kVacuumGate), held);
+    board.drive(kVacuumGate, held);
+    devices->close();
+    EXPECT_EQ(board.level(kVacuumGate), held);
+  }
+}
+
+// This chip leaves a line that nobody claims any more to the resistor.
+TEST_F(GpiodLoopback, holds_the_vacuum_when_its_program_is_killed_and_a_resistor_pulls_to_hold) {
+  int opened[2];
+  ASSERT_EQ(pipe(opened), 0);
+  const pid_t program = fork();
+  ASSERT_GE(program, 0);
+  if (program == 0) {
+    GpiodDevices killed(params, kAll, clock);
+    const char ok = killed.open() ? 'y' : 'n';
+    (void)!write(opened[1], &ok, 1);
+    for (;;) {
+      pause();
+    }
+  }
+  char ok = 0;
+  ASSERT_EQ(::read(opened[0], &ok, 1), 1);
+  EXPECT_EQ(ok, 'y');
+  EXPECT_TRUE(board.level(kVacuumGate)) << "against the resistor";
+  board.drive(kVacuumGate, true);
+  ASSERT_EQ(kill(program, SIGKILL), 0);
+  ASSERT_EQ(waitpid(program, nullptr, 0), program);
+  EXPECT_EQ(refusal(params), "it opened");
+  EXPECT_TRUE(board.level(kVacuumGate));
+  close(opened[0]);
+  close(opened[1]);
+}
+
 TEST_F(GpiodLoopback, has_its_outputs_off_from_the_moment_it_opens) {
   board.drive(kHeartbeat, true);
   board.drive(kGate, true);
@@ -374,13 +490,13 @@ TEST_F(GpiodLoopback, says_which_line_is_busy) {
 
 TEST_F(GpiodLoopback, says_which_line_is_beyond_the_chip) {
   params.reset = GpioSim::kLines;
-  EXPECT_EQ(refusal(params), "gpiod.reset = 8: no line of " + board.path() + ", allowed: 0 to 7");
+  EXPECT_EQ(refusal(params), "gpiod.reset = 16: no line of " + board.path() + ", allowed: 0 to 15");
 }
 
 TEST_F(GpiodLoopback, holds_no_line_after_it_failed_to_open) {
   GpiodParams last_is_wrong = params;
   last_is_wrong.valve_contact = GpioSim::kLines;
-  GpiodDevices refused(last_is_wrong, {true, true}, clock);
+  GpiodDevices refused(last_is_wrong, kAll, clock);
   ASSERT_FALSE(refused.open());
   EXPECT_EQ(refusal(params), "it opened");
 }

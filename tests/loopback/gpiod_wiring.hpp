@@ -6,7 +6,8 @@
 
 namespace punctum::loopback {
 
-inline constexpr int kContactA = 0, kContactB = 1, kReset = 2, kHeartbeat = 3, kGate = 4, kValve = 5;
+inline constexpr int kContactA = 0, kContactB = 1, kReset = 2, kHeartbeat = 3, kGate = 4, kValve = 5,
+                     kEnablingA = 6, kEnablingB = 7, kEnable = 8, kVacuumGate = 9, kVacuumSwitch = 10;
 
 inline gpiod::GpiodParams wiring(const GpioSim& board) {
   gpiod::GpiodParams params;
@@ -17,6 +18,12 @@ inline gpiod::GpiodParams wiring(const GpioSim& board) {
   params.heartbeat = kHeartbeat;
   params.gate = kGate;
   params.valve_contact = kValve;
+  params.enabling_a = kEnablingA;
+  params.enabling_b = kEnablingB;
+  params.enable = kEnable;
+  params.vacuum_gate = kVacuumGate;
+  params.vacuum_switch = kVacuumSwitch;
+  params.vacuum_switch_Pa = 20'000;
   return params;
 }
 

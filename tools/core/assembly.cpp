@@ -77,7 +77,8 @@ std::unique_ptr<hal::Device> make_gpiod(const Surroundings& around, const Roles&
   return std::make_unique<gpiod::GpiodDevices>(around.scene.gpiod.value_or(gpiod::GpiodParams{}),
                                                gpiod::GpiodParts{.estop = wanted.has(Role::estop),
                                                                  .injector = wanted.has(Role::injector),
-                                                                 .enabling = wanted.has(Role::enabling)},
+                                                                 .enabling = wanted.has(Role::enabling),
+                                                                 .vacuum = wanted.has(Role::vacuum)},
                                                around.clock);
 }
 
@@ -119,7 +120,7 @@ std::span<const Backend> backends() {
                Role::camera},
               make_simulated_devices},
       Backend{kSimulated, {Role::positioner}, make_simulated_positioner},
-      Backend{kGpiod, {Role::estop, Role::enabling, Role::injector}, make_gpiod},
+      Backend{kGpiod, {Role::estop, Role::enabling, Role::vacuum, Role::injector}, make_gpiod},
       Backend{kCia402, {Role::stage, Role::force_sensor}, make_cia402},
       Backend{kFalcon, {Role::haptic}, make_falcon},
       Backend{kEvdev, {Role::haptic}, make_evdev},

@@ -29,10 +29,12 @@ hal::Findings look_at_recorded(const Scene& scene, const Machine&, std::string_v
 }
 
 hal::Findings look_at_gpiod(const Scene& scene, const Machine& machine, std::string_view device) {
-  return gpiod::look(
-      *scene.gpiod,
-      {.estop = device == "estop", .injector = device == "injector", .enabling = device == "enabling"},
-      machine.open_chip);
+  return gpiod::look(*scene.gpiod,
+                     {.estop = device == "estop",
+                      .injector = device == "injector",
+                      .enabling = device == "enabling",
+                      .vacuum = device == "vacuum"},
+                     machine.open_chip);
 }
 
 hal::Findings look_at_cia402(const Scene& scene, const Machine& machine, std::string_view device) {

@@ -86,7 +86,7 @@ struct Scene {
   std::optional<sim::SimConfig> sim;             // absent: no device is simulated
   std::optional<RecordedFrames> recorded;        // camera = recorded frames
   std::optional<cia402::CanStageParams> cia402;  // stage = drives on a CAN bus
-  std::optional<gpiod::GpiodParams> gpiod;       // lines of e-stop chain, enabling switch and injector
+  std::optional<gpiod::GpiodParams> gpiod;       // lines of the devices that name it
   std::optional<WatchdogParams> watchdog;        // of the machine
   std::optional<hal::CameraSettings> camera;     // camera = one that is plugged in
   std::optional<v4l2::V4l2Params> v4l2;

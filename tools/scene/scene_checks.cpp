@@ -115,6 +115,29 @@ Found check_live_camera(const Scene& s) {
   return std::nullopt;
 }
 
+// A switch knows two pressures: its own, and none.
+Found check_vacuum_switch(const gpiod::GpiodParams& p, const rt::VacuumParams& vacuum) {
+  if (p.vacuum_switch_Pa == 0) {
+    return Problem{
+        "gpiod.vacuum_switch_kPa",
+        "is missing, which [vacuum] needs, allowed: the pressure below ambient at which it closes"};
+  }
+  if (vacuum.min_Pa == 0 || vacuum.min_Pa > p.vacuum_switch_Pa) {
+    return Problem{"vacuum.min_Pa",
+                   fmt::format("{:g}, but the switch tells either 0 or {:g}, allowed: more than 0, at most "
+                               "gpiod.vacuum_switch_kPa = {:g}",
+                               vacuum.min_Pa, p.vacuum_switch_Pa, p.vacuum_switch_Pa / 1e3)};
+  }
+  if (vacuum.still_s > 0) {
+    return Problem{
+        "vacuum.still_s",
+        fmt::format("{:g}, but a switch shows the same as long as it does not switch, allowed: 0 with "
+                    "vacuum.device = \"gpiod\"",
+                    vacuum.still_s)};
+  }
+  return std::nullopt;
+}
+
 // The lines of [gpiod], and what its devices need of them.
 Found check_gpiod(const Scene& s) {
   const auto needed_by = [&s](const char* table, std::string DeviceNames::* device) {
@@ -123,7 +146,11 @@ Found check_gpiod(const Scene& s) {
   const char* const estop = needed_by("estop", &DeviceNames::estop);
   const char* const enabling = needed_by("enabling", &DeviceNames::enabling);
   const char* const injector = needed_by("injector", &DeviceNames::injector);
-  const char* const any = estop != nullptr ? estop : enabling != nullptr ? enabling : injector;
+  const char* const vacuum = needed_by("vacuum", &DeviceNames::vacuum);
+  const char* any = nullptr;
+  for (const char* table : {estop, enabling, injector, vacuum}) {
+    any = any != nullptr ? any : table;
+  }
   if (!s.gpiod) {
     return any != nullptr
                ? Found{Problem{fmt::format("{}.device", any),
@@ -131,9 +158,10 @@ Found check_gpiod(const Scene& s) {
                : std::nullopt;
   }
   if (any == nullptr) {
-    return Problem{"gpiod",
-                   "no device uses it, allowed: with device = \"gpiod\" in [estop], [enabling] or "
-                   "[injector], or leave it out"};
+    return Problem{
+        "gpiod",
+        "no device uses it, allowed: with device = \"gpiod\" in [estop], [enabling], [injector] or "
+        "[vacuum], or leave it out"};
   }
   const gpiod::GpiodParams& p = *s.gpiod;
   if (!p.chip.starts_with('/')) {
@@ -156,6 +184,8 @@ Found check_gpiod(const Scene& s) {
                         {"gpiod.heartbeat", p.heartbeat, estop},
                         {"gpiod.enable", p.enable, nullptr},
                         {"gpiod.gate", p.gate, injector},
+                        {"gpiod.vacuum_gate", p.vacuum_gate, nullptr},
+                        {"gpiod.vacuum_switch", p.vacuum_switch, vacuum},
                         {"gpiod.valve_contact", p.valve_contact, nullptr},
                         {"gpiod.enabling_a", p.enabling_a, enabling},
                         {"gpiod.enabling_b", p.enabling_b, enabling}};
@@ -173,7 +203,7 @@ Found check_gpiod(const Scene& s) {
       }
     }
   }
-  return std::nullopt;
+  return vacuum != nullptr ? check_vacuum_switch(p, *s.servo.vacuum) : std::nullopt;
 }
 
 Found check_falcon(const Scene& s) {

@@ -427,6 +427,7 @@ const Backends& known_backends() {
     b["estop"].emplace_back(kGpiod);
     b["enabling"] = {std::string(kHandle), std::string(kGpiod)};
     b["injector"].emplace_back(kGpiod);
+    b["vacuum"].emplace_back(kGpiod);
     b["stage"].emplace_back(kCia402);
     b["force_sensor"].emplace_back(kCia402);
     b["haptic"].emplace_back(kFalcon);

@@ -36,8 +36,8 @@ class BoardLine final : public Line {
   BoardLine(Wire& wire, const LineRequest& request) : wire_(wire) {
     wire_.claimed = true;
     wire_.request = request;
-    if (request.use == Use::output) {
-      wire_.level = request.active_low;
+    if (is_output(request.use)) {
+      wire_.level = (request.use == Use::held_output) != request.active_low;
     }
   }
   ~BoardLine() override { wire_.claimed = false; }
@@ -92,7 +92,7 @@ struct StandingTime final : hal::Clock {
 };
 
 constexpr unsigned kA = 1, kB = 2, kReset = 3, kHeartbeat = 4, kGate = 5, kValve = 6, kEnablingA = 7,
-                   kEnablingB = 8, kEnable = 9;
+                   kEnablingB = 8, kEnable = 9, kVacuumGate = 10, kVacuumSwitch = 11;
 
 class GpiodTest : public testing::Test {
  protected:
@@ -106,11 +106,14 @@ class GpiodTest : public testing::Test {
     params.enabling_a = kEnablingA;
     params.enabling_b = kEnablingB;
     params.enable = kEnable;
+    params.vacuum_gate = kVacuumGate;
+    params.vacuum_switch = kVacuumSwitch;
+    params.vacuum_switch_Pa = 20'000;
   }
   // With contacts that are closed, for either wiring.
-  tl::expected<void, std::string> open(GpiodParts parts = {true, true, true}) {
+  tl::expected<void, std::string> open(GpiodParts parts = {true, true, true, true}) {
     const bool high = params.contacts_closed == GpiodParams::Closed::high;
-    for (const unsigned line : {kA, kB, kValve, kEnablingA, kEnablingB}) {
+    for (const unsigned line : {kA, kB, kValve, kEnablingA, kEnablingB, kVacuumSwitch}) {
       board.wires[line].level = high;
     }
     board.wires[kReset].level = !high;
@@ -188,13 +191,13 @@ TEST_F(GpiodTest, tells_the_contacts_and_the_button_apart) {
 
 TEST_F(GpiodTest, pulls_a_cut_wire_to_open_with_either_wiring) {
   ASSERT_TRUE(open());
-  for (const unsigned input : {kA, kB, kReset, kValve, kEnablingA, kEnablingB}) {
+  for (const unsigned input : {kA, kB, kReset, kValve, kEnablingA, kEnablingB, kVacuumSwitch}) {
     EXPECT_EQ(board.wires[input].request.bias, Bias::pull_down);
     EXPECT_FALSE(board.wires[input].request.active_low);
   }
   params.contacts_closed = GpiodParams::Closed::low;
   ASSERT_TRUE(open());
-  for (const unsigned input : {kA, kB, kReset, kValve, kEnablingA, kEnablingB}) {
+  for (const unsigned input : {kA, kB, kReset, kValve, kEnablingA, kEnablingB, kVacuumSwitch}) {
     EXPECT_EQ(board.wires[input].request.bias, Bias::pull_up);
     EXPECT_TRUE(board.wires[input].request.active_low);
   }
@@ -206,7 +209,7 @@ TEST_F(GpiodTest, pulls_a_cut_wire_to_open_with_either_wiring) {
 TEST_F(GpiodTest, leaves_the_bias_to_the_resistors_of_the_board_where_there_are_some) {
   params.pull = GpiodParams::Pull::external;
   ASSERT_TRUE(open());
-  for (const unsigned input : {kA, kB, kReset, kValve, kEnablingA, kEnablingB}) {
+  for (const unsigned input : {kA, kB, kReset, kValve, kEnablingA, kEnablingB, kVacuumSwitch}) {
     EXPECT_EQ(board.wires[input].request.bias, Bias::as_it_is);
   }
 }
@@ -433,6 +436,50 @@ TEST_F(GpiodTest, returns_to_the_safe_state_and_gives_the_lines_back) {
   EXPECT_TRUE(nothing_is_held());
 }
 
+TEST_F(GpiodTest, holds_the_vacuum_from_the_moment_it_opens_and_never_writes_its_gate_again) {
+  for (const auto holds_at : {GpiodParams::Level::high, GpiodParams::Level::low}) {
+    params.vacuum_holds_at = holds_at;
+    const bool held = holds_at == GpiodParams::Level::high;
+    board.wires[kVacuumGate].level = !held;
+    board.wires[kVacuumGate].written.clear();
+    ASSERT_TRUE(open());
+    EXPECT_TRUE(board.wires[kVacuumGate].claimed);
+    EXPECT_EQ(board.wires[kVacuumGate].level, held);
+    devices->served().estop->drive_power(false);
+    devices->safe_state();
+    EXPECT_EQ(board.wires[kVacuumGate].level, held);
+    devices->close();
+    EXPECT_EQ(board.wires[kVacuumGate].level, held);
+    EXPECT_TRUE(board.wires[kVacuumGate].written.empty());
+    EXPECT_TRUE(nothing_is_held());
+  }
+}
+
+TEST_F(GpiodTest, reads_the_vacuum_as_the_pressure_of_its_switch_or_none) {
+  ASSERT_TRUE(open());
+  hal::VacuumState state;
+  ASSERT_EQ(devices->served().vacuum->read(state), Status::ok);
+  EXPECT_EQ(state.pressure_Pa, 20'000);
+  EXPECT_EQ(state.sample_ns, 77);
+  board.wires[kVacuumSwitch].level = false;  // also a cut wire
+  ASSERT_EQ(devices->served().vacuum->read(state), Status::ok);
+  EXPECT_EQ(state.pressure_Pa, 0);
+  board.wires[kVacuumSwitch].level = true;
+  board.wires[kVacuumSwitch].status = Status::disconnected;
+  EXPECT_EQ(devices->served().vacuum->read(state), Status::disconnected);
+  EXPECT_EQ(state.pressure_Pa, 0);
+}
+
+TEST_F(GpiodTest, reads_a_vacuum_switch_without_a_gate) {
+  params.vacuum_gate = kNotWired;
+  ASSERT_TRUE(open({.vacuum = true}));
+  hal::VacuumState state;
+  EXPECT_EQ(devices->served().vacuum->read(state), Status::ok);
+  EXPECT_EQ(state.pressure_Pa, 20'000);
+  EXPECT_EQ(devices->served().estop, nullptr);
+  EXPECT_FALSE(board.wires[kVacuumGate].claimed || board.wires[kA].claimed);
+}
+
 TEST_F(GpiodTest, claims_only_what_it_serves) {
   ASSERT_TRUE(open({.estop = true}));
   EXPECT_NE(devices->served().estop, nullptr);
@@ -443,7 +490,8 @@ TEST_F(GpiodTest, claims_only_what_it_serves) {
   ASSERT_TRUE(open({.injector = true}));
   EXPECT_EQ(devices->served().estop, nullptr);
   EXPECT_NE(devices->served().injector, nullptr);
-  for (const unsigned line : {kA, kB, kReset, kHeartbeat, kEnablingA, kEnablingB}) {
+  for (const unsigned line :
+       {kA, kB, kReset, kHeartbeat, kEnablingA, kEnablingB, kVacuumGate, kVacuumSwitch}) {
     EXPECT_FALSE(board.wires[line].claimed);
   }
   devices->close();

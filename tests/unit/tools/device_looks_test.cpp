@@ -228,6 +228,12 @@ TEST_F(DeviceLooks, an_enabling_device_is_a_button_of_the_handle_or_two_lines) {
                    "4\n"));
 }
 
+TEST_F(DeviceLooks, a_vacuum_on_lines_is_a_switch_and_a_gate) {
+  EXPECT_TRUE(says(look(kSmallest + "[vacuum]\ndevice = \"gpiod\"\nstill_s = 0\n[gpiod]\nvacuum_switch = 1\n"
+                                    "vacuum_switch_kPa = 1\nvacuum_gate = 2\n"),
+                   "vacuum: ok gpiod: /dev/gpiochip0 (a board, 5 lines), vacuum_gate 2, vacuum_switch 1\n"));
+}
+
 TEST_F(DeviceLooks, a_chip_a_line_and_a_free_line_that_are_not_there_are_a_line_each) {
   lines[3] = {"", true, "leds"};
   const std::string found = look(kWired + "valve_contact = 9\n");

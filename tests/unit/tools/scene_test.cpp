@@ -66,6 +66,8 @@ const std::vector<Broken>& broken() {
   static const std::string needle = "[stage]\n[sim.needle]\nradius_um = 3.8\n";
   static const std::string gpiod_scene =
       kLeast + "[estop]\ndevice = \"gpiod\"\n[gpiod]\ncontact_a = 1\nreset = 3\n";
+  static const std::string vacuum_switch =
+      kLeast + "[gpiod]\nvacuum_switch = 5\nvacuum_switch_kPa = 0.5\n[vacuum]\ndevice = \"gpiod\"\n";
   static const std::string sim_tables =
       "sim.operator, sim.haptic, sim.stage, sim.needle, sim.estop, sim.cell, sim.holder, sim.dish, "
       "sim.injector, "
@@ -147,8 +149,8 @@ const std::vector<Broken>& broken() {
        "\"simulated\", \"recorded\", "
        "\"v4l2\" or \"aravis\""},
       {"lines without a device", kLeast + "[gpiod]\n",
-       "b.toml:5:2: gpiod: no device uses it, allowed: with device = \"gpiod\" in [estop], [enabling] or "
-       "[injector], or leave it out"},
+       "b.toml:5:2: gpiod: no device uses it, allowed: with device = \"gpiod\" in [estop], [enabling], "
+       "[injector] or [vacuum], or leave it out"},
       {"a device without lines", kLeast + "[estop]\ndevice = \"gpiod\"\n",
        "b.toml:6:10: estop.device: \"gpiod\" needs [gpiod] (it says which lines), allowed: add [gpiod]"},
       {"an injector without lines", kLeast + "[injector]\ndevice = \"gpiod\"\n",
@@ -174,6 +176,25 @@ const std::vector<Broken>& broken() {
        "[estop], or leave it out"},
       {"an enable line that is the heartbeat's", gpiod_scene + "contact_b = 2\nheartbeat = 4\nenable = 4\n",
        "b.toml:12:10: gpiod.enable: 4 is the line of gpiod.heartbeat too, allowed: a line of its own"},
+      {"a vacuum switch without a line", kLeast + "[vacuum]\ndevice = \"gpiod\"\n[gpiod]\nvacuum_gate = 5\n",
+       "b.toml:7:2: gpiod.vacuum_switch: is missing, which [vacuum] needs, allowed: the offset of a line, "
+       "from "
+       "0 on"},
+      {"a vacuum switch that is no pressure",
+       kLeast + "[vacuum]\ndevice = \"gpiod\"\n[gpiod]\nvacuum_switch = 5\n",
+       "b.toml:7:2: gpiod.vacuum_switch_kPa: is missing, which [vacuum] needs, allowed: the pressure below "
+       "ambient at which it closes"},
+      {"a vacuum that its switch does not tell", vacuum_switch + "min_Pa = 600\nstill_s = 0\n",
+       "b.toml:10:10: vacuum.min_Pa: 600, but the switch tells either 0 or 500, allowed: more than 0, at "
+       "most "
+       "gpiod.vacuum_switch_kPa = 0.5"},
+      {"a vacuum that its switch tells always", vacuum_switch + "min_Pa = 0\nstill_s = 0\n",
+       "b.toml:10:10: vacuum.min_Pa: 0, but the switch tells either 0 or 500, allowed: more than 0, at most "
+       "gpiod.vacuum_switch_kPa = 0.5"},
+      {"a vacuum switch that is to flicker", vacuum_switch + "still_s = 1\n",
+       "b.toml:10:11: vacuum.still_s: 1, but a switch shows the same as long as it does not switch, allowed: "
+       "0 "
+       "with vacuum.device = \"gpiod\""},
       {"a contact without a line", gpiod_scene + "contact_b = -1\n",
        "b.toml:10:13: gpiod.contact_b: is missing, which [estop] needs, allowed: the offset of a line, from "
        "0 on"},

@@ -21,14 +21,16 @@
 #include "tests/loopback/can_wires.hpp"
 #include "tests/loopback/gpiod_wiring.hpp"
 #include "tests/loopback/vivid_loop.hpp"
-#include "tests/loopback/wired_world.hpp"
 #include "tests/support/descendants.hpp"
 #include "tests/support/programs.hpp"
 #include "tools/emulators/falcon/vhci.hpp"
+#include "tools/emulators/world/wired_world.hpp"
 #include "tools/scene/scene.hpp"
 
 namespace punctum::loopback {
 namespace {
+
+using emulator::HandOnGrip, emulator::WatchedLevel, emulator::WiredWorld, emulator::WorldEvent;
 
 constexpr int kWiresPriority = 90;  // wires are as fast as they are: above the core
 constexpr int kFps = 25;
@@ -46,18 +48,6 @@ sim::SimConfig simulated_world() {
   EXPECT_TRUE(scene) << scene.error();
   return *scene->sim;
 }
-
-class HandOnGrip final : public emulator::Hand {
- public:
-  explicit HandOnGrip(WiredWorld& world) : world_(world) {}
-  emulator::Grip grip(std::int64_t /*now_ns*/) override { return world_.grip(); }
-  void push(const emulator::Triple& force_N, std::int64_t now_ns) override {
-    world_.push_hand(force_N, now_ns);
-  }
-
- private:
-  WiredWorld& world_;
-};
 
 // A boot stream of nothing: what a Falcon is booted with is its maker's.
 std::string boot_stream_file() {
@@ -95,6 +85,7 @@ double ms_until(const std::string& what, const std::vector<WorldEvent>& events, 
 class Injection : public testing::Test {
  protected:
   Injection() {
+    EXPECT_TRUE(gate.is_there() && heartbeat.is_there());
     board.drive(kContactA, true);
     board.drive(kContactB, true);
     for (int node = 1; node <= WiredWorld::kAxes; ++node) {
@@ -199,7 +190,7 @@ class Injection : public testing::Test {
 
   rt::MonotonicClock clock;
   GpioSim board;
-  Watched gate{board.value_file(kGate)}, heartbeat{board.value_file(kHeartbeat)};
+  WatchedLevel gate{board.value_file(kGate)}, heartbeat{board.value_file(kHeartbeat)};
   CanInterface can0{"can0"}, can1{"can1"};
   sim::SimConfig config = simulated_world();
   std::unique_ptr<sim::Bench> bench = std::make_unique<sim::Bench>();
@@ -307,7 +298,7 @@ TEST_F(Injection, goes_no_deeper_without_its_camera_and_runs_on_when_the_disk_is
     ASSERT_TRUE(wait_for([&] { return world.now().truth.gap_m < -15e-6; }, 14));
     plugged_in = false;
     clock.sleep_until_ns(clock.now_ns() + 100'000'000);  // a picture may be on its way to the wire
-    picture.camera().set("Disconnect", 1);
+    EXPECT_TRUE(picture.camera().set("Disconnect", 1));
     gone_ns = clock.now_ns();
     std::ofstream filler(fs::path(kReports) / "filler");
     const std::string block(4096, 'x');

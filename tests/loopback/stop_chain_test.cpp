@@ -99,7 +99,7 @@ TEST_F(StopChain, the_heartbeat_ends_when_a_drive_neither_stops_nor_lets_go_of_i
       for (const char* habit : {"ignore quick-stop", "ignore disable"}) {
         EXPECT_EQ(drives.with(1, [habit](emulator::Drive& d) { return d.command(habit); }), "");
       }
-      Watched beat(board->value_file(kHeartbeat));
+      emulator::WatchedLevel beat(board->value_file(kHeartbeat));
       opened_ns.push_back(clock.now_ns());
       board->drive(kContactA, false);
       board->drive(kContactB, false);

@@ -456,7 +456,7 @@ class WiredServo {
   std::unique_ptr<tools::Assembly> assembly_;
   std::optional<tests::WatchedDevices> watched_;
   std::unique_ptr<rt::Servo> servo_;
-  Watched beat_wire_{board->value_file(kHeartbeat)}, gate_wire_{board->value_file(kGate)};
+  emulator::WatchedLevel beat_wire_{board->value_file(kHeartbeat)}, gate_wire_{board->value_file(kGate)};
   std::int64_t first_ns_ = 0, last_wake_ns_ = 0, beat_ns_ = 0, seen_ns_ = 0;
   std::uint64_t last_tick_ = 0, next_frame_ = 0, frames_ = 0;
   std::atomic<bool> chip_gone_{false};

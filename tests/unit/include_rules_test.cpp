@@ -150,6 +150,9 @@ std::vector<Room> house() {
       {"tools/emulators/drive/", {"tools/shared/"}, kTools},
       {"tools/emulators/falcon/", {"tools/shared/"}, kTools},
       {"tools/emulators/positioner/", {"tools/shared/"}, kTools},
+      // One world behind them all.
+      {"tools/emulators/world/",
+       station + Names{"hal/sim/camera/", "tools/emulators/drive/", "tools/emulators/falcon/"}, kTools},
       {"tests/support/",
        pictures + Names{"hal/v4l2/config", "hal/v4l2/", "hal/cia402/", "hal/falcon/", "hal/zaber/config",
                         "hal/zaber/", "tools/emulators/drive/", "tools/emulators/falcon/",
@@ -174,6 +177,7 @@ std::vector<Room> house() {
                         "tools/emulators/positioner/",
                         "tools/emulators/drive/",
                         "tools/emulators/falcon/",
+                        "tools/emulators/world/",
                         "tests/support/",
                         "tools/core/",
                         "tools/punctum/",

@@ -39,7 +39,8 @@ void put(std::uint8_t* data, std::uint32_t value, int bytes) {
 
 const char* const Drive::kCommands =
     "fault CODE | ignore quick-stop|disable|enable | obey | mute heartbeat|pdo|sdo|emergency|all | speak | "
-    "freeze | thaw | stick | unstick | creep COUNTS_PER_SECOND | switch-off | reset | emergency CODE | "
+    "freeze | thaw | stick | unstick | creep COUNTS_PER_SECOND | switch-off | switch-on | reset | emergency "
+    "CODE | "
     "refuse INDEX:SUB ABORT_CODE";
 
 Drive::Drive(DriveParams params)
@@ -842,6 +843,8 @@ std::string Drive::command(std::string_view line) {
   } else if (what == "switch-off") {
     off_switch_ = true;
     go(DriveState::switch_on_disabled);
+  } else if (what == "switch-on") {
+    off_switch_ = false;
   } else if (what == "reset") {
     can_frame frame{};
     frame.can_dlc = 2;

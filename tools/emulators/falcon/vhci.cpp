@@ -88,12 +88,13 @@ VhciPort::~VhciPort() {
   }
 }
 
+pollfd VhciPort::waits_for() const {
+  return {socket_, static_cast<short>(more_to_say_ ? POLLIN | POLLOUT : POLLIN), 0};
+}
+
 bool VhciPort::wait(std::int64_t longest_ns, int wake) const {
   const std::int64_t left_ns = std::max<std::int64_t>(longest_ns, 0);
-  std::array<pollfd, 2> ready = {{{socket_, POLLIN, 0}, {wake, POLLIN, 0}}};
-  if (more_to_say_) {
-    ready[0].events |= POLLOUT;
-  }
+  std::array<pollfd, 2> ready = {waits_for(), {wake, POLLIN, 0}};
   const timespec left{static_cast<time_t>(left_ns / 1'000'000'000),
                       static_cast<long>(left_ns % 1'000'000'000)};
   return ppoll(ready.data(), ready.size(), &left, nullptr) >= 0 || errno == EINTR;

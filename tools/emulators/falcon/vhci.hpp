@@ -2,6 +2,8 @@
 // and the dialogue with it. Needs root.
 #pragma once
 
+#include <poll.h>
+
 #include <cstdint>
 #include <string>
 #include <tl/expected.hpp>
@@ -18,6 +20,8 @@ class VhciPort {
   VhciPort(VhciPort&& other) noexcept;
   VhciPort& operator=(VhciPort&&) = delete;
 
+  // What to wait for, beside other things, before talk().
+  [[nodiscard]] pollfd waits_for() const;
   // Waits until the kernel, or `wake` (a descriptor to read from; -1: none), has something, at most
   // longest_ns. False: it cannot.
   [[nodiscard]] bool wait(std::int64_t longest_ns, int wake = -1) const;

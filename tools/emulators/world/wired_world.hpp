@@ -14,7 +14,7 @@
 #include "tools/emulators/drive/drive_bus.hpp"
 #include "tools/emulators/falcon/falcon.hpp"
 
-namespace punctum::loopback {
+namespace punctum::emulator {
 
 struct WorldEvent {
   std::int64_t t_ns;
@@ -23,7 +23,7 @@ struct WorldEvent {
 
 class WiredWorld {
  public:
-  static constexpr int kAxes = 3;            // nodes 1, 2 and 3 carry the needle along x, y and z
+  static constexpr int kAxes = 3;            // the first three drives carry the needle along x, y and z
   static constexpr double kCount_m = 40e-9;  // of each drive; all at zero: the needle is where it starts
 
   // The bench gets the exposures of the camera. May take a second: the cell's tables are solved.
@@ -32,13 +32,13 @@ class WiredWorld {
   void begin(std::int64_t now_ns) { world_.begin(now_ns); }
   // Up to now, with the needle where the drives are. Call it every millisecond, from the thread that serves
   // them.
-  void step(emulator::DriveBus& drives, std::int64_t now_ns);
+  void step(DriveBus& drives, std::int64_t now_ns);
   // What the drives have become, from the same thread.
-  void look_at(emulator::DriveBus& drives, std::int64_t now_ns);
+  void look_at(DriveBus& drives, std::int64_t now_ns);
 
   // The operator's hand on the grip, whose workspace is around grip_middle_m; from any thread.
-  [[nodiscard]] emulator::Grip grip() const;
-  void push_hand(const emulator::Triple& force_N, std::int64_t now_ns);  // from now on
+  [[nodiscard]] Grip grip() const;
+  void push_hand(const Triple& force_N, std::int64_t now_ns);  // from now on
 
   // From any thread.
   struct Now {
@@ -47,7 +47,9 @@ class WiredWorld {
     bool powered = false;                     // any drive
   };
   [[nodiscard]] Now now() const;
-  [[nodiscard]] std::vector<WorldEvent> events() const;  // all so far, in order
+  void tell(std::int64_t now_ns, std::string what);  // of what else belongs to this world
+  // So far, as they were told: that the handle is without force when that has lasted, with its beginning.
+  [[nodiscard]] std::vector<WorldEvent> events(std::size_t from = 0) const;
 
  private:
   void note(std::int64_t now_ns, bool now, bool before, const char* what);
@@ -55,13 +57,28 @@ class WiredWorld {
   sim::SimConfig config_;
   sim::World world_;
   hal::StageState needle_;
-  std::array<emulator::DriveState, kAxes> drive_states_{};
+  std::array<DriveState, kAxes> drive_states_{};
 
   mutable std::mutex mutex_;  // of what follows
   Now now_;
   hal::Vec3 hand_m_ = hal::Vec3::Zero(), force_N_ = hal::Vec3::Zero();
   std::uint32_t buttons_ = 0;
+  std::int64_t no_force_since_ns_ = -1;  // not told yet
   std::vector<WorldEvent> events_;
 };
 
-}  // namespace punctum::loopback
+// The operator's hand on the grip of an emulated handle.
+class HandOnGrip final : public Hand {
+ public:
+  explicit HandOnGrip(WiredWorld& world) : world_(world) {}
+  Grip grip(std::int64_t /*now_ns*/) override { return world_.grip(); }
+  void push(const Triple& force_N, std::int64_t now_ns) override {
+    world_.push_hand(amplifier_on ? force_N : Triple{}, now_ns);
+  }
+  bool amplifier_on = true;
+
+ private:
+  WiredWorld& world_;
+};
+
+}  // namespace punctum::emulator

@@ -4,8 +4,12 @@
 #include <linux/can.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <cstdio>
 #include <initializer_list>
+#include <map>
+#include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -40,9 +44,18 @@ class DriveTest : public testing::Test {
   }
   // The answer's eight bytes as text, "" where there is not exactly one.
   std::string sdo(std::initializer_list<unsigned> request) {
-    const auto answers = send(0x605, request);
-    return answers.size() == 1 && answers[0].can_id == 0x585 && answers[0].can_dlc == 8 ? text(answers[0])
-                                                                                        : "";
+    const auto answers = only(0x585, send(0x605, request));
+    return answers.size() == 1 && answers[0].size() == 23 ? answers[0] : "";
+  }
+  // The bytes of those with this identifier.
+  static std::vector<std::string> only(std::uint32_t id, const std::vector<can_frame>& frames) {
+    std::vector<std::string> out;
+    for (const can_frame& frame : frames) {
+      if (frame.can_id == id) {
+        out.push_back(text(frame));
+      }
+    }
+    return out;
   }
   static std::string text(const can_frame& frame) {
     std::string out;
@@ -113,7 +126,7 @@ TEST_F(DriveTest, uploads_its_name_in_segments_with_an_alternating_bit) {
   EXPECT_EQ(sdo({0x70, 0, 0, 0, 0, 0, 0, 0}), "13 2D 64 72 69 76 65 00");  // last, one byte unused
   EXPECT_EQ(sdo({0x60, 0, 0, 0, 0, 0, 0, 0}).substr(0, 2), "80");
   EXPECT_EQ(sdo({0x40, 0x08, 0x10, 0, 0, 0, 0, 0}).substr(0, 2), "41");
-  EXPECT_EQ(sdo({0x70, 0, 0, 0, 0, 0, 0, 0}), "80 00 00 00 00 00 03 05");  // the toggle bit did not alternate
+  EXPECT_EQ(sdo({0x70, 0, 0, 0, 0, 0, 0, 0}), "80 08 10 00 00 00 03 05");  // the toggle bit did not alternate
 }
 
 TEST_F(DriveTest, aborts_with_the_code_of_the_standard) {
@@ -122,7 +135,6 @@ TEST_F(DriveTest, aborts_with_the_code_of_the_standard) {
   EXPECT_EQ(sdo({0x23, 0x00, 0x10, 0, 1, 0, 0, 0}), "80 00 10 00 02 00 01 06");  // read only
   EXPECT_EQ(sdo({0x23, 0x17, 0x10, 0, 1, 0, 0, 0}), "80 17 10 00 10 00 07 06");  // length
   EXPECT_EQ(sdo({0x2F, 0x60, 0x60, 0, 3, 0, 0, 0}), "80 60 60 00 30 00 09 06");  // mode that it has not
-  EXPECT_EQ(sdo({0x21, 0x17, 0x10, 0, 9, 0, 0, 0}), "80 17 10 00 00 00 01 06");  // segmented download
   EXPECT_EQ(sdo({0xE0, 0x17, 0x10, 0, 9, 0, 0, 0}), "80 17 10 00 01 00 04 05");  // unknown command
 }
 
@@ -145,7 +157,9 @@ TEST_F(DriveTest, maps_a_pdo_only_while_it_is_off_and_empty) {
 }
 
 TEST_F(DriveTest, sends_and_takes_synchronous_pdos_with_the_sync_only) {
-  sdo({0x23, 0x01, 0x18, 1, 0x85, 0x02, 0, 0x80});
+  for (const unsigned other : {1U, 2U, 3U}) {  // the other PDOs are off
+    sdo({0x23, other, 0x18, 1, 0x85, 0x02, 0, 0x80});
+  }
   sdo({0x2F, 0x00, 0x18, 2, 1, 0, 0, 0});
   sdo({0x2F, 0x00, 0x14, 2, 1, 0, 0, 0});
   EXPECT_TRUE(send(0x080, {}).empty());  // not operational
@@ -204,18 +218,18 @@ TEST_F(DriveTest, the_power_state_machine_takes_the_transitions_of_the_standard)
 TEST_F(DriveTest, leaves_a_fault_on_a_rising_edge_only) {
   operate();
   EXPECT_EQ(drive.command("fault 0x7305"), "");
-  const auto told = drive.step(now);
+  const auto told = only(0x085, drive.step(now));
   ASSERT_EQ(told.size(), 1U);
-  EXPECT_EQ(told[0].can_id, 0x085U);
-  EXPECT_EQ(text(told[0]), "05 73 01 00 00 00 00 00");
+  EXPECT_EQ(told[0], "05 73 01 00 00 00 00 00");
   pass(10 * kMs);
   EXPECT_EQ(drive.state(), DriveState::fault);
   control(0x0F);
   EXPECT_EQ(drive.state(), DriveState::fault);
   const auto gone = send(0x605, {0x2B, 0x40, 0x60, 0, 0x80, 0, 0, 0});
   EXPECT_EQ(drive.state(), DriveState::switch_on_disabled);
-  ASSERT_EQ(gone.size(), 2U);
-  EXPECT_EQ(text(gone[0]), "00 00 00 00 00 00 00 00");  // the error is gone
+  ASSERT_EQ(only(0x085, gone).size(), 1U);
+  EXPECT_EQ(only(0x085, gone)[0], "00 00 00 00 00 00 00 00");  // the error is gone
+  EXPECT_EQ(only(0x585, gone).size(), 1U);
   EXPECT_EQ(drive.command("fault 0x7305"), "");
   (void)drive.step(now);
   control(0x80);  // it was up before: no edge
@@ -332,6 +346,406 @@ TEST_F(DriveTest, ignores_remote_and_extended_frames_and_other_nodes) {
   EXPECT_TRUE(send(0x605U | CAN_EFF_FLAG, {0x40, 0x00, 0x10, 0, 0, 0, 0, 0}).empty());
   EXPECT_TRUE(send(0x606U, {0x40, 0x00, 0x10, 0, 0, 0, 0, 0}).empty());
   EXPECT_TRUE(send(0x605U, {0x40, 0x00, 0x10}).empty());
+}
+
+// ---- PDOs, by CiA 301 ----
+
+// CiA 402, its predefined PDOs: identifier, and what is mapped.
+TEST_F(DriveTest, comes_with_the_mappings_of_its_profile) {
+  const struct {
+    unsigned parameter, mapping;
+    const char *id, *type, *count;
+    std::vector<const char*> entries;
+  } table[] = {
+      {0x1400, 0x1600, "05 02 00 00", "FF", "01", {"10 00 40 60"}},
+      {0x1401, 0x1601, "05 03 00 00", "FF", "02", {"10 00 40 60", "08 00 60 60"}},
+      {0x1402, 0x1602, "05 04 00 00", "FF", "02", {"10 00 40 60", "20 00 7A 60"}},
+      {0x1403, 0x1603, "05 05 00 80", "FF", "00", {}},  // its velocity is no mode of this drive
+      {0x1800, 0x1A00, "85 01 00 00", "FF", "01", {"10 00 41 60"}},
+      {0x1801, 0x1A01, "85 02 00 00", "FF", "02", {"10 00 41 60", "08 00 61 60"}},
+      {0x1802, 0x1A02, "85 03 00 00", "01", "02", {"10 00 41 60", "20 00 64 60"}},
+      {0x1803, 0x1A03, "85 04 00 00", "01", "02", {"10 00 41 60", "20 00 6C 60"}},
+  };
+  for (const auto& row : table) {
+    const auto value = [&](unsigned index, unsigned sub) {
+      return sdo({0x40, index & 0xFF, index >> 8, sub, 0, 0, 0, 0}).substr(12);
+    };
+    EXPECT_EQ(value(row.parameter, 1), row.id) << std::hex << row.parameter;
+    EXPECT_EQ(value(row.parameter, 2).substr(0, 2), row.type) << std::hex << row.parameter;
+    EXPECT_EQ(value(row.mapping, 0).substr(0, 2), row.count) << std::hex << row.mapping;
+    for (unsigned i = 0; i < row.entries.size(); ++i) {
+      EXPECT_EQ(value(row.mapping, i + 1), row.entries[i]) << std::hex << row.mapping;
+    }
+  }
+}
+
+TEST_F(DriveTest, sends_event_driven_pdos_when_a_mapped_value_changes_and_only_then) {
+  const auto first = send(0x000, {0x01, 0x05});
+  EXPECT_EQ(only(0x185, first), std::vector<std::string>{"50 02"});
+  EXPECT_EQ(only(0x285, first), std::vector<std::string>{"50 02 08"});
+  EXPECT_TRUE(only(0x385, first).empty()) << "synchronous";
+  EXPECT_TRUE(pass(100 * kMs).empty()) << "nothing changes";
+  EXPECT_EQ(only(0x185, send(0x205, {0x06, 0x00})), std::vector<std::string>{"31 02"});
+  // Another mode changes the second one only.
+  const auto mode = send(0x305, {0x06, 0x00, 0x06});
+  EXPECT_EQ(only(0x285, mode), std::vector<std::string>{"31 06 06"});
+  EXPECT_EQ(drive.value(0x6061), 6);
+}
+
+TEST_F(DriveTest, keeps_the_inhibit_time_between_two_event_driven_pdos_and_loses_no_last_value) {
+  EXPECT_EQ(sdo({0x2B, 0x00, 0x18, 3, 100, 0, 0, 0}), "80 00 18 03 22 00 00 08");  // it is on
+  sdo({0x23, 0x00, 0x18, 1, 0x85, 0x01, 0, 0x80});
+  EXPECT_EQ(sdo({0x2B, 0x00, 0x18, 3, 100, 0, 0, 0}), "60 00 18 03 00 00 00 00");  // 10 ms
+  sdo({0x23, 0x00, 0x18, 1, 0x85, 0x01, 0, 0});
+  EXPECT_EQ(only(0x185, send(0x000, {0x01, 0x05})), std::vector<std::string>{"50 02"});
+  EXPECT_TRUE(only(0x185, send(0x205, {0x06, 0x00})).empty());
+  EXPECT_TRUE(only(0x185, send(0x205, {0x07, 0x00})).empty());
+  EXPECT_TRUE(only(0x185, pass(9 * kMs)).empty());
+  EXPECT_EQ(only(0x185, pass(2 * kMs)), std::vector<std::string>{"33 02"});
+  EXPECT_TRUE(only(0x185, pass(50 * kMs)).empty());
+}
+
+TEST_F(DriveTest, repeats_an_event_driven_pdo_when_its_event_timer_runs_out) {
+  EXPECT_EQ(sdo({0x2B, 0x00, 0x18, 5, 20, 0, 0, 0}), "60 00 18 05 00 00 00 00");
+  send(0x000, {0x01, 0x05});
+  EXPECT_EQ(only(0x185, pass(100 * kMs)), std::vector<std::string>(5, "50 02"));
+  // A change begins the time anew.
+  pass(10 * kMs);
+  send(0x205, {0x06, 0x00});
+  EXPECT_TRUE(only(0x185, pass(19 * kMs)).empty());
+  EXPECT_EQ(only(0x185, pass(2 * kMs)), std::vector<std::string>{"31 02"});
+}
+
+TEST_F(DriveTest, sends_by_every_nth_sync_or_by_the_next_one_after_a_change) {
+  sdo({0x2F, 0x00, 0x18, 2, 3, 0, 0, 0});
+  sdo({0x2F, 0x01, 0x18, 2, 0, 0, 0, 0});
+  send(0x000, {0x01, 0x05});
+  std::vector<std::size_t> third, after_a_change;
+  for (int i = 0; i < 6; ++i) {
+    if (i == 3) {
+      EXPECT_TRUE(only(0x285, send(0x205, {0x06, 0x00})).empty());
+    }
+    const auto sent = send(0x080, {});
+    third.push_back(only(0x185, sent).size());
+    after_a_change.push_back(only(0x285, sent).size());
+  }
+  EXPECT_EQ(third, (std::vector<std::size_t>{0, 0, 1, 0, 0, 1}));
+  EXPECT_EQ(after_a_change, (std::vector<std::size_t>{1, 0, 0, 1, 0, 0}));
+}
+
+TEST_F(DriveTest, answers_remote_requests_for_its_pdos) {
+  EXPECT_EQ(sdo({0x2F, 0x00, 0x18, 2, 253, 0, 0, 0}), "60 00 18 02 00 00 00 00");
+  EXPECT_EQ(sdo({0x2F, 0x01, 0x18, 2, 252, 0, 0, 0}), "60 01 18 02 00 00 00 00");
+  EXPECT_TRUE(send(0x185U | CAN_RTR_FLAG, {}).empty()) << "not operational";
+  send(0x000, {0x01, 0x05});
+  const auto synced = send(0x080, {});
+  EXPECT_TRUE(only(0x185, synced).empty());
+  EXPECT_TRUE(only(0x285, synced).empty()) << "it is sampled, and waits for the request";
+  EXPECT_TRUE(only(0x185, send(0x205, {0x06, 0x00})).empty());
+  EXPECT_EQ(only(0x185, send(0x185U | CAN_RTR_FLAG, {})), std::vector<std::string>{"31 02"})
+      << "as it is now";
+  EXPECT_EQ(only(0x285, send(0x285U | CAN_RTR_FLAG, {})), std::vector<std::string>{"50 02 08"})
+      << "as it was at the SYNC";
+  sdo({0x23, 0x00, 0x18, 1, 0x85, 0x01, 0, 0x40});  // no remote request any more
+  EXPECT_TRUE(send(0x185U | CAN_RTR_FLAG, {}).empty());
+}
+
+TEST_F(DriveTest, refuses_parameters_that_a_pdo_cannot_have) {
+  EXPECT_EQ(sdo({0x40, 0x00, 0x18, 0, 0, 0, 0, 0}), "4F 00 18 00 06 00 00 00");
+  EXPECT_EQ(sdo({0x40, 0x00, 0x18, 4, 0, 0, 0, 0}), "80 00 18 04 11 00 09 06");    // there is none
+  EXPECT_EQ(sdo({0x2F, 0x00, 0x18, 2, 241, 0, 0, 0}), "80 00 18 02 30 00 09 06");  // reserved
+  EXPECT_EQ(sdo({0x2F, 0x00, 0x18, 2, 251, 0, 0, 0}), "80 00 18 02 30 00 09 06");
+  EXPECT_EQ(sdo({0x2F, 0x00, 0x14, 2, 253, 0, 0, 0}), "80 00 14 02 30 00 09 06");         // not of an RPDO
+  EXPECT_EQ(sdo({0x23, 0x00, 0x18, 1, 0x85, 0x01, 0, 0x20}), "80 00 18 01 30 00 09 06");  // 29 bits
+  sdo({0x23, 0x00, 0x18, 1, 0x85, 0x01, 0, 0x80});
+  for (const unsigned id : {0x000U, 0x07FU, 0x101U, 0x580U + 5, 0x605U, 0x6E0U, 0x705U}) {  // restricted
+    EXPECT_EQ(sdo({0x23, 0x00, 0x18, 1, id & 0xFF, id >> 8, 0, 0}), "80 00 18 01 30 00 09 06")
+        << std::hex << id;
+  }
+  EXPECT_EQ(sdo({0x23, 0x00, 0x18, 1, 0x90, 0x01, 0, 0}), "60 00 18 01 00 00 00 00");
+  EXPECT_EQ(only(0x190, send(0x000, {0x01, 0x05})), std::vector<std::string>{"50 02"});
+}
+
+TEST_F(DriveTest, takes_every_received_pdo_and_says_when_one_is_too_short) {
+  send(0x000, {0x01, 0x05});
+  for (const unsigned word : {0x06U, 0x07U, 0x0FU}) {
+    send(0x205, {word, 0x00});
+  }
+  send(0x405, {0x0F, 0x00, 0x90, 0x01, 0, 0});  // 400
+  pass(50 * kMs);
+  EXPECT_NEAR(drive.position(), 400, 0.5);
+  const auto told = send(0x405, {0x0F, 0x00, 0x00, 0x00});
+  EXPECT_EQ(only(0x085, told), std::vector<std::string>{"10 82 11 00 00 00 00 00"});
+  pass(50 * kMs);
+  EXPECT_NEAR(drive.position(), 400, 0.5);
+  send(0x505, {0x00, 0x00, 0, 0, 0, 0});  // the fourth is off
+  EXPECT_EQ(drive.state(), DriveState::operation_enabled);
+}
+
+// ---- SDO ----
+
+TEST_F(DriveTest, takes_downloads_in_segments) {
+  // 1017 = 10 ms: announced with two bytes; one segment with five bytes unused, the last one.
+  EXPECT_EQ(sdo({0x21, 0x17, 0x10, 0, 2, 0, 0, 0}), "60 17 10 00 00 00 00 00");
+  EXPECT_EQ(sdo({0x0B, 10, 0, 0, 0, 0, 0, 0}), "20 00 00 00 00 00 00 00");
+  EXPECT_EQ(drive.value(0x1017), 10);
+  EXPECT_EQ(only(0x705, pass(100 * kMs)).size(), 10U);
+  // 6065 = 0x01020304 without a length, byte by byte: the bit alternates.
+  EXPECT_EQ(sdo({0x20, 0x65, 0x60, 0, 0, 0, 0, 0}), "60 65 60 00 00 00 00 00");
+  EXPECT_EQ(sdo({0x0C, 4, 0, 0, 0, 0, 0, 0}), "20 00 00 00 00 00 00 00");
+  EXPECT_EQ(sdo({0x1A, 3, 2, 0, 0, 0, 0, 0}), "30 00 00 00 00 00 00 00");
+  EXPECT_EQ(drive.value(0x6065), 2000) << "it has not ended";
+  EXPECT_EQ(sdo({0x0D, 1, 0, 0, 0, 0, 0, 0}), "20 00 00 00 00 00 00 00");
+  EXPECT_EQ(drive.value(0x6065), 0x01020304);
+  EXPECT_EQ(sdo({0x0D, 1, 0, 0, 0, 0, 0, 0}), "80 00 00 00 01 00 04 05");  // a segment of nothing
+}
+
+TEST_F(DriveTest, aborts_a_download_in_segments_with_the_code_of_the_standard) {
+  EXPECT_EQ(sdo({0x21, 0x17, 0x10, 0, 4, 0, 0, 0}), "80 17 10 00 10 00 07 06");  // 1017 has two bytes
+  EXPECT_EQ(sdo({0x21, 0x00, 0x10, 0, 4, 0, 0, 0}), "80 00 10 00 02 00 01 06");  // read only
+  EXPECT_EQ(sdo({0x21, 0x0C, 0x10, 0, 2, 0, 0, 0}), "80 0C 10 00 00 00 02 06");  // no object
+  sdo({0x21, 0x17, 0x10, 0, 2, 0, 0, 0});
+  EXPECT_EQ(sdo({0x1B, 10, 0, 0, 0, 0, 0, 0}), "80 17 10 00 00 00 03 05");  // the bit begins with 0
+  sdo({0x21, 0x17, 0x10, 0, 2, 0, 0, 0});
+  EXPECT_EQ(sdo({0x0D, 10, 0, 0, 0, 0, 0, 0}), "80 17 10 00 10 00 07 06");  // one byte came
+  sdo({0x21, 0x60, 0x60, 0, 1, 0, 0, 0});
+  EXPECT_EQ(sdo({0x0D, 3, 0, 0, 0, 0, 0, 0}), "80 60 60 00 30 00 09 06");  // no such mode
+  sdo({0x21, 0x17, 0x10, 0, 2, 0, 0, 0});
+  EXPECT_EQ(sdo({0x80, 0x17, 0x10, 0, 0, 0, 0, 8}), "");  // the client gives up
+  EXPECT_EQ(sdo({0x0B, 10, 0, 0, 0, 0, 0, 0}), "80 00 00 00 01 00 04 05");
+  EXPECT_EQ(drive.value(0x1017), 0);
+}
+
+TEST_F(DriveTest, refuses_block_transfers_as_a_command_that_it_does_not_know) {
+  EXPECT_EQ(sdo({0xC6, 0x17, 0x10, 0, 2, 0, 0, 0}), "80 17 10 00 01 00 04 05");     // download
+  EXPECT_EQ(sdo({0xA4, 0x08, 0x10, 0, 0x7F, 0, 0, 0}), "80 08 10 00 01 00 04 05");  // upload
+}
+
+// ---- its other objects ----
+
+TEST_F(DriveTest, tells_who_it_is_and_what_it_can) {
+  EXPECT_EQ(sdo({0x40, 0x18, 0x10, 0, 0, 0, 0, 0}), "4F 18 10 00 04 00 00 00");
+  EXPECT_EQ(sdo({0x40, 0x09, 0x10, 0, 0, 0, 0, 0}), "41 09 10 00 04 00 00 00");
+  EXPECT_EQ(sdo({0x60, 0, 0, 0, 0, 0, 0, 0}), "07 6E 6F 6E 65 00 00 00");  // "none"
+  EXPECT_EQ(sdo({0x40, 0x0A, 0x10, 0, 0, 0, 0, 0}), "41 0A 10 00 01 00 00 00");
+  EXPECT_EQ(sdo({0x40, 0x00, 0x12, 1, 0, 0, 0, 0}), "43 00 12 01 05 06 00 00");
+  EXPECT_EQ(sdo({0x40, 0x00, 0x12, 2, 0, 0, 0, 0}), "43 00 12 02 85 05 00 00");
+  // Homing is bit 5, cyclic synchronous position bit 7; a mode that is not there is refused.
+  EXPECT_EQ(sdo({0x40, 0x02, 0x65, 0, 0, 0, 0, 0}), "43 02 65 00 A0 00 00 00");
+  for (unsigned mode = 0; mode <= 11; ++mode) {
+    EXPECT_EQ(sdo({0x2F, 0x60, 0x60, 0, mode, 0, 0, 0}).substr(0, 2), mode == 6 || mode == 8 ? "60" : "80")
+        << mode;
+  }
+}
+
+TEST_F(DriveTest, knows_no_node_guarding) {
+  EXPECT_EQ(sdo({0x40, 0x0C, 0x10, 0, 0, 0, 0, 0}), "80 0C 10 00 00 00 02 06");
+  EXPECT_EQ(sdo({0x40, 0x0D, 0x10, 0, 0, 0, 0, 0}), "80 0D 10 00 00 00 02 06");
+  EXPECT_TRUE(send(0x705U | CAN_RTR_FLAG, {}).empty());
+}
+
+TEST_F(DriveTest, stores_its_parameters_and_restores_the_defaults_when_it_is_signed) {
+  EXPECT_EQ(sdo({0x40, 0x10, 0x10, 1, 0, 0, 0, 0}), "43 10 10 01 01 00 00 00");  // on command
+  EXPECT_EQ(sdo({0x23, 0x10, 0x10, 1, 's', 'a', 'v', 'f'}), "80 10 10 01 20 00 00 08");
+  sdo({0x2B, 0x17, 0x10, 0, 100, 0, 0, 0});
+  sdo({0x23, 0x65, 0x60, 0, 77, 0, 0, 0});
+  EXPECT_EQ(sdo({0x23, 0x10, 0x10, 1, 's', 'a', 'v', 'e'}), "60 10 10 01 00 00 00 00");
+  sdo({0x2B, 0x17, 0x10, 0, 50, 0, 0, 0});
+  sdo({0x23, 0x65, 0x60, 0, 88, 0, 0, 0});
+  send(0x000, {0x82, 0x05});  // the communication only
+  EXPECT_EQ(drive.value(0x1017), 100);
+  EXPECT_EQ(drive.value(0x6065), 88);
+  send(0x000, {0x81, 0x05});
+  EXPECT_EQ(drive.value(0x6065), 77);
+  EXPECT_EQ(sdo({0x23, 0x11, 0x10, 1, 's', 'a', 'v', 'e'}), "80 11 10 01 20 00 00 08");
+  EXPECT_EQ(sdo({0x23, 0x11, 0x10, 1, 'l', 'o', 'a', 'd'}), "60 11 10 01 00 00 00 00");
+  EXPECT_EQ(drive.value(0x6065), 77) << "from the next reset on";
+  send(0x000, {0x81, 0x05});
+  EXPECT_EQ(drive.value(0x6065), 2000);
+  EXPECT_EQ(drive.value(0x1017), 0);
+}
+
+TEST_F(DriveTest, counts_syncs_when_it_is_told_to) {
+  EXPECT_EQ(sdo({0x2F, 0x19, 0x10, 0, 1, 0, 0, 0}), "80 19 10 00 30 00 09 06");
+  EXPECT_EQ(sdo({0x2F, 0x19, 0x10, 0, 241, 0, 0, 0}), "80 19 10 00 30 00 09 06");
+  sdo({0x23, 0x06, 0x10, 0, 1, 0, 0, 0});
+  EXPECT_EQ(sdo({0x2F, 0x19, 0x10, 0, 4, 0, 0, 0}), "80 19 10 00 22 00 00 08");  // not with a cycle period
+  sdo({0x23, 0x06, 0x10, 0, 0, 0, 0, 0});
+  EXPECT_EQ(sdo({0x2F, 0x19, 0x10, 0, 4, 0, 0, 0}), "60 19 10 00 00 00 00 00");
+  sdo({0x23, 0x02, 0x18, 1, 0x85, 0x03, 0, 0x80});
+  sdo({0x2F, 0x02, 0x18, 2, 2, 0, 0, 0});
+  sdo({0x2F, 0x02, 0x18, 6, 3, 0, 0, 0});  // the SYNC with counter 3 is the first
+  sdo({0x23, 0x02, 0x18, 1, 0x85, 0x03, 0, 0});
+  send(0x000, {0x01, 0x05});
+  std::vector<std::size_t> sent;
+  for (const unsigned counter : {1U, 2U, 3U, 4U, 1U, 2U}) {
+    sent.push_back(only(0x385, send(0x080, {counter})).size());
+  }
+  EXPECT_EQ(sent, (std::vector<std::size_t>{0, 0, 0, 1, 0, 1}));
+  // CiA 301: unexpected SYNC data length.
+  EXPECT_EQ(emergencies(send(0x080, {})), std::vector<std::string>{"40 82 11"});
+  EXPECT_EQ(emergencies(send(0x080, {})), std::vector<std::string>{}) << "once";
+  EXPECT_EQ(emergencies(send(0x080, {1})), std::vector<std::string>{"00 00 00"});
+}
+
+TEST_F(DriveTest, listens_for_the_sync_where_it_is_told_to_and_sends_none) {
+  sdo({0x23, 0x05, 0x10, 0, 0x90, 0, 0, 0});
+  send(0x000, {0x01, 0x05});
+  EXPECT_TRUE(send(0x080, {}).empty());
+  EXPECT_EQ(only(0x385, send(0x090, {})).size(), 1U);
+  EXPECT_EQ(sdo({0x23, 0x05, 0x10, 0, 0x80, 0, 0, 0x40}), "80 05 10 00 30 00 09 06");
+}
+
+// ---- its data sheet ----
+
+using Section = std::map<std::string, std::string>;
+
+std::map<std::string, Section> parsed(const std::string& sheet) {
+  std::map<std::string, Section> sections;
+  std::istringstream lines(sheet);
+  std::string name;
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t equals = line.find('=');
+    if (line.starts_with("[")) {
+      name = line.substr(1, line.find(']') - 1);
+      EXPECT_FALSE(sections.contains(name)) << name;
+      sections[name];
+    } else if (equals != std::string::npos) {
+      EXPECT_FALSE(sections[name].contains(line.substr(0, equals))) << name << ": " << line;
+      sections[name][line.substr(0, equals)] = line.substr(equals + 1);
+    } else {
+      EXPECT_EQ(line, "");
+    }
+  }
+  return sections;
+}
+
+// CiA 306: numbers as in C, and the node number as a name.
+std::int64_t number(const std::string& text, int node) {
+  const std::string plus = "$NODEID+";
+  return text.starts_with(plus) ? node + std::stoll(text.substr(plus.size()), nullptr, 0)
+                                : std::stoll(text, nullptr, 0);
+}
+
+TEST_F(DriveTest, its_data_sheet_says_what_the_standards_say) {
+  const auto sheet = parsed(Drive::data_sheet({.node = 5}));
+  const struct {
+    const char *section, *type, *access, *standard, *mapped;
+  } table[] = {
+      {"1000", "0x0007", "const", "0x20192", "0"},
+      {"1001", "0x0005", "ro", "0x0", "0"},
+      {"1005", "0x0007", "rw", "0x80", "0"},
+      {"1008", "0x0009", "const", "punctum-drive", "0"},
+      {"1014", "0x0007", "ro", "$NODEID+0x80", "0"},
+      {"1017", "0x0006", "rw", "0x0", "0"},
+      {"1018sub0", "0x0005", "const", "0x4", "0"},
+      {"1200sub1", "0x0007", "ro", "$NODEID+0x600", "0"},
+      {"1400sub1", "0x0007", "rw", "$NODEID+0x200", "0"},
+      {"1403sub1", "0x0007", "rw", "$NODEID+0x80000500", "0"},
+      {"1802sub2", "0x0005", "rw", "0x1", "0"},
+      {"1A02sub2", "0x0007", "rw", "0x60640020", "0"},
+      {"6040", "0x0006", "rw", "0x0", "1"},
+      {"6041", "0x0006", "ro", "0x250", "1"},
+      {"605A", "0x0003", "rw", "2", "0"},
+      {"6060", "0x0002", "rw", "8", "1"},
+      {"6061", "0x0002", "ro", "8", "1"},
+      {"6064", "0x0004", "ro", "0", "1"},
+      {"607A", "0x0004", "rw", "0", "1"},
+      {"607Dsub1", "0x0004", "rw", "-2147483648", "0"},
+      {"60C2sub2", "0x0002", "rw", "-3", "0"},
+      {"6502", "0x0007", "const", "0xA0", "0"},
+  };
+  for (const auto& row : table) {
+    ASSERT_TRUE(sheet.contains(row.section)) << row.section;
+    const Section& section = sheet.at(row.section);
+    EXPECT_EQ(section.at("ObjectType"), "0x7") << row.section;
+    EXPECT_EQ(section.at("DataType"), row.type) << row.section;
+    EXPECT_EQ(section.at("AccessType"), row.access) << row.section;
+    EXPECT_EQ(section.at("DefaultValue"), row.standard) << row.section;
+    EXPECT_EQ(section.at("PDOMapping"), row.mapped) << row.section;
+  }
+  EXPECT_EQ(sheet.at("1018").at("ObjectType"), "0x9");
+  EXPECT_EQ(sheet.at("1018").at("SubNumber"), "5");
+  EXPECT_EQ(sheet.at("607D").at("ObjectType"), "0x8");
+  EXPECT_EQ(sheet.at("MandatoryObjects"),
+            (Section{{"SupportedObjects", "3"}, {"1", "0x1000"}, {"2", "0x1001"}, {"3", "0x1018"}}));
+  EXPECT_EQ(sheet.at("DeviceInfo").at("NrOfRXPDO"), "4");
+  EXPECT_EQ(sheet.at("DeviceInfo").at("NrOfTXPDO"), "4");
+  EXPECT_EQ(sheet.at("DeviceInfo").at("LSS_Supported"), "0");
+}
+
+// Over the wire: what is there, its length, its value, whether it can be written, whether it can be mapped.
+TEST_F(DriveTest, its_data_sheet_is_what_the_drive_answers) {
+  const auto sheet = parsed(Drive::data_sheet({.node = 5}));
+  std::set<unsigned> listed;
+  for (const char* objects : {"MandatoryObjects", "OptionalObjects", "ManufacturerObjects"}) {
+    for (const auto& [key, value] : sheet.at(objects)) {
+      if (key != "SupportedObjects") {
+        listed.insert(static_cast<unsigned>(number(value, 5)));
+      }
+    }
+  }
+  sdo({0x23, 0x00, 0x18, 1, 0x85, 0x01, 0, 0x80});  // TPDO 1 is for trying what can be mapped
+  sdo({0x2F, 0x00, 0x1A, 0, 0, 0, 0, 0});
+  std::size_t variables = 0;
+  for (unsigned index = 0x1000; index <= 0x9FFF; ++index) {
+    const unsigned low = index & 0xFF, high = index >> 8;
+    const bool is_there = !sdo({0x40, low, high, 0, 0, 0, 0, 0}).ends_with("00 00 02 06");
+    ASSERT_EQ(is_there, listed.contains(index)) << std::hex << index;
+    if (!is_there) {
+      continue;
+    }
+    char hex[16];
+    std::snprintf(hex, sizeof(hex), "%04X", index);
+    const bool composed = sheet.at(hex).at("ObjectType") != "0x7";
+    std::size_t subs = 0;
+    for (unsigned sub = 0; sub < 256; ++sub) {
+      const std::string answer = sdo({0x40, low, high, sub, 0, 0, 0, 0});
+      char name[24];
+      std::snprintf(name, sizeof(name), composed ? "%04Xsub%X" : "%04X", index, sub);
+      if (answer.ends_with("11 00 09 06")) {
+        ASSERT_FALSE(composed && sheet.contains(name)) << name;
+        continue;
+      }
+      ++subs;
+      ++variables;
+      ASSERT_TRUE(sheet.contains(name)) << name;
+      const Section& section = sheet.at(name);
+      const std::string& access = section.at("AccessType");
+      // Its length by CiA 301: 8, 16 and 32 bits, or a text.
+      const std::int64_t type = number(section.at("DataType"), 5);
+      const std::map<std::int64_t, std::string> begins = {{2, "4F"}, {3, "4B"}, {4, "43"}, {5, "4F"},
+                                                          {6, "4B"}, {7, "43"}, {9, "41"}};
+      ASSERT_TRUE(begins.contains(type)) << name;
+      EXPECT_EQ(answer.substr(0, 2), begins.at(type)) << name;
+      if (type == 9) {
+        EXPECT_EQ(std::stoll(answer.substr(12, 2), nullptr, 16),
+                  static_cast<std::int64_t>(section.at("DefaultValue").size()));
+      } else if (index != 0x1800 && index != 0x1A00 && index != 0x6064) {
+        std::uint32_t value = 0;
+        for (std::size_t i = 0; i < 4; ++i) {
+          value |= static_cast<std::uint32_t>(std::stoul(answer.substr(12 + 3 * i, 2), nullptr, 16)) << 8 * i;
+        }
+        const unsigned unused = type == 2 || type == 5 ? 24 : type == 3 || type == 6 ? 16 : 0;
+        const auto told = static_cast<std::uint32_t>(number(section.at("DefaultValue"), 5));
+        EXPECT_EQ(value, told << unused >> unused) << name;
+      }
+      // A length that no object has: read only is told first.
+      const std::string written = sdo({0x27, low, high, sub, 0, 0, 0, 0});
+      EXPECT_EQ(written.ends_with("02 00 01 06"), access == "ro" || access == "const")
+          << name << ": " << written;
+      if (type != 9) {
+        const unsigned bits = type == 2 || type == 5 ? 8 : type == 3 || type == 6 ? 16 : 32;
+        const std::string mapped = sdo({0x23, 0x00, 0x1A, 1, bits, sub, low, high});
+        EXPECT_EQ(mapped == "60 00 1A 01 00 00 00 00", section.at("PDOMapping") == "1")
+            << name << ": " << mapped;
+      }
+    }
+    if (composed) {
+      EXPECT_EQ(sheet.at(hex).at("SubNumber"), std::to_string(subs)) << hex;
+    }
+  }
+  EXPECT_GT(variables, 100U);
 }
 
 }  // namespace

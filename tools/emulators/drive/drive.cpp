@@ -6,6 +6,10 @@
 #include <cstring>
 #include <limits>
 #include <sstream>
+#include <utility>
+
+#include "tools/emulators/drive/eds.hpp"
+#include "tools/emulators/drive/little_endian.hpp"
 
 namespace punctum::emulator {
 namespace {
@@ -14,26 +18,25 @@ constexpr int kStopped = 0x04, kOperational = 0x05, kPreOperational = 0x7F;
 constexpr std::int64_t kMillisecond_ns = 1'000'000;
 constexpr double kStep_s = 100e-6;  // of the motor
 constexpr int kHoming = 6, kSynchronousPosition = 8;
-constexpr std::uint32_t kOff = 0x8000'0000;
 constexpr std::int64_t kInt32Min = std::numeric_limits<std::int32_t>::min();
 constexpr std::int64_t kInt32Max = std::numeric_limits<std::int32_t>::max();
 // Cycles without SYNC after which the drive takes the link for lost.
 constexpr int kSyncsMissed = 10;
-constexpr std::uint16_t kHeartbeatLost = 0x8130, kPdoTooShort = 0x8210, kSyncLost = 0x8700;
+constexpr std::uint16_t kHeartbeatLost = 0x8130, kPdoTooShort = 0x8210, kSyncLength = 0x8240,
+                        kSyncLost = 0x8700;
 constexpr std::uint8_t kCommunicationError = 0x11;  // of the error register: generic, and communication
+// What is written to 1010 and 1011: "save" and "load".
+constexpr std::int64_t kSave = 0x6576'6173, kLoad = 0x6461'6F6C;
 
-std::uint32_t word(const std::uint8_t* data, int bytes) {
-  std::uint32_t value = 0;
-  for (int i = 0; i < bytes; ++i) {
-    value |= static_cast<std::uint32_t>(data[i]) << 8 * i;
-  }
-  return value;
-}
-void put(std::uint8_t* data, std::uint32_t value, int bytes) {
-  for (int i = 0; i < bytes; ++i) {
-    data[i] = static_cast<std::uint8_t>(value >> 8 * i);
-  }
-}
+// Of CiA 402. Positions change all the time: with the SYNC.
+const Pdos::Defaults kReceived = {{{.entries = {0x6040'0010}},
+                                   {.entries = {0x6040'0010, 0x6060'0008}},
+                                   {.entries = {0x6040'0010, 0x607A'0020}},
+                                   {.on = false}}};  // controlword and target velocity, which it has not
+const Pdos::Defaults kSent = {{{.entries = {0x6041'0010}},
+                               {.entries = {0x6041'0010, 0x6061'0008}},
+                               {.type = 1, .entries = {0x6041'0010, 0x6064'0020}},
+                               {.type = 1, .entries = {0x6041'0010, 0x606C'0020}}}};
 
 }  // namespace
 
@@ -44,7 +47,25 @@ const char* const Drive::kCommands =
     "refuse INDEX:SUB ABORT_CODE";
 
 Drive::Drive(DriveParams params)
-    : params_(std::move(params)), motor_(params_.motor, params_.start_counts), demand_(params_.start_counts) {
+    : params_(std::move(params)),
+      motor_(params_.motor, params_.start_counts),
+      pdos_(objects_, params_.node,
+            {.refresh = [this] { refresh(); },
+             .written = [this](std::uint16_t index, std::uint8_t sub) { on_written(index, sub); },
+             .send =
+                 [this](std::uint32_t id, std::uint8_t size, const std::uint8_t* data) {
+                   if (!mute_pdo_) {
+                     send(id - static_cast<std::uint32_t>(params_.node), size, data);
+                   }
+                 },
+             .received =
+                 [this](bool long_enough) {
+                   long_enough ? communication_back(kPdoTooShort) : communication_error(kPdoTooShort);
+                 }}),
+      sdo_(
+          objects_, [this](std::uint16_t, std::uint8_t) { refresh(); },
+          [this](std::uint16_t index, std::uint8_t sub) { on_written(index, sub); }),
+      demand_(params_.start_counts) {
   add_communication_objects();
   add_drive_objects();
 }
@@ -52,111 +73,109 @@ Drive::Drive(DriveParams params)
 // ---- objects ----
 
 void Drive::add_communication_objects() {
+  using Kind = ObjectDictionary::Kind;
+  constexpr auto kConstant = Access::constant;
+  constexpr std::uint32_t kProducer = 0x4000'0000, kExtended = 0x2000'0000;
   const auto node = static_cast<std::uint32_t>(params_.node);
-  objects_.add(0x1000, 0, {.access = Access::constant, .value = 0x0002'0192});  // servo drive, profile 402
-  objects_.add(0x1001, 0, {.bytes = 1, .access = Access::read_only});
-  objects_.add(0x1005, 0, {.value = 0x80});
-  objects_.add(0x1006, 0, {});
-  objects_.add(0x1008, 0, {.bytes = 0, .access = Access::constant, .text = params_.name});
-  objects_.add(0x1014, 0, {.access = Access::read_only, .value = 0x80 + node});
-  objects_.add(0x1016, 0, {.bytes = 1, .access = Access::constant, .value = 1});
-  objects_.add(0x1016, 1, {.most = 0x7F'FFFF});
-  objects_.add(0x1017, 0, {.bytes = 2, .most = 0xFFFF});
-  objects_.add(0x1018, 0, {.bytes = 1, .access = Access::constant, .value = 4});
-  objects_.add(0x1018, 1, {.access = Access::constant, .value = params_.vendor_id});
-  objects_.add(0x1018, 2, {.access = Access::constant, .value = params_.product_code});
-  objects_.add(0x1018, 3, {.access = Access::constant, .value = 1});
-  objects_.add(0x1018, 4, {.access = Access::constant, .value = node});
-  objects_.add(0x1029, 0, {.bytes = 1, .access = Access::constant, .value = 1});
-  objects_.add(0x1029, 1, {.bytes = 1, .most = 2});
-  add_pdo(kRpdo, 0x200 + node, {0x6040'0010});
-  add_pdo(kTpdo, 0x180 + node, {0x6041'0010});
-  // What many drives come with: a second one, sent on every SYNC unless it is switched off.
-  objects_.add(0x1801, 0, {.bytes = 1, .access = Access::constant, .value = 2});
-  objects_.add(0x1801, 1, {.value = 0x280 + node});
-  objects_.add(0x1801, 2, {.bytes = 1, .most = 0xFF, .value = 1});
-}
-
-void Drive::add_pdo(const Pdo& pdo, std::uint32_t id, const std::vector<std::uint32_t>& entries) {
-  constexpr std::uint8_t kMostEntries = 8;
-  objects_.add(pdo.parameter, 0, {.bytes = 1, .access = Access::constant, .value = 2});
-  objects_.add(pdo.parameter, 1, {.value = id, .check = [this, pdo](std::int64_t wanted) {
-                                    // The identifier changes only while the PDO is off, or by switching it.
-                                    const std::int64_t now = objects_.get(pdo.parameter, 1);
-                                    const bool stays_on = (now & kOff) == 0 && (wanted & kOff) == 0;
-                                    const bool other = ((now ^ wanted) & 0x1FFF'FFFF) != 0;
-                                    return stays_on && other ? abort_state : abort_none;
-                                  }});
-  objects_.add(pdo.parameter, 2, {.bytes = 1, .most = 0xFF, .value = 0xFF, .check = [](std::int64_t type) {
-                                    return type > 240 && type < 254 ? abort_range : abort_none;
-                                  }});
-  objects_.add(pdo.mapping, 0,
-               {.bytes = 1,
-                .value = static_cast<std::int64_t>(entries.size()),
-                .check = [this, pdo](std::int64_t count) { return check_mapping_count(pdo, count); }});
-  for (std::uint8_t sub = 1; sub <= kMostEntries; ++sub) {
-    objects_.add(pdo.mapping, sub,
-                 {.value = sub <= entries.size() ? static_cast<std::int64_t>(entries[sub - 1U]) : 0,
-                  .check = [this, pdo](std::int64_t entry) { return check_mapping(pdo, entry); }});
-  }
-}
-
-Abort Drive::check_mapping(const Pdo& pdo, std::int64_t entry) const {
-  if (pdo_is_on(pdo) || objects_.get(pdo.mapping, 0) != 0) {
-    return abort_state;
-  }
-  const auto index = static_cast<std::uint16_t>(entry >> 16);
-  const auto sub = static_cast<std::uint8_t>(entry >> 8);
-  const Entry* object = objects_.find(index, sub);
-  if (object == nullptr) {
-    return objects_.missing(index);
-  }
-  const bool right_way = pdo.mapping == kRpdo.mapping
-                             ? object->access == Access::read_write || object->access == Access::write_only
-                             : object->access != Access::write_only;
-  return object->mappable && right_way && (entry & 0xFF) == 8 * object->bytes ? abort_none
-                                                                              : abort_not_mappable;
-}
-
-Abort Drive::check_mapping_count(const Pdo& pdo, std::int64_t count) const {
-  constexpr std::int64_t kMostEntries = 8, kMostBits = 64;
-  if (pdo_is_on(pdo)) {
-    return abort_state;
-  }
-  if (count > kMostEntries) {
-    return abort_range;
-  }
-  std::int64_t bits = 0;
-  const auto entries = static_cast<std::uint8_t>(count);
-  for (std::uint8_t sub = 1; sub <= entries; ++sub) {
-    const std::int64_t entry = objects_.get(pdo.mapping, sub);
-    if (entry == 0) {
-      return abort_not_mappable;
-    }
-    bits += entry & 0xFF;
-  }
-  return bits > kMostBits ? abort_pdo_length : abort_none;
+  const auto text = [this](std::uint16_t index, const char* name, const std::string& value) {
+    objects_.add(index, 0, {.name = name, .bytes = 0, .access = kConstant, .text = value});
+  };
+  // Servo drive, profile 402.
+  objects_.add(0x1000, 0, {.name = "Device type", .access = kConstant, .value = 0x0002'0192});
+  objects_.add(0x1001, 0, {.name = "Error register", .bytes = 1, .access = Access::read_only});
+  objects_.add(0x1005, 0, {.name = "COB-ID SYNC", .value = 0x80, .check = [](std::int64_t id) {
+                             return (id & (kProducer | kExtended)) != 0 ? abort_range : abort_none;
+                           }});
+  objects_.add(0x1006, 0, {.name = "Communication cycle period"});
+  text(0x1008, "Manufacturer device name", params_.name);
+  text(0x1009, "Manufacturer hardware version", "none");
+  text(0x100A, "Manufacturer software version", "1");
+  // Reading 1: it stores, and restores, when it is told to.
+  objects_.compose(0x1010, Kind::array, "Store parameters", 1);
+  objects_.add(0x1010, 1, {.name = "Save all parameters", .value = 1, .check = [](std::int64_t signature) {
+                             return signature == kSave ? abort_none : abort_transfer;
+                           }});
+  objects_.compose(0x1011, Kind::array, "Restore default parameters", 1);
+  objects_.add(0x1011, 1,
+               {.name = "Restore all default parameters", .value = 1, .check = [](std::int64_t signature) {
+                  return signature == kLoad ? abort_none : abort_transfer;
+                }});
+  objects_.add(0x1014, 0,
+               {.name = "COB-ID EMCY", .access = Access::read_only, .value = 0x80 + node, .plus_node = true});
+  objects_.compose(0x1016, Kind::array, "Consumer heartbeat time", 1);
+  objects_.add(0x1016, 1, {.name = "Consumer heartbeat time 1", .most = 0x7F'FFFF});
+  objects_.add(0x1017, 0, {.name = "Producer heartbeat time", .bytes = 2, .most = 0xFFFF});
+  objects_.compose(0x1018, Kind::record, "Identity object", 4);
+  objects_.add(0x1018, 1, {.name = "Vendor-ID", .access = kConstant, .value = params_.vendor_id});
+  objects_.add(0x1018, 2, {.name = "Product code", .access = kConstant, .value = params_.product_code});
+  objects_.add(0x1018, 3, {.name = "Revision number", .access = kConstant, .value = 1});
+  objects_.add(0x1018, 4, {.name = "Serial number", .access = kConstant, .value = node, .plus_node = true});
+  objects_.add(0x1019, 0,
+               {.name = "Synchronous counter overflow value",
+                .bytes = 1,
+                .most = 240,
+                .check = [this](std::int64_t wanted) {
+                  return wanted == 1 ? abort_range : objects_.get(0x1006, 0) != 0 ? abort_state : abort_none;
+                }});
+  objects_.compose(0x1029, Kind::array, "Error behaviour", 1);
+  objects_.add(0x1029, 1, {.name = "Communication error", .bytes = 1, .most = 2});
+  objects_.compose(0x1200, Kind::record, "SDO server parameter", 2);
+  objects_.add(0x1200, 1,
+               {.name = "COB-ID client to server",
+                .access = Access::read_only,
+                .value = 0x600 + node,
+                .plus_node = true});
+  objects_.add(0x1200, 2,
+               {.name = "COB-ID server to client",
+                .access = Access::read_only,
+                .value = 0x580 + node,
+                .plus_node = true});
+  pdos_.add_objects(kReceived, kSent);
 }
 
 void Drive::add_drive_objects() {
-  const auto number = [this](std::uint16_t index, std::uint8_t sub, int bytes, std::int64_t value) {
-    objects_.add(index, sub, {.bytes = bytes, .most = (std::int64_t{1} << 8 * bytes) - 1, .value = value});
+  using Kind = ObjectDictionary::Kind;
+  const auto number = [this](std::uint16_t index, std::uint8_t sub, const char* name, int bytes,
+                             std::int64_t value) {
+    objects_.add(index, sub,
+                 {.name = name, .bytes = bytes, .most = (std::int64_t{1} << 8 * bytes) - 1, .value = value});
   };
-  const auto whole = [this](std::uint16_t index, std::uint8_t sub, std::int64_t value) {
-    objects_.add(index, sub, {.is_signed = true, .least = kInt32Min, .most = kInt32Max, .value = value});
+  const auto whole = [this](std::uint16_t index, std::uint8_t sub, const char* name, std::int64_t value) {
+    objects_.add(index, sub,
+                 {.name = name, .is_signed = true, .least = kInt32Min, .most = kInt32Max, .value = value});
   };
-  objects_.add(0x6007, 0, {.bytes = 2, .is_signed = true, .least = 0, .most = 3, .value = 1});
-  objects_.add(0x603F, 0, {.bytes = 2, .access = Access::read_only, .mappable = true});
-  objects_.add(0x6040, 0, {.bytes = 2, .mappable = true, .most = 0xFFFF});
-  objects_.add(0x6041, 0, {.bytes = 2, .access = Access::read_only, .mappable = true});
-  objects_.add(
-      0x605A, 0,
-      {.bytes = 2, .is_signed = true, .least = 0, .most = 8, .value = 2, .check = [](std::int64_t option) {
-         const bool known = option <= 2 || option == 5 || option == 6;
-         return known ? abort_none : abort_range;
-       }});
+  const auto shown = [this](std::uint16_t index, const char* name, int bytes, bool is_signed) {
+    objects_.add(index, 0,
+                 {.name = name,
+                  .bytes = bytes,
+                  .is_signed = is_signed,
+                  .access = Access::read_only,
+                  .mappable = true});
+  };
+  objects_.add(0x6007, 0,
+               {.name = "Abort connection option code",
+                .bytes = 2,
+                .is_signed = true,
+                .least = 0,
+                .most = 3,
+                .value = 1});
+  shown(0x603F, "Error code", 2, false);
+  objects_.add(0x6040, 0, {.name = "Controlword", .bytes = 2, .mappable = true, .most = 0xFFFF});
+  shown(0x6041, "Statusword", 2, false);
+  objects_.add(0x605A, 0,
+               {.name = "Quick stop option code",
+                .bytes = 2,
+                .is_signed = true,
+                .least = 0,
+                .most = 8,
+                .value = 2,
+                .check = [](std::int64_t option) {
+                  const bool known = option <= 2 || option == 5 || option == 6;
+                  return known ? abort_none : abort_range;
+                }});
   objects_.add(0x6060, 0,
-               {.bytes = 1,
+               {.name = "Modes of operation",
+                .bytes = 1,
                 .is_signed = true,
                 .mappable = true,
                 .least = -128,
@@ -166,24 +185,26 @@ void Drive::add_drive_objects() {
                   const bool known = wanted == kHoming || wanted == kSynchronousPosition;
                   return known ? abort_none : abort_range;
                 }});
-  objects_.add(0x6061, 0,
-               {.bytes = 1,
+  shown(0x6061, "Modes of operation display", 1, true);
+  objects_.set(0x6061, 0, kSynchronousPosition);
+  shown(0x6064, "Position actual value", 4, true);
+  number(0x6065, 0, "Following error window", 4, 2000);
+  number(0x6066, 0, "Following error time out", 2, 10);
+  shown(0x606C, "Velocity actual value", 4, true);
+  objects_.add(0x607A, 0,
+               {.name = "Target position",
                 .is_signed = true,
-                .access = Access::read_only,
                 .mappable = true,
-                .value = kSynchronousPosition});
-  objects_.add(0x6064, 0, {.is_signed = true, .access = Access::read_only, .mappable = true});
-  number(0x6065, 0, 4, 2000);
-  number(0x6066, 0, 2, 10);
-  objects_.add(0x606C, 0, {.is_signed = true, .access = Access::read_only, .mappable = true});
-  objects_.add(0x607A, 0, {.is_signed = true, .mappable = true, .least = kInt32Min, .most = kInt32Max});
-  objects_.add(0x607D, 0, {.bytes = 1, .access = Access::constant, .value = 2});
-  whole(0x607D, 1, kInt32Min);
-  whole(0x607D, 2, kInt32Max);
-  number(0x6084, 0, 4, 5'000'000);
-  number(0x6085, 0, 4, 10'000'000);
+                .least = kInt32Min,
+                .most = kInt32Max});
+  objects_.compose(0x607D, Kind::array, "Software position limit", 2);
+  whole(0x607D, 1, "Min position limit", kInt32Min);
+  whole(0x607D, 2, "Max position limit", kInt32Max);
+  number(0x6084, 0, "Profile deceleration", 4, 5'000'000);
+  number(0x6085, 0, "Quick stop deceleration", 4, 10'000'000);
   objects_.add(0x6098, 0,
-               {.bytes = 1,
+               {.name = "Homing method",
+                .bytes = 1,
                 .is_signed = true,
                 .least = -128,
                 .most = 127,
@@ -192,18 +213,95 @@ void Drive::add_drive_objects() {
                   const bool known = method == 17 || method == 18 || method == 35 || method == 37;
                   return known ? abort_none : abort_range;
                 }});
-  objects_.add(0x6099, 0, {.bytes = 1, .access = Access::constant, .value = 2});
-  number(0x6099, 1, 4, 10'000);
-  number(0x6099, 2, 4, 1'000);
-  number(0x609A, 0, 4, 100'000);
-  objects_.add(0x60C2, 0, {.bytes = 1, .access = Access::constant, .value = 2});
-  objects_.add(0x60C2, 1, {.bytes = 1, .least = 1, .most = 255, .value = 1});
-  objects_.add(0x60C2, 2, {.bytes = 1, .is_signed = true, .least = -128, .most = 63, .value = -3});
-  objects_.add(0x60F4, 0, {.is_signed = true, .access = Access::read_only, .mappable = true});
-  objects_.add(0x6502, 0, {.access = Access::constant, .value = 1 << 5 | 1 << 7});  // homing, position
+  objects_.compose(0x6099, Kind::array, "Homing speeds", 2);
+  number(0x6099, 1, "Speed during search for switch", 4, 10'000);
+  number(0x6099, 2, "Speed during search for zero", 4, 1'000);
+  number(0x609A, 0, "Homing acceleration", 4, 100'000);
+  objects_.compose(0x60C2, Kind::record, "Interpolation time period", 2);
+  objects_.add(0x60C2, 1,
+               {.name = "Interpolation time period value", .bytes = 1, .least = 1, .most = 255, .value = 1});
+  objects_.add(0x60C2, 2,
+               {.name = "Interpolation time index",
+                .bytes = 1,
+                .is_signed = true,
+                .least = -128,
+                .most = 63,
+                .value = -3});
+  shown(0x60F4, "Following error actual value", 4, true);
+  // By bits, from 0: homing is mode 6, cyclic synchronous position mode 8.
+  objects_.add(0x6502, 0,
+               {.name = "Supported drive modes",
+                .access = Access::constant,
+                .value = 1 << (kHoming - 1) | 1 << (kSynchronousPosition - 1)});
 }
 
 std::int64_t Drive::value(std::uint16_t index, std::uint8_t sub) const { return objects_.get(index, sub); }
+
+std::string Drive::data_sheet(const DriveParams& params) {
+  Drive drive(params);
+  drive.refresh();
+  return eds(drive.objects_, {.node = params.node,
+                              .vendor_id = params.vendor_id,
+                              .product_code = params.product_code,
+                              .product = params.name});
+}
+
+void Drive::store() {
+  for (const auto& [key, entry] : objects_.entries()) {
+    const bool command =
+        key.first == 0x1010 || key.first == 0x1011 || key.first == 0x6040 || key.first == 0x607A;
+    if (entry.access == Access::read_write && !command) {
+      stored_[key] = entry.value;
+    }
+  }
+}
+
+void Drive::start_from_stored(std::uint16_t from, std::uint16_t to) {
+  for (const auto& [key, value] : stored_) {
+    if (key.first >= from && key.first <= to) {
+      objects_.set(key.first, key.second, value);
+    }
+  }
+}
+
+void Drive::refresh() { objects_.set(0x6041, 0, statusword()); }
+
+void Drive::on_written(std::uint16_t index, std::uint8_t /*sub*/) {
+  switch (index) {
+    case 0x1010:
+      objects_.set(0x1010, 1, 1);
+      store();
+      break;
+    case 0x1011:  // from the next reset on
+      objects_.set(0x1011, 1, 1);
+      stored_.clear();
+      break;
+    case 0x1016:
+      master_ns_ = -1;
+      break;
+    case 0x1017:
+      heartbeat_ns_ = now_ns_;
+      break;
+    case 0x6040:
+      control(static_cast<std::uint16_t>(objects_.get(0x6040)));
+      break;
+    case 0x6060:
+      if (mode_ != kHoming || !homing_) {
+        mode_ = static_cast<int>(objects_.get(0x6060));
+        demand_ = motor_.position();
+        objects_.set(0x6061, 0, mode_);
+      }
+      break;
+    case 0x607A:
+      if (state_ == DriveState::operation_enabled && mode_ == kSynchronousPosition) {
+        largest_step_ =
+            std::max(largest_step_, std::abs(static_cast<double>(objects_.get(0x607A)) - demand_));
+      }
+      break;
+    default:
+      pdos_.configured(index);
+  }
+}
 
 // ---- network ----
 
@@ -224,14 +322,18 @@ void Drive::send(std::uint32_t id, std::uint8_t size, const std::uint8_t* data) 
 
 void Drive::on_frame(const can_frame& frame, std::int64_t now_ns) {
   advance(now_ns);
-  if (frozen_ || nmt_ == 0 || (frame.can_id & (CAN_EFF_FLAG | CAN_RTR_FLAG | CAN_ERR_FLAG)) != 0) {
+  if (frozen_ || nmt_ == 0 || (frame.can_id & (CAN_EFF_FLAG | CAN_ERR_FLAG)) != 0) {
     return;
   }
   const auto node = static_cast<std::uint32_t>(params_.node);
-  if (frame.can_id == 0) {
+  if ((frame.can_id & CAN_RTR_FLAG) != 0) {  // asks for a PDO; nodes are not guarded
+    if (nmt_ == kOperational) {
+      pdos_.request(frame.can_id & CAN_SFF_MASK, now_ns);
+    }
+  } else if (frame.can_id == 0) {
     on_nmt(frame);
-  } else if (frame.can_id == 0x80) {
-    on_sync(now_ns);
+  } else if (frame.can_id == (objects_.get(0x1005) & CAN_SFF_MASK)) {
+    on_sync(frame, now_ns);
   } else if (frame.can_id == 0x600 + node) {
     on_sdo(frame);
   } else if (frame.can_id > 0x700 && frame.can_id <= 0x77F) {
@@ -240,258 +342,86 @@ void Drive::on_frame(const can_frame& frame, std::int64_t now_ns) {
       master_ns_ = now_ns;
       communication_back(kHeartbeatLost);
     }
-  } else if (pdo_is_on(kRpdo) && frame.can_id == (objects_.get(kRpdo.parameter, 1) & 0x7FF)) {
-    on_rpdo(frame);
+  } else if (nmt_ == kOperational) {
+    pdos_.receive(frame);
   }
+}
+
+void Drive::become(int nmt) {
+  if (nmt == kOperational && nmt_ != kOperational) {
+    pdos_.start();
+  }
+  nmt_ = nmt;
 }
 
 void Drive::on_nmt(const can_frame& frame) {
   if (frame.can_dlc != 2 || (frame.data[1] != 0 && frame.data[1] != params_.node)) {
     return;
   }
+  constexpr std::uint16_t kCommunicationFirst = 0x1000, kCommunicationLast = 0x1FFF, kLast = 0xFFFF;
   switch (frame.data[0]) {
     case 0x01:
-      nmt_ = kOperational;
+      become(kOperational);
       break;
     case 0x02:
-      nmt_ = kStopped;
+      become(kStopped);
       break;
     case 0x80:
-      nmt_ = kPreOperational;
+      become(kPreOperational);
       break;
     case 0x81:
-    case 0x82:
+    case 0x82: {
+      const bool whole_node = frame.data[0] == 0x81;
+      const std::int64_t error_register = objects_.get(0x1001);
       add_communication_objects();
-      if (frame.data[0] == 0x81) {
+      if (whole_node) {
         add_drive_objects();
         go(DriveState::switch_on_disabled);
-        mode_ = kSynchronousPosition;
+        controlword_ = 0;
+      } else if (state_ == DriveState::fault || state_ == DriveState::fault_reaction) {
+        objects_.set(0x1001, 0, error_register);
       }
-      rpdo_pending_ = segments_open_ = false;
+      start_from_stored(kCommunicationFirst, whole_node ? kLast : kCommunicationLast);
+      if (whole_node) {
+        mode_ = static_cast<int>(objects_.get(0x6060));
+        objects_.set(0x6061, 0, mode_);
+      }
+      sdo_.reset();
+      communication_error_ = 0;
       master_ns_ = sync_ns_ = -1;
       boot();
       break;
+    }
     default:
       break;
   }
 }
 
-bool Drive::pdo_is_on(const Pdo& pdo) const { return (objects_.get(pdo.parameter, 1) & kOff) == 0; }
-
-void Drive::on_rpdo(const can_frame& frame) {
-  if (nmt_ != kOperational) {
+void Drive::on_sync(const can_frame& frame, std::int64_t now_ns) {
+  const bool counted = objects_.get(0x1019) != 0;
+  if (frame.can_dlc != (counted ? 1 : 0)) {
+    if (communication_error_ != kSyncLength) {
+      communication_error(kSyncLength);
+    }
     return;
   }
-  constexpr std::int64_t kLastSynchronous = 240;
-  if (objects_.get(kRpdo.parameter, 2) <= kLastSynchronous) {
-    pending_rpdo_ = frame;
-    rpdo_pending_ = true;
-  } else {
-    take_rpdo(frame);
-  }
-}
-
-void Drive::on_sync(std::int64_t now_ns) {
   sync_ns_ = now_ns;
   communication_back(kSyncLost);
-  if (nmt_ != kOperational) {
-    return;
+  communication_back(kSyncLength);
+  if (nmt_ == kOperational) {
+    pdos_.sync(frame.data[0], now_ns);
   }
-  if (rpdo_pending_) {
-    rpdo_pending_ = false;
-    take_rpdo(pending_rpdo_);
-  }
-  ++syncs_;
-  const std::int64_t type = objects_.get(kTpdo.parameter, 2);
-  constexpr std::int64_t kLastSynchronous = 240;
-  if (pdo_is_on(kTpdo) && type >= 1 && type <= kLastSynchronous && syncs_ % type == 0) {
-    send_tpdo();
-  }
-  if ((objects_.get(0x1801, 1) & kOff) == 0) {
-    const std::uint8_t nothing = 0;
-    send(static_cast<std::uint32_t>(objects_.get(0x1801, 1) & 0x7FF) -
-             static_cast<std::uint32_t>(params_.node),
-         1, &nothing);
-  }
-}
-
-void Drive::take_rpdo(const can_frame& frame) {
-  const auto entries = static_cast<std::uint8_t>(objects_.get(kRpdo.mapping, 0));
-  int bytes = 0;
-  for (std::uint8_t sub = 1; sub <= entries; ++sub) {
-    bytes += static_cast<int>(objects_.get(kRpdo.mapping, sub) & 0xFF) / 8;
-  }
-  if (frame.can_dlc < bytes) {
-    communication_error(kPdoTooShort);
-    return;
-  }
-  communication_back(kPdoTooShort);
-  int at = 0;
-  std::uint16_t controlword = controlword_;
-  for (std::uint8_t sub = 1; sub <= entries; ++sub) {
-    const std::int64_t entry = objects_.get(kRpdo.mapping, sub);
-    const auto index = static_cast<std::uint16_t>(entry >> 16);
-    const int size = static_cast<int>(entry & 0xFF) / 8;
-    const std::uint32_t raw = word(frame.data + at, size);
-    at += size;
-    if (index == 0x607A && state_ == DriveState::operation_enabled && mode_ == kSynchronousPosition) {
-      const double step = static_cast<std::int32_t>(raw) - demand_;
-      largest_step_ = std::max(largest_step_, std::abs(step));
-    }
-    if (objects_.write(index, static_cast<std::uint8_t>(entry >> 8), raw, size) == abort_none &&
-        index == 0x6040) {
-      controlword = static_cast<std::uint16_t>(raw);
-    }
-  }
-  control(controlword);  // with its set-point
-}
-
-void Drive::send_tpdo() {
-  objects_.set(0x6041, 0, statusword());
-  std::uint8_t data[8] = {};
-  int at = 0;
-  const auto entries = static_cast<std::uint8_t>(objects_.get(kTpdo.mapping, 0));
-  for (std::uint8_t sub = 1; sub <= entries; ++sub) {
-    const std::int64_t entry = objects_.get(kTpdo.mapping, sub);
-    const int size = static_cast<int>(entry & 0xFF) / 8;
-    put(data + at,
-        static_cast<std::uint32_t>(
-            objects_.get(static_cast<std::uint16_t>(entry >> 16), static_cast<std::uint8_t>(entry >> 8))),
-        size);
-    at += size;
-  }
-  if (!mute_pdo_) {
-    const auto id = static_cast<std::uint32_t>(objects_.get(kTpdo.parameter, 1) & 0x7FF);
-    send(id - static_cast<std::uint32_t>(params_.node), static_cast<std::uint8_t>(at), data);
-  }
-}
-
-// ---- SDO server ----
-
-void Drive::abort_sdo(std::uint16_t index, std::uint8_t sub, std::uint32_t code) {
-  std::uint8_t data[8] = {0x80};
-  put(data + 1, index, 2);
-  data[3] = sub;
-  put(data + 4, code, 4);
-  send(0x580, 8, data);
-  segments_open_ = false;
 }
 
 void Drive::on_sdo(const can_frame& frame) {
   if (mute_sdo_ || nmt_ == kStopped || frame.can_dlc != 8) {
     return;
   }
-  const std::uint8_t command = frame.data[0];
-  const auto index = static_cast<std::uint16_t>(word(frame.data + 1, 2));
-  const std::uint8_t sub = frame.data[3];
-  switch (command >> 5U) {
-    case 1: {  // initiate download
-      const std::uint32_t refused = objects_.refused(index, sub);
-      const std::uint32_t why = refused != 0 ? refused : download(frame);
-      if (why != abort_none) {
-        abort_sdo(index, sub, why);
-        return;
-      }
-      std::uint8_t data[8] = {0x60};
-      std::memcpy(data + 1, frame.data + 1, 3);
-      send(0x580, 8, data);
-      return;
-    }
-    case 2:  // initiate upload
-      start_upload(index, sub);
-      return;
-    case 3:  // upload segment
-      upload_segment(command);
-      return;
-    case 4:  // the client gives up
-      segments_open_ = false;
-      return;
-    default:
-      abort_sdo(index, sub, abort_command);
+  SdoServer::Message request;
+  std::copy(std::begin(frame.data), std::end(frame.data), request.begin());
+  if (const auto answer = sdo_.answer(request)) {
+    send(0x580, 8, answer->data());
   }
-}
-
-Abort Drive::download(const can_frame& frame) {
-  const std::uint8_t command = frame.data[0];
-  const auto index = static_cast<std::uint16_t>(word(frame.data + 1, 2));
-  const std::uint8_t sub = frame.data[3];
-  const bool expedited = (command & 2U) != 0, sized = (command & 1U) != 0;
-  if (!expedited) {
-    return abort_access;  // nothing here is longer than four bytes and can be written
-  }
-  const int bytes = sized ? 4 - static_cast<int>(command >> 2U & 3U) : 0;
-  const Entry* entry = objects_.find(index, sub);
-  const Abort why = objects_.write(index, sub, word(frame.data + 4, sized ? bytes : 4), bytes);
-  if (why != abort_none || entry == nullptr) {
-    return why;
-  }
-  if (index == 0x6040) {
-    control(static_cast<std::uint16_t>(entry->value));
-  }
-  if (index == 0x6060 && (mode_ != kHoming || !homing_)) {
-    mode_ = static_cast<int>(entry->value);
-    demand_ = motor_.position();
-    objects_.set(0x6061, 0, mode_);
-  }
-  if (index == 0x1017) {
-    heartbeat_ns_ = now_ns_;
-  }
-  if (index == 0x1016) {
-    master_ns_ = -1;
-  }
-  return abort_none;
-}
-
-void Drive::start_upload(std::uint16_t index, std::uint8_t sub) {
-  const Entry* entry = objects_.find(index, sub);
-  if (entry == nullptr) {
-    abort_sdo(index, sub, objects_.missing(index));
-    return;
-  }
-  if (entry->access == Access::write_only) {
-    abort_sdo(index, sub, abort_write_only);
-    return;
-  }
-  if (index == 0x6041) {
-    objects_.set(0x6041, 0, statusword());
-  }
-  std::uint8_t data[8] = {};
-  put(data + 1, index, 2);
-  data[3] = sub;
-  if (entry->bytes != 0) {
-    data[0] = static_cast<std::uint8_t>(0x43 | (4 - entry->bytes) << 2);
-    put(data + 4, static_cast<std::uint32_t>(entry->value), entry->bytes);
-  } else {
-    data[0] = 0x41;
-    put(data + 4, static_cast<std::uint32_t>(entry->text.size()), 4);
-    segments_ = entry->text;
-    segments_sent_ = 0;
-    segments_open_ = true;
-    toggle_ = false;
-  }
-  send(0x580, 8, data);
-}
-
-void Drive::upload_segment(std::uint8_t command) {
-  if (!segments_open_) {
-    abort_sdo(0, 0, abort_command);
-    return;
-  }
-  if (((command & 0x10U) != 0) != toggle_) {
-    abort_sdo(0, 0, abort_toggle);
-    return;
-  }
-  constexpr std::size_t kSegment = 7;
-  const std::size_t size = std::min(kSegment, segments_.size() - segments_sent_);
-  const bool last = segments_sent_ + size == segments_.size();
-  std::uint8_t data[8] = {};
-  data[0] = static_cast<std::uint8_t>((toggle_ ? 0x10 : 0) | static_cast<int>(kSegment - size) << 1 |
-                                      (last ? 1 : 0));
-  std::memcpy(data + 1, segments_.data() + segments_sent_, size);
-  send(0x580, 8, data);
-  segments_sent_ += size;
-  toggle_ = !toggle_;
-  segments_open_ = !last;
 }
 
 // ---- power state machine ----
@@ -646,7 +576,7 @@ void Drive::link_lost(std::uint16_t code) {
     communication_error(code);
   }
   if (nmt_ == kOperational && objects_.get(0x1029, 1) == 0) {
-    nmt_ = kPreOperational;
+    become(kPreOperational);
   }
   if (!moves) {
     return;
@@ -671,6 +601,9 @@ void Drive::link_lost(std::uint16_t code) {
 
 std::vector<can_frame> Drive::step(std::int64_t now_ns) {
   advance(now_ns);
+  if (nmt_ == kOperational && !frozen_) {
+    pdos_.step(now_ns);
+  }
   std::vector<can_frame> out;
   std::swap(out, out_);
   return out;

@@ -2,19 +2,21 @@
 //
 // Frames in, frames out, at times that the caller gives: it runs over SocketCAN (main.cpp) as well as inside
 // a test. Modes: homing (6; methods 35 and 37, and 17 and 18 onto a limit switch) and cyclic synchronous
-// position (8). PDO 1 each way can be mapped, and is sent and taken with the SYNC (1 .. 240) or at once (254,
-// 255).
+// position (8).
 #pragma once
 
 #include <linux/can.h>
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "tools/emulators/drive/motor.hpp"
 #include "tools/emulators/drive/object_dictionary.hpp"
+#include "tools/emulators/drive/pdos.hpp"
+#include "tools/emulators/drive/sdo_server.hpp"
 
 namespace punctum::emulator {
 
@@ -42,6 +44,8 @@ enum class DriveState : std::uint8_t {
 class Drive {
  public:
   explicit Drive(DriveParams params);
+  Drive(const Drive&) = delete;
+  Drive& operator=(const Drive&) = delete;
 
   void on_frame(const can_frame& frame, std::int64_t now_ns);
   // Up to now: the motor moves, time-outs run. What it has to send, since the last call and from on_frame().
@@ -52,6 +56,8 @@ class Drive {
   static const char* const kCommands;
 
   [[nodiscard]] int node() const { return params_.node; }
+  // What such a drive has, as an electronic data sheet for any node (CiA 306).
+  [[nodiscard]] static std::string data_sheet(const DriveParams& params);
   [[nodiscard]] DriveState state() const { return state_; }
   [[nodiscard]] std::uint16_t statusword() const;
   [[nodiscard]] int nmt_state() const { return nmt_; }  // as its heartbeat says
@@ -63,30 +69,19 @@ class Drive {
   [[nodiscard]] double largest_step() const { return largest_step_; }
 
  private:
-  struct Pdo {
-    std::uint16_t parameter, mapping;
-  };
-  static constexpr Pdo kRpdo{0x1400, 0x1600};
-  static constexpr Pdo kTpdo{0x1800, 0x1A00};
-
   void boot();
   void add_communication_objects();
-  void add_pdo(const Pdo& pdo, std::uint32_t id, const std::vector<std::uint32_t>& entries);
   void add_drive_objects();
-  [[nodiscard]] Abort check_mapping(const Pdo& pdo, std::int64_t entry) const;
-  [[nodiscard]] Abort check_mapping_count(const Pdo& pdo, std::int64_t count) const;
+  void start_from_stored(std::uint16_t from, std::uint16_t to);
+  void store();
 
   void on_nmt(const can_frame& frame);
-  void on_sync(std::int64_t now_ns);
-  void on_rpdo(const can_frame& frame);
+  void become(int nmt);
+  void on_sync(const can_frame& frame, std::int64_t now_ns);
   void on_sdo(const can_frame& frame);
-  [[nodiscard]] Abort download(const can_frame& frame);
-  void start_upload(std::uint16_t index, std::uint8_t sub);
-  void upload_segment(std::uint8_t command);
-  void abort_sdo(std::uint16_t index, std::uint8_t sub, std::uint32_t code);
+  void on_written(std::uint16_t index, std::uint8_t sub);
+  void refresh();
 
-  void take_rpdo(const can_frame& frame);
-  void send_tpdo();
   void control(std::uint16_t word);
   void raise_fault(std::uint16_t code, std::uint8_t error_register);
   void link_lost(std::uint16_t code);
@@ -100,23 +95,18 @@ class Drive {
   void watch_time_outs(std::int64_t now_ns);
   void go(DriveState state);
   void send(std::uint32_t id, std::uint8_t size, const std::uint8_t* data);
-  [[nodiscard]] bool pdo_is_on(const Pdo& pdo) const;
 
   DriveParams params_;
   ObjectDictionary objects_;
   Motor motor_;
   std::vector<can_frame> out_;
+  Pdos pdos_;
+  SdoServer sdo_;
+  // What object 1010 has stored, and a reset brings back.
+  std::map<ObjectDictionary::Key, std::int64_t> stored_;
 
   int nmt_ = 0;  // 0 before boot-up, 0x7F pre-operational, 5 operational, 4 stopped
   std::int64_t now_ns_ = -1, heartbeat_ns_ = 0, sync_ns_ = -1, master_ns_ = -1;
-  int syncs_ = 0;
-  can_frame pending_rpdo_{};
-  bool rpdo_pending_ = false;
-
-  // The transfer of a text, segment by segment.
-  std::string segments_;
-  std::size_t segments_sent_ = 0;
-  bool segments_open_ = false, toggle_ = false;
 
   DriveState state_ = DriveState::switch_on_disabled;
   std::uint16_t controlword_ = 0;

@@ -65,6 +65,7 @@ int run(int argc, char** argv) {
   std::vector<int> nodes = {1};
   std::vector<std::string> commands;
   double start_counts = 0;
+  bool data_sheet = false;
   app.set_version_flag("--version", tools::version_line("punctum-drive"));
   app.add_option("interface", interface, "a CAN interface that is up")->type_name("NAME");
   app.add_option("--node", nodes, "node numbers, a drive for each")
@@ -72,15 +73,23 @@ int run(int argc, char** argv) {
       ->check(CLI::Range(1, 127))
       ->delimiter(',');
   app.add_option("--start", start_counts, "where the drives stand at first, in counts")->type_name("COUNTS");
+  app.add_flag("--eds", data_sheet, "print its electronic data sheet (CiA 306), and end");
   app.add_option("--do", commands, "a line as on the standard input")->type_name("LINE");
-  app.footer(std::string("Lines on the standard input, for all drives or behind a node number for one:\n  ") +
-             emulator::Drive::kCommands + "\n\n" +
-             tools::help_footer({{"punctum-drive vcan0 --node 1,2,3", "three drives"},
-                                 {"punctum-drive can1 --do 'ignore quick-stop'", "one that does not stop"}},
-                                {{tools::exit_done, "it was stopped by a signal"},
-                                 {tools::exit_bad_input, "bad input, or no such interface"}}));
+  app.footer(
+      std::string("Lines on the standard input, for all drives or behind a node number for one:\n  ") +
+      emulator::Drive::kCommands + "\n\n" +
+      tools::help_footer({{"punctum-drive vcan0 --node 1,2,3", "three drives"},
+                          {"punctum-drive can1 --do 'ignore quick-stop'", "one that does not stop"},
+                          {"punctum-drive --eds > punctum-drive.eds", "what it has, for a CANopen master"}},
+                         {{tools::exit_done, "it was stopped by a signal, or has printed what was asked for"},
+                          {tools::exit_not_done, "what was asked for could not be written"},
+                          {tools::exit_bad_input, "bad input, or no such interface"}}));
   if (const auto over = tools::parse_command_line(app, argc, argv)) {
     return *over;
+  }
+  if (data_sheet) {
+    tools::say(emulator::Drive::data_sheet({}));
+    return tools::all_was_said() ? tools::exit_done : tools::exit_not_done;
   }
   emulator::DriveBus drives;
   for (const int node : nodes) {

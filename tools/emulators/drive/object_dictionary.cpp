@@ -3,21 +3,32 @@
 namespace punctum::emulator {
 
 Entry& ObjectDictionary::add(std::uint16_t index, std::uint8_t sub, Entry entry) {
-  return entries_[key(index, sub)] = std::move(entry);
+  return entries_[{index, sub}] = std::move(entry);
 }
 
 const Entry* ObjectDictionary::find(std::uint16_t index, std::uint8_t sub) const {
-  const auto it = entries_.find(key(index, sub));
+  const auto it = entries_.find({index, sub});
   return it == entries_.end() ? nullptr : &it->second;
 }
 
+void ObjectDictionary::compose(std::uint16_t index, Kind kind, std::string name, std::uint8_t highest) {
+  composed_[index] = {std::move(name), kind};
+  add(index, 0,
+      {.name = "Highest sub-index supported", .bytes = 1, .access = Access::constant, .value = highest});
+}
+
+const ObjectDictionary::Composed* ObjectDictionary::composed(std::uint16_t index) const {
+  const auto it = composed_.find(index);
+  return it == composed_.end() ? nullptr : &it->second;
+}
+
 Abort ObjectDictionary::missing(std::uint16_t index) const {
-  const auto it = entries_.lower_bound(key(index, 0));
-  return it != entries_.end() && it->first / 256 == index ? abort_no_sub_index : abort_no_object;
+  const auto it = entries_.lower_bound({index, 0});
+  return it != entries_.end() && it->first.first == index ? abort_no_sub_index : abort_no_object;
 }
 
 Abort ObjectDictionary::write(std::uint16_t index, std::uint8_t sub, std::uint32_t raw, int bytes) {
-  const auto it = entries_.find(key(index, sub));
+  const auto it = entries_.find({index, sub});
   if (it == entries_.end()) {
     return missing(index);
   }
@@ -51,17 +62,17 @@ std::int64_t ObjectDictionary::get(std::uint16_t index, std::uint8_t sub) const 
 }
 
 void ObjectDictionary::set(std::uint16_t index, std::uint8_t sub, std::int64_t value) {
-  if (const auto it = entries_.find(key(index, sub)); it != entries_.end()) {
+  if (const auto it = entries_.find({index, sub}); it != entries_.end()) {
     it->second.value = value;
   }
 }
 
 void ObjectDictionary::refuse(std::uint16_t index, std::uint8_t sub, std::uint32_t code) {
-  refused_[key(index, sub)] = code;
+  refused_[{index, sub}] = code;
 }
 
 std::uint32_t ObjectDictionary::refused(std::uint16_t index, std::uint8_t sub) const {
-  const auto it = refused_.find(key(index, sub));
+  const auto it = refused_.find({index, sub});
   return it == refused_.end() ? 0 : it->second;
 }
 

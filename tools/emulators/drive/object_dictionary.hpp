@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <string>
+#include <utility>
 
 namespace punctum::emulator {
 
@@ -23,12 +24,15 @@ enum Abort : std::uint32_t {
   abort_length = 0x06070010,
   abort_no_sub_index = 0x06090011,
   abort_range = 0x06090030,
+  abort_transfer = 0x08000020,
   abort_state = 0x08000022,
 };
 
 enum class Access : std::uint8_t { constant, read_only, write_only, read_write };
 
+// A variable: what an index without sub-indices is, or one sub-index.
 struct Entry {
+  std::string name = {};
   int bytes = 4;  // 1, 2 or 4; 0: a text
   bool is_signed = false;
   Access access = Access::read_write;
@@ -36,13 +40,27 @@ struct Entry {
   std::int64_t least = 0, most = 0xFFFFFFFF;
   std::int64_t value = 0;
   std::string text = {};
+  bool plus_node = false;  // `value` contains the node number: another node has another one
   // Asked before a value is taken.
   std::function<Abort(std::int64_t)> check = {};
 };
 
 class ObjectDictionary {
  public:
+  using Key = std::pair<std::uint16_t, std::uint8_t>;  // index and sub-index
+
+  enum class Kind : std::uint8_t { array, record };
+  struct Composed {
+    std::string name;
+    Kind kind;
+  };
+
   Entry& add(std::uint16_t index, std::uint8_t sub, Entry entry);
+  // An index with sub-indices, the highest of which is told by sub-index 0; the others are added.
+  void compose(std::uint16_t index, Kind kind, std::string name, std::uint8_t highest);
+  [[nodiscard]] const std::map<Key, Entry>& entries() const { return entries_; }
+  // Null: it has no sub-indices.
+  [[nodiscard]] const Composed* composed(std::uint16_t index) const;
 
   [[nodiscard]] const Entry* find(std::uint16_t index, std::uint8_t sub) const;
   // Why there is nothing: no object, or no such sub-index of it.
@@ -60,9 +78,9 @@ class ObjectDictionary {
   [[nodiscard]] std::uint32_t refused(std::uint16_t index, std::uint8_t sub) const;
 
  private:
-  static std::uint32_t key(std::uint16_t index, std::uint8_t sub) { return index * 256U + sub; }
-  std::map<std::uint32_t, Entry> entries_;
-  std::map<std::uint32_t, std::uint32_t> refused_;
+  std::map<Key, Entry> entries_;
+  std::map<std::uint16_t, Composed> composed_;
+  std::map<Key, std::uint32_t> refused_;
 };
 
 }  // namespace punctum::emulator

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -57,7 +58,7 @@ class WiredWorld {
   sim::SimConfig config_;
   sim::World world_;
   hal::StageState needle_;
-  std::array<DriveState, kAxes> drive_states_{};
+  std::array<std::optional<DriveState>, kAxes> drive_states_;  // as told last
 
   mutable std::mutex mutex_;  // of what follows
   Now now_;

@@ -24,12 +24,6 @@ constexpr std::int64_t kStopsWithin_ns = 500 * kMillisecond_ns;  // as [estop] p
 constexpr std::int64_t kPowerOffWithin_ns = 100 * kMillisecond_ns;
 constexpr std::uint32_t kMany = 1'000'000'000;  // counters stop there
 
-// SYNCs in a row after which no node was heard at all; then none of our frames may have passed, and the
-// kernel would keep every further one and play it later. Not one: a tick that comes early after a late one
-// has sent its SYNC before the answers to the last could be there. More would only be more old set-points in
-// the queue.
-constexpr int kUnheard_syncs = 2;
-
 constexpr Object kDeviceType{{0x1000, 0}, 4, 0, "device type", "is it a CANopen drive?"};
 constexpr Object kVendor{{0x1018, 1}, 4, 0, "vendor", "look at vendor_id of its [[cia402.axis]]"};
 constexpr Object kProduct{{0x1018, 2}, 4, 0, "product", "look at product_code of its [[cia402.axis]]"};
@@ -399,8 +393,8 @@ std::string Cia402Stage::report() const {
     line("the controller went bus-off: check cable, terminators and bitrate");
   }
   if (h.silences > 0) {
-    line("no node was heard for " + std::to_string(kUnheard_syncs) + " SYNCs, " + std::to_string(h.silences) +
-         " times, and the drives were stopped: check the connectors");
+    line("no node was heard for " + std::to_string(params_.silence_cycles) + " SYNCs, " +
+         std::to_string(h.silences) + " times, and the drives were stopped: check the connectors");
   }
   if (h.not_sent > 0) {
     line(std::to_string(h.not_sent) + " frames found the queue full: ip link set " + params_.interface +
@@ -565,12 +559,12 @@ bool Cia402Stage::all_enabled() const NONBLOCKING {
 // behind it, in order and with no way to take it back. So as long as no node is heard, nothing is added but a
 // stop. How much waits, the kernel does not tell (a CAN socket has no SIOCOUTQ); but what a node sends goes
 // over the same contact, an answer follows the SYNC that asked for it, and a heartbeat gives way to every
-// command and SYNC that the controller holds. With at most kUnheard_syncs cycles sent after the last frame
+// command and SYNC that the controller holds. With at most silence_cycles cycles sent after the last frame
 // that was heard, and none but stops from then on until the core has told the drives off, what can be played
 // later is bounded.
 void Cia402Stage::cycle(std::int64_t now_ns) NONBLOCKING {
   const bool was_silent = silent_;
-  silent_ = unheard_ >= kUnheard_syncs;
+  silent_ = unheard_ >= params_.silence_cycles;
   if (silent_ && !was_silent) {
     fall_silent();
   }
@@ -593,7 +587,7 @@ void Cia402Stage::cycle(std::int64_t now_ns) NONBLOCKING {
   }
 }
 
-// The old set-points that wait already cannot be helped: at most those of kUnheard_syncs cycles, for one that
+// The old set-points that wait already cannot be helped: at most those of silence_cycles cycles, for one that
 // was sent behind the last SYNC is overwritten in the drive by the stop. It goes out with a SYNC of its own
 // that lets it act as soon as anything passes; and once only.
 void Cia402Stage::fall_silent() NONBLOCKING {
@@ -623,7 +617,7 @@ void Cia402Stage::send_sync(std::int64_t now_ns) NONBLOCKING {
     return;
   }
   stop_due_ = false;
-  unheard_ = std::min(unheard_ + 1, kUnheard_syncs);
+  unheard_ = std::min(unheard_ + 1, params_.silence_cycles);
   sync_ns_ = now_ns;
   for (std::size_t i = 0; i < count_; ++i) {
     axes_[i].synced();

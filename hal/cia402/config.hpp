@@ -53,6 +53,11 @@ struct CanStageParams {
   int master_node = 127;       // whose heartbeat the drives watch
   double heartbeat_s = 0.02;   // of drives and master
   double heartbeat_timeout_s = 0.06;
+  // SYNCs in a row after which no node was heard at all: then none of our frames may have passed, and nothing
+  // but a stop goes out. More for an adapter that hands on answers late; so many cycles of set-points may be
+  // played after a contact that was open. Not 1: a tick that comes early after a late one has sent its SYNC
+  // before the answers to the last could be there.
+  int silence_cycles = 2;
   bool homing = false;                  // on the first enable after the start, each drive by its method
   hal::Vec3 tip_m = hal::Vec3::Zero();  // where the tip is when every drive stands at zero
   hal::Vec3 needle{-1, 0, 0};   // its axis, out of the tip; no drive turns it, one or two move along it
@@ -69,6 +74,7 @@ inline constexpr auto kCia402Keys =
               hal::whole("master_node", &CanStageParams::master_node, 1, kMaxNode),
               hal::milli("heartbeat_ms", &CanStageParams::heartbeat_s, 5, 1000),
               hal::milli("heartbeat_timeout_ms", &CanStageParams::heartbeat_timeout_s, 10, 5000),
+              hal::whole("silence_cycles", &CanStageParams::silence_cycles, 2, 10),
               hal::flag("homing", &CanStageParams::homing),
               hal::micro_vector("tip_um", &CanStageParams::tip_m, -1e6, 1e6),
               hal::direction("needle", &CanStageParams::needle),

@@ -384,6 +384,15 @@ Found check_bus(const cia402::CanStageParams& can, const rt::ServoConfig& servo)
                     static_cast<int>(servo.stage_timeout_s * servo.rate_Hz / kCycles),
                     kCycles * cycle_s * 1e3)};
   }
+  // The stop of a silent bus comes before the core's own, which would only wait behind it.
+  if (servo.stage_timeout_s < (can.silence_cycles + 1) * cycle_s) {
+    return Problem{
+        "cia402.silence_cycles",
+        fmt::format("the stage would time out before the bus counts as silent, allowed: at most {}, or "
+                    "stage.timeout_ms of at least {:g}",
+                    std::max(static_cast<int>(servo.stage_timeout_s / cycle_s + 1e-9) - 1, 2),
+                    (can.silence_cycles + 1) * cycle_s * 1e3)};
+  }
   if (can.heartbeat_timeout_s < 2 * can.heartbeat_s) {
     return Problem{
         "cia402.heartbeat_timeout_ms",

@@ -848,6 +848,44 @@ TEST_F(Cia402ContactTest, a_contact_that_returns_after_the_stop_plays_no_queue_o
   EXPECT_EQ(stage->health().not_sent, 0U);
 }
 
+// As many cycles of set-points as the scene allows, and no more; one heard frame begins the count anew.
+TEST_F(Cia402ContactTest, a_bus_may_be_silent_for_as_many_cycles_as_the_scene_says) {
+  for (const int cycles : {2, 5, 10}) {
+    CanStageParams params = three_axes();
+    params.silence_cycles = cycles;
+    begin(params);
+    configure_drives(0, 1);
+    enable();
+    move_along_x(10);
+    for (int i = 0; i < 3; ++i) {
+      can.lose_of_drives = [](const can_frame&) { return true; };
+      ticks(cycles - 1);
+      can.lose_of_drives = nullptr;
+      EXPECT_EQ(tick(), Status::no_data);
+      EXPECT_EQ(tick(), Status::ok);
+    }
+    EXPECT_EQ(stage->health().silences, 0U) << cycles;
+    expect_all(DriveState::operation_enabled);
+    (void)lose_contact(40);
+    EXPECT_EQ(stage->health().silences, 1U);
+    // Three commands and a SYNC for each cycle, the stop in the same form, and perhaps a heartbeat.
+    const auto cycles_and_stop = 4U * static_cast<std::size_t>(cycles + 1);
+    EXPECT_GE(most_waiting, cycles_and_stop);
+    EXPECT_LE(most_waiting, cycles_and_stop + 1);
+    // The bus plays a cycle in 0.4 ms, and the drive brakes from that speed.
+    const double played_s = kPerCycle / 0.4e-3;
+    const double braking = played_s * played_s / (2.0 * params.axes[0].quick_stop_counts_s2);
+    EXPECT_LE(furthest(), cycles * kPerCycle + braking) << cycles;
+    expect_all(DriveState::quick_stop_active);
+    expect_rest();
+    EXPECT_NE(stage->report().find("no node was heard for " + std::to_string(cycles) + " SYNCs, 1 times"),
+              std::string::npos)
+        << stage->report();
+    stage->safe_state();
+    stage->close();
+  }
+}
+
 TEST_F(Cia402ContactTest, drives_that_stand_in_quick_stop_stay_there_when_the_contact_returns) {
   begin();
   configure_drives(1000, 1);  // they stop by themselves, and stay operational in the network

@@ -170,6 +170,20 @@ TEST(SceneCia402, a_sync_that_is_too_slow_for_the_stage_or_for_drives_is_refused
       << heartbeat;
 }
 
+TEST(SceneCia402, a_silence_that_the_stage_would_not_outlast_is_refused) {
+  EXPECT_EQ(error_of(kGood, {"cia402.silence_cycles=10"}), "");
+  EXPECT_EQ(
+      error_of(kGood, {"cia402.silence_cycles=10", "stage.timeout_ms=10"}),
+      "--set: cia402.silence_cycles: the stage would time out before the bus counts as silent, allowed: at "
+      "most 9, or stage.timeout_ms of at least 11");
+  EXPECT_EQ(error_of(kGood, {"cia402.silence_cycles=9", "stage.timeout_ms=10"}), "");
+  EXPECT_EQ(
+      error_of(kGood, {"cia402.silence_cycles=10", "cia402.sync_divisor=2"}),
+      "--set: cia402.silence_cycles: the stage would time out before the bus counts as silent, allowed: at "
+      "most 9, or stage.timeout_ms of at least 22");
+  EXPECT_NE(error_of(kGood, {"cia402.silence_cycles=1"}).find("cia402.silence_cycles"), std::string::npos);
+}
+
 TEST(SceneCia402, a_force_sensor_on_the_bus_needs_its_node_and_the_stage) {
   const std::string sensor = "[force_sensor]\ndevice = \"cia402\"\n";
   EXPECT_NE(error_of(kGood + sensor).find("cia402.force_node: 0 is no force sensor"), std::string::npos);

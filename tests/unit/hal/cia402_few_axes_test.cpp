@@ -188,6 +188,7 @@ class FewAxes {
     ++ticked;
     seen.asked_N = seen.force_N = hand.force;
     seen.power = watched->power;
+    seen.enable_line = watched->enable_line;
     seen.gate = injector.open;
     seen.level = estop.level;
     seen.sample = &servo->sample();

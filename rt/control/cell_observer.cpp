@@ -15,7 +15,6 @@ constexpr double kOutwardTau_s = 0.03;
 
 CellObserver::CellObserver(const ServoConfig& config, Station& station) NONBLOCKING
     : station_(station),
-      penetration_m_(config.limits.penetration_depth_m),
       far_wall_m_(config.limits.far_wall_m),
       has_phases_(config.phases.has_value()),
       let_go_m_(config.phases.value_or(PhaseParams{}).clear_m) {
@@ -86,9 +85,7 @@ void CellObserver::count_from_contact(LocalMembraneModel& model, const hal::Vec3
     const double room_m = std::max(first.chord_m(tip_m) - far_wall_m_, 0.0);
     facts_.inward_limit_m = facts_.inward_m - first.depth_m(tip_m) + room_m;
   }
-  if (touched_) {
-    facts_.inward_limit_m = std::min(facts_.inward_limit_m, axis.dot(contact_m_) + penetration_m_);
-  }
+  facts_.contact_inward_m = touched_ ? axis.dot(contact_m_) : std::numeric_limits<double>::infinity();
 }
 
 void CellObserver::take_newest_observation(LocalMembraneModel& model, bool inside_cell) NONBLOCKING {
@@ -122,7 +119,7 @@ void CellObserver::restart(std::int64_t now_ns) NONBLOCKING {
   if (model_) {
     model_->restart(now_ns);
     touched_ = false;
-    facts_.inward_limit_m = std::numeric_limits<double>::infinity();
+    facts_.inward_limit_m = facts_.contact_inward_m = std::numeric_limits<double>::infinity();
     copy_from(*model_);
   }
 }

@@ -26,8 +26,10 @@ struct CellFacts {
   double outward_m_s = 0;  // outward speed of the tip, low-passed
   // By the encoders alone, the way of the tip past the place of the first contact. Before it: depth_m.
   double contact_depth_m = 0;
-  // What inward_m may not exceed: the penetration limit past the first contact, and the distance from the far
-  // wall of the cell as it was first seen. No observation that comes later moves it inwards.
+  // inward_m at the first contact; infinite before it.
+  double contact_inward_m = std::numeric_limits<double>::infinity();
+  // What inward_m may not exceed: the distance from the far wall of the cell as it was first seen. No
+  // observation that comes later moves it inwards.
   double inward_limit_m = std::numeric_limits<double>::infinity();
   bool vision_implausible = false;  // the newest observation contradicts what is known of this cell
   bool contact_seen = false;
@@ -65,7 +67,6 @@ class CellObserver {
   void copy_from(const LocalMembraneModel& model) NONBLOCKING;
 
   Station& station_;
-  double penetration_m_;
   double far_wall_m_;
   bool has_phases_;
   double let_go_m_;  // this far outside the first contact, the next one is the first

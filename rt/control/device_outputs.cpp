@@ -50,6 +50,9 @@ void DeviceOutputs::write_stage(const LatchOutput& latch, const Readings& readin
       power(true);
     }
   } else if (until_command_ <= 0 && set_point != nullptr) {
+    if (!power_given_) {  // it came with power: the chain's line has to say so too
+      power(true);
+    }
     const hal::Status status = stage.command(*set_point);
     written.stage_commanded = true;
     if (status == hal::Status::disconnected) {
@@ -64,6 +67,7 @@ void DeviceOutputs::write_stage(const LatchOutput& latch, const Readings& readin
 }
 
 void DeviceOutputs::power(bool on) NONBLOCKING {
+  power_given_ = on;
   devices_.stage->enable(on);
   if (devices_.estop) {
     devices_.estop->drive_power(on);

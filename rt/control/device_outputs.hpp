@@ -40,6 +40,7 @@ class DeviceOutputs {
   int until_command_ = 0;            // ticks until the next stage set-point
   bool hand_force_unknown_ = false;  // it could not be written: no heartbeat until the reset
   bool heartbeat_level_ = false;
+  bool power_given_ = false;
 };
 
 }  // namespace punctum::rt

@@ -6,6 +6,7 @@
 // before the next press.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include "hal/devices.hpp"
@@ -47,7 +48,7 @@ class EnablingDevice {
       return Fault::none;
     }
     enabled_ = enabled_ || press_;
-    released_s_ = enabled_ && !held_ ? released_s_ + elapsed_s : 0;
+    released_s_ = enabled_ ? std::max(released_s_ + (held_ ? -kHeldCounts : 1) * elapsed_s, 0.0) : 0;
     if (released_s_ > release_s_ || (enabled_ && squeezed_)) {
       enabled_ = false;
       return Fault::enabling_released;
@@ -59,6 +60,9 @@ class EnablingDevice {
   [[nodiscard]] bool pressed_anew() const NONBLOCKING { return press_; }  // on this tick
 
  private:
+  // A contact that chatters is let go again and again: being held makes up for a tenth of it.
+  static constexpr double kHeldCounts = 0.1;
+
   double release_s_;
   bool held_ = false;
   bool squeezed_ = false;

@@ -289,7 +289,7 @@ void PassivityGuard::follow_motion(const GuardInput& in, double between_s) NONBL
 }
 
 // The damper beside the springs and against surplus, of a new sample. share: of the effects' damping that is
-// rendered.
+// rendered while nothing brakes the handle: what is left out then, the damper does not make up for.
 void PassivityGuard::damp(const GuardInput& in, double share) NONBLOCKING {
   const hal::Vec3& v = v_m_s_;
   const double bound = kDamperShare * (T_s_ / sample_.kept_s()) * own_stable_Ns_m_;
@@ -354,13 +354,15 @@ hal::Vec3 PassivityGuard::step(const GuardInput& in) NONBLOCKING {
   // Effects' damping that the device can render, and that a spring of this stiffness leaves in phase.
   const double rendered = gain_ * std::max(in.stiffness_N_m, 0.0);
   const double in_phase = rendered > in_phase_N_m_ ? square(in_phase_N_m_ / rendered) : 1;
+  const double renders = kDamperShare * (T_s_ / sample_.kept_s()) * stable_Ns_m_ * in_phase;
+  const double regular = in.damping_Ns_m > renders ? renders / in.damping_Ns_m : 1;
   // Of a handle that is braked hard only as much as the limit behind the guard lets go before the handle
   // turns round: what is left of the force then pushes it on.
-  const double most =
-      std::min(kDamperShare * (T_s_ / sample_.kept_s()) * stable_Ns_m_ * in_phase, slew_N_s_ / braked_m_s2_);
-  const double share = in.damping_Ns_m > most ? most / in.damping_Ns_m : 1;
+  const double comes_down_Ns_m = slew_N_s_ / braked_m_s2_;
+  const double share =
+      regular * in.damping_Ns_m > comes_down_Ns_m ? comes_down_Ns_m / in.damping_Ns_m : regular;
   if (in.fresh) {
-    damp(in, share);
+    damp(in, regular);
     if (first_) {
       way_ = {Way{in.position_m.x()}, Way{in.position_m.y()}, Way{in.position_m.z()}};
     }

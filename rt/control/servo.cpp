@@ -1,5 +1,7 @@
 #include "rt/control/servo.hpp"
 
+#include <algorithm>
+
 namespace punctum::rt {
 
 Servo::Servo(const ServoConfig& config, const Devices& devices, Station& station, bool degraded) NONBLOCKING
@@ -159,7 +161,7 @@ StageConstraint Servo::constraint(const CellFacts& cell, const TaskFacts& task, 
   c.membrane.axis = cell.approach_axis;
   c.withdrawal_only = !cell.vision_fresh || requested.end;
   c.no_deeper = tip_force_soft;
-  c.inward_limit_m = cell.inward_limit_m;
+  c.inward_limit_m = std::min(cell.inward_limit_m, cell.contact_inward_m + requested.depth_limit_m);
   c.depth_limit_m = requested.depth_limit_m;
   if (task.inside_cell && !task.outside()) {  // without phases nobody knows where the needle went in
     c.insertion = task.insertion;

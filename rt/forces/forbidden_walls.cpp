@@ -18,6 +18,9 @@ PotentialForce ForbiddenWalls::push(Region region, const NeedlePose& needle) NON
   away = regions_.away(region, needle);
   const double delta_m = params_.felt_m - regions_.apart_m(region, away, needle);
   push.force_N = params_.K_N_m * soft_spring(delta_m, kSoftPart * params_.felt_m) * away;
+  if (reach_) {
+    push.force_N = reach_->lazyProduct(hal::Vec3(push.force_N));
+  }
   push.energy_J = params_.K_N_m * soft_spring_energy(delta_m, kSoftPart * params_.felt_m);
   return push;
 }

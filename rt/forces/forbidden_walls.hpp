@@ -6,12 +6,14 @@
 //
 // The hand's point goes no further than d = 0 (rt/control/limits), so the push ends at K k_p felt: from there
 // on the hand slips. The regions are where the scene says, whatever vision sees, so the walls do not fade
-// with it; with the clutch they do. Tilting the needle moves the walls; what that does to U is counted. No
+// with it; with the clutch they do. A wall pushes only along the ways that the stage can make: no other way
+// of the hand leads out of it. Tilting the needle moves the walls; what that does to U is counted. No
 // eigenvalue of the Hessian exceeds K where felt <= tip_radius + clearance, or the walls are flat. Real-time
 // safe.
 #pragma once
 
 #include <array>
+#include <optional>
 
 #include "hal/realtime.hpp"
 #include "rt/forces/effect.hpp"
@@ -23,9 +25,9 @@ class ForbiddenWalls {
  public:
   using Params = ForbiddenParams;
 
-  ForbiddenWalls(const ForbiddenParams& params, const EffectSetup& /*setup*/) NONBLOCKING : params_(params),
-                                                                                            regions_(params) {
-  }
+  ForbiddenWalls(const ForbiddenParams& params, const EffectSetup& setup) NONBLOCKING : params_(params),
+                                                                                        regions_(params),
+                                                                                        reach_(setup.reach) {}
 
   [[nodiscard]] EffectOutput step(const EffectInput& in) NONBLOCKING;
 
@@ -35,6 +37,7 @@ class ForbiddenWalls {
 
   ForbiddenParams params_;
   ForbiddenRegions regions_;
+  std::optional<hal::Mat3> reach_;
   std::array<hal::Vec3, std::size(kRegions)> away_{hal::Vec3::UnitX(), hal::Vec3::UnitX()};
   double last_stored_J_ = 0;
   hal::Vec3 last_force_N_ = hal::Vec3::Zero();

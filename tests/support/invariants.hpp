@@ -188,6 +188,7 @@ struct Bounds {
   double truth_m = 3e-6;        // the core knows the membrane's place to this
   double lateral_m = c.limits.lateral_m + 2e-6;  // the tip follows the set-point late
   double shortest_opening_s = 0.02;
+  double ramp_s = 0.6;        // of a command
   double brake_s = 0.03;      // v/a, and two periods of the slowest check
   double relay_s = 0.02;      // beyond the stop's own time
   double settles_m = 13e-6;   // a stage without power: its bearings, and two ticks at 1 mm/s
@@ -242,6 +243,7 @@ struct Seen {
   bool injector_stuck = false;
   bool stop_commanded = false;
   double position_scale = 0;  // commanded on this tick, within the scene's bounds
+  double depth_limit_m = 0;   // likewise
   bool ending = false;
   bool finished = false;
   const TelemetrySample* sample = nullptr;
@@ -581,7 +583,8 @@ class Invariants {
     // nothing.
     const bool acts = s.power || s.commands != 0 || s.asked_N.norm() != 0;
     const bool on = running && was_running_ && pressed_ && acts;
-    let_go_s_ = on && !held ? let_go_s_ + s.elapsed_s : 0;
+    // A contact that chatters counts: being held makes up for a tenth.
+    let_go_s_ = on ? std::max(let_go_s_ + (held ? -0.1 : 1.0) * s.elapsed_s, 0.0) : 0;
     squeezed_s_ = on && squeezed(enabling_) ? squeezed_s_ + s.elapsed_s : 0;
     const double unseen_s = (s.has_switch ? b_.switch_timeout_s : b_.c.hand_timeout_s) + two_ticks_s;
     at_most(I::stops_when_let_go, let_go_s_, b_.c.enabling->release_s + unseen_s);
@@ -714,8 +717,21 @@ class Invariants {
     if (touched_ && (depth < -1e-6 || t.cell != cell_)) {
       touched_ = false;
     }
+    if (s.depth_limit_m > 0) {
+      depth_ramp_s_ = b_.ramp_s;
+      asked_depth_m_ = s.depth_limit_m;
+      depth_limit_m_ = std::max(depth_limit_m_, asked_depth_m_);
+    }
+    depth_ramp_s_ -= told_s_;
+    if (!touched_ && depth_ramp_s_ <= 0) {
+      depth_limit_m_ = asked_depth_m_;
+    }
     if (touched_ && s.stage_true) {
-      at_most(I::depth_bounded, depth, b_.c.limits.penetration_depth_m + b_.vision_sum_m + b_.truth_m);
+      // A commanded limit holds from where the needle is once the command's ramp has ended; vision moves it
+      // by no more than its sum.
+      depth_limit_m_ =
+          depth_ramp_s_ > 0 ? depth_limit_m_ : std::max(asked_depth_m_, std::min(depth_limit_m_, depth));
+      at_most(I::depth_bounded, depth, depth_limit_m_ + b_.vision_sum_m + b_.truth_m);
     }
     const bool inside =
         t.phase == Phase::puncture || t.phase == Phase::injection || t.phase == Phase::withdrawal;
@@ -949,6 +965,7 @@ class Invariants {
   bool touched_ = false, inside_ = false;
   // Where the needle was told to be when its motion began: without power it may have gone there.
   double false_start_m_ = 0;
+  double asked_depth_m_ = b_.c.limits.penetration_depth_m, depth_limit_m_ = asked_depth_m_, depth_ramp_s_ = 0;
   Vec3 first_contact_m_ = Vec3::Zero(), entered_m_ = Vec3::Zero();
 
   bool entry_known_ = false;

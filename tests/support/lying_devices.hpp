@@ -656,7 +656,9 @@ class LyingStation {
       seen_.position_scale = within ? scale : 0;
     }
     if (begins(Lie::command_depth_limit)) {
-      (void)station_->console.queue.try_push({Command::depth_limit, value(Lie::command_depth_limit), 0});
+      const double limit_m = value(Lie::command_depth_limit);
+      (void)station_->console.queue.try_push({Command::depth_limit, limit_m, 0});
+      seen_.depth_limit_m = limit_m > 0 && limit_m <= config_.limits.penetration_depth_m ? limit_m : 0;
     }
     seen_.stop_commanded = begins(Lie::command_stop);
     truth.ending = truth.ending || begins(Lie::command_end);

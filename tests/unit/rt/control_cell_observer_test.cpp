@@ -222,7 +222,7 @@ TEST(CellObserver, counts_the_depth_past_the_first_contact_by_the_encoders_alone
   EXPECT_NEAR(o.cell.facts().contact_depth_m, 1e-6, 1e-9);
   o.last.outside = false;
   (void)o.tick();
-  EXPECT_NEAR(o.cell.facts().inward_limit_m, -20e-6 + config.limits.penetration_depth_m, 1e-9);
+  EXPECT_NEAR(o.cell.facts().contact_inward_m, -20e-6, 1e-9);
   // Vision lets the entry recede with the needle.
   double entry_x = 20e-6;
   for (int k = 0; k < 1000; ++k) {
@@ -242,7 +242,7 @@ TEST(CellObserver, counts_the_depth_past_the_first_contact_by_the_encoders_alone
   }
   EXPECT_NEAR(o.cell.facts().contact_depth_m, 51e-6, 1e-9);
   EXPECT_LT(std::abs(o.cell.facts().depth_m - o.cell.facts().contact_depth_m), 8e-6);
-  EXPECT_NEAR(o.cell.facts().inward_limit_m, -20e-6 + config.limits.penetration_depth_m, 1e-9);
+  EXPECT_NEAR(o.cell.facts().contact_inward_m, -20e-6, 1e-9);
   EXPECT_NE(o.cell.facts().alarms & alarm_vision_implausible, 0U);
   EXPECT_FALSE(o.cell.facts().vision_fresh);
   // Out by less than clears the cell: it is the same contact still.
@@ -251,13 +251,14 @@ TEST(CellObserver, counts_the_depth_past_the_first_contact_by_the_encoders_alone
   (void)o.tick();
   (void)o.tick();
   EXPECT_NEAR(o.cell.facts().contact_depth_m, -5e-6, 1e-9);
-  EXPECT_NEAR(o.cell.facts().inward_limit_m, -20e-6 + config.limits.penetration_depth_m, 1e-9);
+  EXPECT_NEAR(o.cell.facts().contact_inward_m, -20e-6, 1e-9);
   // Out and clear of where it was touched, the next contact counts from where it will be.
   o.readings.stage.tip_m.x() = 31e-6;
   o.last.outside = true;
   (void)o.tick();
   (void)o.tick();
   EXPECT_NEAR(o.cell.facts().inward_limit_m, -20e-6 + 120e-6 - config.limits.far_wall_m, 1e-9);
+  EXPECT_EQ(o.cell.facts().contact_inward_m, std::numeric_limits<double>::infinity());
 }
 
 TEST(CellObserver, takes_one_observation_on_a_tick_however_many_are_written) {

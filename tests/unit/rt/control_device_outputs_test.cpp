@@ -118,6 +118,13 @@ TEST(DeviceOutputs, tells_the_enable_line_what_it_tells_the_stage_of_its_power) 
   EXPECT_FALSE(o.stage.on || o.estop.enable_line);
 }
 
+TEST(DeviceOutputs, gives_the_enable_line_also_to_a_stage_that_came_with_power) {
+  Outputs o;
+  o.stage.on = true;
+  EXPECT_TRUE(o.write(&o.set_point).stage_commanded);
+  EXPECT_TRUE(o.estop.enable_line);
+}
+
 // A counter that goes on in a stop would overflow after days: nothing in it may have changed.
 TEST(DeviceOutputs, counts_nothing_while_a_stop_lasts) {
   Outputs o(4);

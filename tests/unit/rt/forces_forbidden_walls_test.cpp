@@ -108,6 +108,19 @@ TEST(ForbiddenWalls, push_away_with_the_force_of_their_energy) {
   EXPECT_GT(felt, 100);
 }
 
+// A stage that moves the needle along x only: the floor cannot be left upwards, and the holder's mouth can.
+TEST(ForbiddenWalls, push_only_along_the_ways_that_the_stage_can_make) {
+  EffectSetup along_x;
+  along_x.reach = Vec3::UnitX().asDiagonal();
+  EXPECT_GT(ForbiddenWalls(both(), {}).step(at({0, 0, 55e-6})).storing_N.norm(), 0.05);
+  EXPECT_EQ(ForbiddenWalls(both(), along_x).step(at({0, 0, 55e-6})).storing_N.norm(), 0);
+  const Vec3 at_the_mouth(-88e-6, 30e-6, 0);
+  const Vec3 whole_N = ForbiddenWalls(both(), {}).step(at(at_the_mouth)).storing_N;
+  const Vec3 felt_N = ForbiddenWalls(both(), along_x).step(at(at_the_mouth)).storing_N;
+  EXPECT_GT(felt_N.x(), 0.05);
+  EXPECT_EQ(felt_N, Vec3(whole_N.x(), 0, 0));
+}
+
 TEST(ForbiddenWalls, are_felt_without_vision_and_not_with_the_clutch_pressed) {
   ForbiddenWalls walls(both(), {});
   EffectInput in = at({0, 0, 55e-6});

@@ -63,6 +63,20 @@ TEST(Servo, lets_the_operator_lower_the_depth_limit_and_moves_the_needle_for_non
   EXPECT_EQ(b.servo->fault(), Fault::none);
 }
 
+// The membrane is said to recede with the needle: past the first contact the encoders know better.
+TEST(Servo, keeps_a_commanded_depth_whatever_vision_says_of_the_membrane) {
+  Bench b(icsi());
+  b.to_inside();
+  ASSERT_TRUE(b.station->console.queue.try_push({Command::depth_limit, 25e-6}));
+  b.run(0.7);
+  const double entry_x = b.stage.tip.x() + -b.gap();
+  b.centre.x() -= 6e-6;  // the cell as it is seen from now on
+  b.move(b.wanted_x - 40e-6, 40e-6);
+  b.run(1);
+  EXPECT_LT(entry_x - b.stage.tip.x(), 26e-6);
+  EXPECT_GT(entry_x - b.stage.tip.x(), 20e-6);
+}
+
 TEST(Servo, stops_at_the_hard_tip_force_as_measured) {
   ServoConfig config = icsi();
   config.force_sensor = true;

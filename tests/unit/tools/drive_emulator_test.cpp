@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "tools/emulators/drive/drive.hpp"
+#include "tools/emulators/drive/drive_bus.hpp"
 
 namespace punctum::emulator {
 namespace {
@@ -277,6 +278,100 @@ TEST_F(DriveTest, quick_stops_on_the_ramp_of_6085) {
   EXPECT_EQ(drive.state(), DriveState::quick_stop_active);
 }
 
+// CiA 402, object 605A: 1 and 5 brake on the slow-down ramp (6084), 2 and 6 on the quick-stop ramp (6085); 5
+// and 6 stay in quick stop.
+TEST_F(DriveTest, quick_stops_on_the_ramp_of_its_option_code) {
+  sdo({0x23, 0x84, 0x60, 0, 0x80, 0x1A, 0x06, 0});  // 400 000 counts/s^2
+  sdo({0x23, 0x85, 0x60, 0, 0x40, 0x42, 0x0F, 0});  // 1 000 000 counts/s^2
+  sdo({0x23, 0x65, 0x60, 0, 0, 0, 0, 0x10});        // a wide window
+  sdo({0x23, 0x7A, 0x60, 0, 0x80, 0x96, 0x98, 0});  // far away
+  const struct {
+    unsigned option;
+    double ramp_counts_s2;
+    DriveState then;
+  } table[] = {
+      {1, 4e5, DriveState::switch_on_disabled},
+      {2, 1e6, DriveState::switch_on_disabled},
+      {5, 4e5, DriveState::quick_stop_active},
+      {6, 1e6, DriveState::quick_stop_active},
+  };
+  for (const auto& row : table) {
+    sdo({0x2B, 0x5A, 0x60, 0, row.option, 0, 0, 0});
+    operate();
+    pass(20 * kMs);
+    const double speed = drive.speed(), from = drive.position();
+    EXPECT_GT(speed, 100'000) << row.option;
+    control(0x02);
+    pass(2000 * kMs);
+    EXPECT_EQ(drive.speed(), 0) << row.option;
+    const double way = speed * speed / (2 * row.ramp_counts_s2);
+    EXPECT_NEAR(drive.position() - from, way, 0.01 * way) << row.option;
+    EXPECT_EQ(drive.state(), row.then) << row.option;
+    control(0x00);
+  }
+}
+
+TEST_F(DriveTest, safe_torque_off_leaves_a_fault_to_its_reset) {
+  sdo({0x23, 0x65, 0x60, 0, 0, 0, 0, 0x10});        // a wide window
+  sdo({0x23, 0x7A, 0x60, 0, 0x40, 0x42, 0x0F, 0});  // far away
+  operate();
+  pass(20 * kMs);
+  EXPECT_EQ(drive.command("fault 0x7305"), "");
+  ASSERT_EQ(drive.state(), DriveState::fault_reaction);
+  EXPECT_EQ(drive.command("switch-off"), "");
+  EXPECT_EQ(drive.state(), DriveState::fault) << "there is no torque to brake with";
+  EXPECT_FALSE(drive.motor_has_power());
+  EXPECT_EQ(drive.command("switch-on"), "");
+  EXPECT_EQ(drive.command("switch-off"), "");
+  EXPECT_EQ(drive.state(), DriveState::fault);
+  EXPECT_EQ(drive.value(0x603F), 0x7305);
+  control(0x80);
+  EXPECT_EQ(drive.state(), DriveState::switch_on_disabled);
+  ASSERT_NE(drive.speed(), 0) << "it still coasts";
+  EXPECT_EQ(drive.command("fault 0x7306"), "");
+  EXPECT_EQ(drive.state(), DriveState::fault);
+}
+
+TEST_F(DriveTest, keeps_its_least_position_limit_below_its_largest) {
+  EXPECT_EQ(sdo({0x23, 0x7D, 0x60, 2, 100, 0, 0, 0}), "60 7D 60 02 00 00 00 00");
+  EXPECT_EQ(sdo({0x23, 0x7D, 0x60, 1, 101, 0, 0, 0}), "80 7D 60 01 36 00 09 06");
+  EXPECT_EQ(sdo({0x23, 0x7D, 0x60, 1, 100, 0, 0, 0}), "60 7D 60 01 00 00 00 00");
+  EXPECT_EQ(sdo({0x23, 0x7D, 0x60, 2, 99, 0, 0, 0}), "80 7D 60 02 36 00 09 06");
+  EXPECT_EQ(drive.value(0x607D, 1), 100);
+  EXPECT_EQ(drive.value(0x607D, 2), 100);
+}
+
+TEST_F(DriveTest, takes_the_mode_that_it_was_given_while_homing_when_homing_ends) {
+  const auto mode = [this](unsigned wanted) {
+    EXPECT_EQ(sdo({0x2F, 0x60, 0x60, 0, wanted, 0, 0, 0}), "60 60 60 00 00 00 00 00");
+  };
+  sdo({0x23, 0x65, 0x60, 0, 0, 0, 0, 0x10});           // a wide window
+  sdo({0x2F, 0x98, 0x60, 0, 17, 0, 0, 0});             // onto the switch at -50 000
+  sdo({0x23, 0x99, 0x60, 1, 0x20, 0xA1, 0x07, 0});     // 500 000 counts/s
+  sdo({0x23, 0x9A, 0x60, 0, 0x80, 0xF0, 0xFA, 0x02});  // 50 000 000 counts/s^2
+  sdo({0x23, 0x7A, 0x60, 0, 0x50, 0xC3, 0, 0});        // 50 000, for later
+  mode(6);
+  operate();
+  control(0x1F);
+  pass(20 * kMs);
+  mode(8);
+  pass(20 * kMs);
+  EXPECT_EQ(drive.value(0x6061), 6) << "it is still on its way";
+  pass(300 * kMs);
+  EXPECT_EQ(drive.value(0x6061), 8);
+  EXPECT_NEAR(drive.position(), 50'000, 0.5);
+  // The same when homing is given up.
+  mode(6);
+  control(0x0F);
+  control(0x1F);
+  pass(20 * kMs);
+  mode(8);
+  EXPECT_EQ(drive.value(0x6061), 6);
+  control(0x0F);
+  pass(kMs);
+  EXPECT_EQ(drive.value(0x6061), 8);
+}
+
 TEST_F(DriveTest, homes_by_the_present_position_and_by_a_switch) {
   sdo({0x2F, 0x98, 0x60, 0, 37, 0, 0, 0});
   sdo({0x2F, 0x60, 0x60, 0, 6, 0, 0, 0});
@@ -322,6 +417,85 @@ TEST_F(DriveTest, a_lost_heartbeat_that_is_a_fault_is_told_once) {
   EXPECT_EQ(emergencies(pass(70 * kMs)), (std::vector<std::string>{"30 81 11"}));
   EXPECT_EQ(drive.state(), DriveState::fault);
   EXPECT_EQ(emergencies(send(0x77F, {0x05})), std::vector<std::string>{}) << "a fault waits for its reset";
+}
+
+// CiA 301, object 1029: 2 is stopped, from any state. The emergency goes out first: a stopped node has none.
+TEST_F(DriveTest, is_stopped_by_a_lost_heartbeat_when_1029_says_so) {
+  sdo({0x23, 0x16, 0x10, 1, 50, 0, 0x7F, 0});
+  EXPECT_EQ(sdo({0x2F, 0x29, 0x10, 1, 2, 0, 0, 0}), "60 29 10 01 00 00 00 00");
+  send(0x77F, {0x05});
+  EXPECT_EQ(emergencies(pass(70 * kMs)), (std::vector<std::string>{"30 81 11"}));
+  EXPECT_EQ(drive.nmt_state(), 0x04);
+  operate();
+  EXPECT_EQ(emergencies(send(0x77F, {0x05})), (std::vector<std::string>{"00 00 00"}));
+  EXPECT_EQ(emergencies(pass(70 * kMs)), (std::vector<std::string>{"30 81 11"}));
+  EXPECT_EQ(drive.nmt_state(), 0x04);
+  EXPECT_EQ(drive.state(), DriveState::fault);
+}
+
+TEST_F(DriveTest, refuses_a_line_with_a_number_that_it_cannot_take_and_does_nothing) {
+  operate();
+  for (const char* line : {"creep nan",
+                           "creep inf",
+                           "creep -inf",
+                           "creep 5x",
+                           "creep 1e300",
+                           "creep 3e9",
+                           "creep",
+                           "fault abc",
+                           "fault 0x73g5",
+                           "fault 0x",
+                           "fault 0x10000",
+                           "fault 65536",
+                           "fault -1",
+                           "fault 0x7305 now",
+                           "emergency abc",
+                           "emergency 65536",
+                           "refuse 6065 0x06090030",
+                           "refuse 6065:zz 0x06090030",
+                           "refuse 60650:00 0x06090030",
+                           "refuse 6065:100 0x06090030",
+                           "refuse :00 0x06090030",
+                           "refuse 6065:00 much",
+                           "refuse 6065:00 0x106090030",
+                           "freeze now",
+                           "switch-off 2"}) {
+    const std::string problem = drive.command(line);
+    EXPECT_TRUE(problem.starts_with("\"" + std::string(line) + "\": ")) << line << ": " << problem;
+    EXPECT_NE(problem.find("allowed: "), std::string::npos) << problem;
+    EXPECT_TRUE(drive.step(now).empty()) << line;
+    EXPECT_EQ(drive.state(), DriveState::operation_enabled) << line;
+    EXPECT_EQ(sdo({0x23, 0x65, 0x60, 0, 1, 0, 0, 0}), "60 65 60 00 00 00 00 00") << line;
+  }
+  EXPECT_EQ(drive.command("creep nan"),
+            "\"creep nan\": \"nan\" is no speed, allowed: a number from -2147483648 to 2147483647");
+  EXPECT_EQ(drive.command("fault abc"), "\"fault abc\": \"abc\" is no code, allowed: 0 .. 0xFFFF");
+  control(0x00);
+  const double from = drive.position();
+  pass(10 * kMs);
+  EXPECT_EQ(drive.position(), from) << "it does not creep";
+  EXPECT_EQ(drive.command("creep -2500.5"), "");
+  pass(100 * kMs);
+  EXPECT_NEAR(drive.position() - from, -250.05, 0.5);
+  EXPECT_EQ(drive.command("fault 29445"), "");
+  EXPECT_EQ(drive.value(0x603F), 0x7305);
+}
+
+TEST(DriveBusTest, gives_a_line_to_the_node_whose_number_stands_before_it) {
+  DriveBus drives;
+  drives.add({.node = 1});
+  drives.add({.node = 2});
+  EXPECT_EQ(drives.command("2 fault 0x7305"), "");
+  EXPECT_EQ(drives.drive(0).value(0x603F), 0);
+  EXPECT_EQ(drives.drive(1).value(0x603F), 0x7305);
+  EXPECT_NE(drives.command("3 fault 0x7306"), "");
+  EXPECT_NE(drives.command("1fault 0x7306"), "");
+  EXPECT_EQ(drives.drive(0).value(0x603F), 0);
+}
+
+TEST(DriveBusTest, refuses_a_node_number_that_is_given_twice) {
+  EXPECT_EQ(check_nodes({1, 2, 3}), "");
+  EXPECT_EQ(check_nodes({3, 1, 2, 1}), "node 1 is given twice, allowed: each number once");
 }
 
 TEST_F(DriveTest, misbehaves_when_it_is_told_to) {

@@ -112,6 +112,23 @@ TEST_F(FalconEmulatorTest, an_event_character_sends_a_packet_before_the_latency_
   }
 }
 
+TEST_F(FalconEmulatorTest, the_hand_is_told_that_the_force_is_gone_when_the_motors_are_off_and_at_a_reset) {
+  make({.booted = true, .homed = true});
+  frames_mode();
+  const auto pushes = [this] { return hand.force != Triple{}; };
+  out("<AAABAAABAAABAA>");  // 0x1000, three times
+  EXPECT_EQ(next_text().size(), 16U);
+  ASSERT_TRUE(pushes());
+  falcon->motors_off(now_ns);
+  EXPECT_FALSE(pushes());
+  EXPECT_EQ(falcon->motors(), (std::array<int, 3>{}));
+  out("<AAABAAABAAABAA>");
+  EXPECT_EQ(next_text().size(), 16U);
+  ASSERT_TRUE(pushes());
+  ASSERT_TRUE(falcon->request(1, 0x0101, now_ns));
+  EXPECT_FALSE(pushes());
+}
+
 TEST_F(FalconEmulatorTest, it_boots_as_libnifalcon_boots_it) {
   make({});
   const auto request = [this](int number, int value) {

@@ -141,6 +141,67 @@ TEST_F(SafetyChainTest, says_when_the_chip_is_gone) {
   EXPECT_FALSE(chain->step(now + kTick_ns));
 }
 
+// A world with drives that stand still, and a hand on a handle.
+class HandOnGripTest : public testing::Test {
+ protected:
+  HandOnGripTest() {
+    const auto scene = tools::load_scene("free", {});
+    EXPECT_TRUE(scene) << scene.error();
+    world = std::make_unique<WiredWorld>(*scene->sim, nullptr);
+    hand = std::make_unique<HandOnGrip>(*world);
+    for (int node = 1; node <= WiredWorld::kAxes; ++node) {
+      drives.add({.node = node});
+    }
+    world->begin(now);
+    hand->push({0, 0, 2}, now);
+    pass(10 * kTick_ns);
+    EXPECT_EQ(world->now().force_N, 2);
+  }
+  void pass(std::int64_t for_ns) {
+    for (const std::int64_t until = now + for_ns; now < until;) {
+      now += kTick_ns;
+      world->step(drives, now);
+    }
+  }
+  // When the handle's force was told to be gone; -1: it was not.
+  [[nodiscard]] std::int64_t without_force() const {
+    for (const WorldEvent& event : world->events()) {
+      if (event.what == "the handle is without force") {
+        return event.t_ns;
+      }
+    }
+    return -1;
+  }
+
+  std::unique_ptr<WiredWorld> world;
+  std::unique_ptr<HandOnGrip> hand;
+  DriveBus drives;
+  std::int64_t now = 1000 * kTick_ns;
+};
+
+TEST_F(HandOnGripTest, the_force_ends_with_the_power_of_the_amplifier_though_no_frame_follows) {
+  const std::int64_t off_ns = now;
+  hand->power(false, off_ns);
+  EXPECT_EQ(world->now().force_N, 0);
+  hand->push({0, 0, 2}, now);
+  EXPECT_EQ(world->now().force_N, 0);
+  pass(300 * kTick_ns);
+  EXPECT_EQ(without_force(), off_ns);
+  hand->power(true, now);
+  EXPECT_EQ(world->now().force_N, 0) << "until the next frame";
+  hand->push({0, 0, 2}, now);
+  EXPECT_EQ(world->now().force_N, 2);
+}
+
+TEST_F(HandOnGripTest, the_force_ends_when_the_handle_is_unplugged) {
+  FalconEmulator falcon({.booted = true}, *hand);
+  const std::int64_t off_ns = now;
+  falcon.motors_off(off_ns);
+  EXPECT_EQ(world->now().force_N, 0);
+  pass(300 * kTick_ns);
+  EXPECT_EQ(without_force(), off_ns);
+}
+
 TEST(GpioWiresTest, refuses_what_is_no_simulated_chip_in_one_line) {
   const auto nothing = GpioWires::of("/dev/nothing");
   ASSERT_FALSE(nothing);

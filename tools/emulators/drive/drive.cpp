@@ -1,10 +1,12 @@
 #include "tools/emulators/drive/drive.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
+#include <iterator>
 #include <limits>
+#include <optional>
 #include <sstream>
 #include <utility>
 
@@ -37,6 +39,29 @@ const Pdos::Defaults kSent = {{{.entries = {0x6041'0010}},
                                {.entries = {0x6041'0010, 0x6061'0008}},
                                {.type = 1, .entries = {0x6041'0010, 0x6064'0020}},
                                {.type = 1, .entries = {0x6041'0010, 0x606C'0020}}}};
+
+// With 0x before it the number is hexadecimal. Nothing: the word is no such number, or it is above `most`.
+std::optional<std::uint32_t> whole_number(std::string_view word, std::uint32_t most, int base = 10) {
+  if (word.starts_with("0x")) {
+    word.remove_prefix(2);
+    base = 16;
+  }
+  std::uint32_t value = 0;
+  const char* const begin = word.data();
+  const char* const end = begin + word.size();
+  const auto [at, error] = std::from_chars(begin, end, value, base);
+  return error == std::errc{} && at == end && value <= most ? std::optional(value) : std::nullopt;
+}
+
+// As object 606C can show it.
+std::optional<double> speed_counts_s(std::string_view word) {
+  double value = 0;
+  const char* const begin = word.data();
+  const char* const end = begin + word.size();
+  const auto [at, error] = std::from_chars(begin, end, value);
+  const bool fits = value >= static_cast<double>(kInt32Min) && value <= static_cast<double>(kInt32Max);
+  return error == std::errc{} && at == end && fits ? std::optional(value) : std::nullopt;
+}
 
 }  // namespace
 
@@ -140,9 +165,14 @@ void Drive::add_drive_objects() {
     objects_.add(index, sub,
                  {.name = name, .bytes = bytes, .most = (std::int64_t{1} << 8 * bytes) - 1, .value = value});
   };
-  const auto whole = [this](std::uint16_t index, std::uint8_t sub, const char* name, std::int64_t value) {
-    objects_.add(index, sub,
-                 {.name = name, .is_signed = true, .least = kInt32Min, .most = kInt32Max, .value = value});
+  const auto limit = [this](std::uint8_t sub, const char* name, std::int64_t value, auto check) {
+    objects_.add(0x607D, sub,
+                 {.name = name,
+                  .is_signed = true,
+                  .least = kInt32Min,
+                  .most = kInt32Max,
+                  .value = value,
+                  .check = check});
   };
   const auto shown = [this](std::uint16_t index, const char* name, int bytes, bool is_signed) {
     objects_.add(index, 0,
@@ -198,8 +228,12 @@ void Drive::add_drive_objects() {
                 .least = kInt32Min,
                 .most = kInt32Max});
   objects_.compose(0x607D, Kind::array, "Software position limit", 2);
-  whole(0x607D, 1, "Min position limit", kInt32Min);
-  whole(0x607D, 2, "Max position limit", kInt32Max);
+  limit(1, "Min position limit", kInt32Min, [this](std::int64_t least) {
+    return least > objects_.get(0x607D, 2) ? abort_most_below_least : abort_none;
+  });
+  limit(2, "Max position limit", kInt32Max, [this](std::int64_t most) {
+    return most < objects_.get(0x607D, 1) ? abort_most_below_least : abort_none;
+  });
   number(0x6084, 0, "Profile deceleration", 4, 5'000'000);
   number(0x6085, 0, "Quick stop deceleration", 4, 10'000'000);
   objects_.add(0x6098, 0,
@@ -286,10 +320,8 @@ void Drive::on_written(std::uint16_t index, std::uint8_t /*sub*/) {
       control(static_cast<std::uint16_t>(objects_.get(0x6040)));
       break;
     case 0x6060:
-      if (mode_ != kHoming || !homing_) {
-        mode_ = static_cast<int>(objects_.get(0x6060));
-        demand_ = motor_.position();
-        objects_.set(0x6061, 0, mode_);
+      if (!homing_) {
+        take_mode();
       }
       break;
     case 0x607A:
@@ -546,7 +578,7 @@ void Drive::raise_fault(std::uint16_t code, std::uint8_t error_register) {
   objects_.set(0x1001, 0, error_register);
   emergency(code);
   if (state_ != DriveState::fault) {
-    go(motor_.stands() ? DriveState::fault : DriveState::fault_reaction);
+    go(motor_.stands() || off_switch_ ? DriveState::fault : DriveState::fault_reaction);
   }
 }
 
@@ -571,29 +603,24 @@ void Drive::communication_back(std::uint16_t code) {
 
 void Drive::link_lost(std::uint16_t code) {
   const bool moves = state_ == DriveState::operation_enabled || state_ == DriveState::switched_on;
-  const bool becomes_fault = moves && objects_.get(0x6007) == 1;
-  if (!becomes_fault) {
+  const std::int64_t option = objects_.get(0x6007);
+  if (moves && option == 1) {
+    raise_fault(code, kCommunicationError);
+  } else {
     communication_error(code);
   }
-  if (nmt_ == kOperational && objects_.get(0x1029, 1) == 0) {
+  if (moves && option == 2) {
+    go(DriveState::switch_on_disabled);
+  } else if (moves && option == 3) {
+    go(state_ == DriveState::operation_enabled ? DriveState::quick_stop_active
+                                               : DriveState::switch_on_disabled);
+  }
+  // Last: a stopped node sends no emergency.
+  const std::int64_t behaviour = objects_.get(0x1029, 1);
+  if (behaviour == 2) {
+    become(kStopped);
+  } else if (behaviour == 0 && nmt_ == kOperational) {
     become(kPreOperational);
-  }
-  if (!moves) {
-    return;
-  }
-  switch (objects_.get(0x6007)) {
-    case 1:
-      raise_fault(code, kCommunicationError);
-      break;
-    case 2:
-      go(DriveState::switch_on_disabled);
-      break;
-    case 3:
-      go(state_ == DriveState::operation_enabled ? DriveState::quick_stop_active
-                                                 : DriveState::switch_on_disabled);
-      break;
-    default:
-      break;
   }
 }
 
@@ -630,8 +657,18 @@ void Drive::advance(std::int64_t now_ns) {
   objects_.set(0x60F4, 0, std::llround(demand_ - shown));
 }
 
+void Drive::take_mode() {
+  mode_ = static_cast<int>(objects_.get(0x6060));
+  demand_ = motor_.position();
+  objects_.set(0x6061, 0, mode_);
+}
+
 void Drive::follow_set_point(double dt_s, std::int64_t now_ns) {
+  if (!homing_ && mode_ != objects_.get(0x6060)) {  // it was written while homing
+    take_mode();
+  }
   const auto quick = static_cast<double>(objects_.get(0x6085));
+  const bool slows_down = objects_.get(0x605A) == 1 || objects_.get(0x605A) == 5;
   limited_ = false;
   switch (state_) {
     case DriveState::operation_enabled:
@@ -642,7 +679,7 @@ void Drive::follow_set_point(double dt_s, std::int64_t now_ns) {
       }
       break;
     case DriveState::quick_stop_active:
-      stop_on_ramp(objects_.get(0x605A) == 5 ? static_cast<double>(objects_.get(0x6084)) : quick, dt_s);
+      stop_on_ramp(slows_down ? static_cast<double>(objects_.get(0x6084)) : quick, dt_s);
       return;
     case DriveState::fault_reaction:
       motor_.brake(quick, dt_s);
@@ -741,14 +778,28 @@ void Drive::watch_time_outs(std::int64_t now_ns) {
 // ---- bad habits ----
 
 std::string Drive::command(std::string_view line) {
-  std::istringstream words{std::string(line)};
-  std::string what, argument, more;
-  words >> what >> argument >> more;
-  const auto number = [](const std::string& text) { return std::strtoll(text.c_str(), nullptr, 0); };
-  if (what == "fault" && !argument.empty()) {
-    raise_fault(static_cast<std::uint16_t>(number(argument)), 1);
-  } else if (what == "emergency" && !argument.empty()) {
-    emergency(static_cast<std::uint16_t>(number(argument)));
+  const auto wrong = [line](const std::string& how) { return "\"" + std::string(line) + "\": " + how; };
+  const std::string unknown = wrong(std::string("unknown, allowed: ") + kCommands);
+  std::istringstream in{std::string(line)};
+  std::vector<std::string> words(std::istream_iterator<std::string>(in), {});
+  const std::size_t count = words.size();
+  words.resize(3);
+  const std::string &what = words[0], &argument = words[1], &more = words[2];
+  const bool takes_one =
+      what == "fault" || what == "emergency" || what == "ignore" || what == "mute" || what == "creep";
+  if (count != (what == "refuse" ? 3U : takes_one ? 2U : 1U)) {
+    return unknown;
+  }
+  if (what == "fault" || what == "emergency") {
+    const auto code = whole_number(argument, 0xFFFF);
+    if (!code) {
+      return wrong("\"" + argument + "\" is no code, allowed: 0 .. 0xFFFF");
+    }
+    if (what == "fault") {
+      raise_fault(static_cast<std::uint16_t>(*code), 1);
+    } else {
+      emergency(static_cast<std::uint16_t>(*code));
+    }
   } else if (what == "ignore" && argument == "quick-stop") {
     ignore_quick_stop_ = true;
   } else if (what == "ignore" && argument == "disable") {
@@ -771,11 +822,16 @@ std::string Drive::command(std::string_view line) {
   } else if (what == "stick" || what == "unstick") {
     stuck_encoder_ = what == "stick";
     stuck_at_ = motor_.position();
-  } else if (what == "creep" && !argument.empty()) {
-    creep_counts_s_ = std::strtod(argument.c_str(), nullptr);
+  } else if (what == "creep") {
+    const auto speed = speed_counts_s(argument);
+    if (!speed) {
+      return wrong("\"" + argument + "\" is no speed, allowed: a number from -2147483648 to 2147483647");
+    }
+    creep_counts_s_ = *speed;
   } else if (what == "switch-off") {
     off_switch_ = true;
-    go(DriveState::switch_on_disabled);
+    const bool has_fault = state_ == DriveState::fault || state_ == DriveState::fault_reaction;
+    go(has_fault ? DriveState::fault : DriveState::switch_on_disabled);
   } else if (what == "switch-on") {
     off_switch_ = false;
   } else if (what == "reset") {
@@ -783,14 +839,17 @@ std::string Drive::command(std::string_view line) {
     frame.can_dlc = 2;
     frame.data[0] = 0x81;
     on_nmt(frame);
-  } else if (what == "refuse" && argument.find(':') != std::string::npos && !more.empty()) {
-    const std::string index = argument.substr(0, argument.find(':'));
-    const std::string sub = argument.substr(argument.find(':') + 1);
-    objects_.refuse(static_cast<std::uint16_t>(std::strtoul(index.c_str(), nullptr, 16)),
-                    static_cast<std::uint8_t>(std::strtoul(sub.c_str(), nullptr, 16)),
-                    static_cast<std::uint32_t>(std::strtoul(more.c_str(), nullptr, 0)));
+  } else if (what == "refuse") {
+    const std::size_t colon = std::min(argument.find(':'), argument.size());
+    const auto index = whole_number(argument.substr(0, colon), 0xFFFF, 16);
+    const auto sub = whole_number(argument.substr(std::min(colon + 1, argument.size())), 0xFF, 16);
+    const auto code = whole_number(more, 0xFFFF'FFFF);
+    if (!index || !sub || !code) {
+      return wrong("allowed: refuse INDEX:SUB ABORT_CODE, 0:0 .. FFFF:FF (hexadecimal) and 0 .. 0xFFFFFFFF");
+    }
+    objects_.refuse(static_cast<std::uint16_t>(*index), static_cast<std::uint8_t>(*sub), *code);
   } else {
-    return "\"" + std::string(line) + "\": unknown, allowed: " + kCommands;
+    return unknown;
   }
   return {};
 }

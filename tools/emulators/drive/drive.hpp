@@ -85,6 +85,7 @@ class Drive {
   void control(std::uint16_t word);
   void raise_fault(std::uint16_t code, std::uint8_t error_register);
   void link_lost(std::uint16_t code);
+  void take_mode();
   void communication_error(std::uint16_t code);
   void communication_back(std::uint16_t code);
   void emergency(std::uint16_t code);

@@ -7,6 +7,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -22,6 +24,15 @@ std::int64_t now_ns() {
 }
 
 }  // namespace
+
+std::string check_nodes(const std::vector<int>& nodes) {
+  for (auto it = nodes.begin(); it != nodes.end(); ++it) {
+    if (std::find(nodes.begin(), it, *it) != it) {
+      return "node " + std::to_string(*it) + " is given twice, allowed: each number once";
+    }
+  }
+  return {};
+}
 
 DriveBus::~DriveBus() {
   if (socket_ >= 0) {
@@ -73,7 +84,7 @@ bool DriveBus::serve() {
 std::string DriveBus::command(const std::string& line) {
   char* end = nullptr;
   const long node = std::strtol(line.c_str(), &end, 10);
-  const bool for_one = end != line.c_str();
+  const bool for_one = end != line.c_str() && std::isspace(static_cast<unsigned char>(*end)) != 0;
   const std::string rest = for_one ? line.substr(static_cast<std::size_t>(end - line.c_str())) : line;
   bool found = false;
   for (const auto& drive : drives_) {

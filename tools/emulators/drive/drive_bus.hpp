@@ -9,6 +9,9 @@
 
 namespace punctum::emulator {
 
+// Empty, or what is wrong with these node numbers on one bus.
+[[nodiscard]] std::string check_nodes(const std::vector<int>& nodes);
+
 class DriveBus {
  public:
   DriveBus() = default;

@@ -91,6 +91,9 @@ int run(int argc, char** argv) {
     tools::say(emulator::Drive::data_sheet({}));
     return tools::all_was_said() ? tools::exit_done : tools::exit_not_done;
   }
+  if (const std::string problem = emulator::check_nodes(nodes); !problem.empty()) {
+    return bad("--node: " + problem);
+  }
   emulator::DriveBus drives;
   for (const int node : nodes) {
     emulator::DriveParams params;

@@ -24,6 +24,7 @@ enum Abort : std::uint32_t {
   abort_length = 0x06070010,
   abort_no_sub_index = 0x06090011,
   abort_range = 0x06090030,
+  abort_most_below_least = 0x06090036,
   abort_transfer = 0x08000020,
   abort_state = 0x08000022,
 };

@@ -64,6 +64,12 @@ void FalconEmulator::power_on() {
   frozen_ = mute_ = hung_ = false;
 }
 
+void FalconEmulator::motors_off(std::int64_t now_ns) {
+  motors_ = {};
+  force_N_ = {};
+  hand_.push(force_N_, now_ns);
+}
+
 bool FalconEmulator::baud_is(double rate) const { return std::abs(baud_ - rate) < 0.03 * rate; }
 std::int64_t FalconEmulator::byte_ns() const { return std::llround(10e9 / baud_); }
 
@@ -89,8 +95,7 @@ bool FalconEmulator::request(std::uint8_t request, std::uint16_t value, std::int
           homed_ = {};
           origin_ = kUnhomed;
           homing_asked_ns_ = -1;
-          motors_ = {};
-          force_N_ = {};
+          motors_off(now_ns);
         }
         data_terminal_ready_ = ready;
       }

@@ -28,8 +28,9 @@ struct Grip {
 class Hand {
  public:
   virtual ~Hand() = default;
-  [[nodiscard]] virtual Grip grip(std::int64_t now_ns) = 0;           // asked for each frame
-  virtual void push(const Triple& force_N, std::int64_t now_ns) = 0;  // told with each frame
+  [[nodiscard]] virtual Grip grip(std::int64_t now_ns) = 0;  // asked for each frame
+  // Told with each frame, and when the motors are off.
+  virtual void push(const Triple& force_N, std::int64_t now_ns) = 0;
 };
 
 struct FalconParams {
@@ -47,7 +48,8 @@ class FalconEmulator {
 
   FalconEmulator(const FalconParams& params, Hand& hand) : params_(params), hand_(hand) { power_on(); }
 
-  void power_on();  // as after it was plugged in
+  void power_on();                       // as after it was plugged in
+  void motors_off(std::int64_t now_ns);  // as when its plug is pulled; the hand is told
 
   // Requests to the FTDI chip without and with an answer. False, nothing: it knows no such request.
   [[nodiscard]] bool request(std::uint8_t request, std::uint16_t value, std::int64_t now_ns);

@@ -66,7 +66,7 @@ class Station {
   // Empty, or what is wrong.
   std::string command(const std::string& line) {
     if (line == "unplug") {
-      port_.reset();
+      unplug();
       return {};
     }
     if (line == "plug") {
@@ -100,7 +100,7 @@ class Station {
           !(port_->wait(std::min(due_ns(), kLongest_ns), listening ? kInput : -1) && port_->talk(*device_))) {
         tools::complain("punctum-falcon: the host has let go" +
                         (device_->problem().empty() ? std::string{} : ": " + device_->problem()));
-        port_.reset();
+        unplug();
       }
       pollfd ready{listening ? kInput : -1, POLLIN, 0};
       if (poll(&ready, 1, port_ ? 0 : 100) > 0) {
@@ -117,6 +117,10 @@ class Station {
   }
 
  private:
+  void unplug() {
+    port_.reset();
+    falcon_.motors_off(emulator::monotonic_ns());
+  }
   [[nodiscard]] std::int64_t due_ns() const {
     const std::int64_t now_ns = emulator::monotonic_ns();
     return device_->next_ns(now_ns) - now_ns;

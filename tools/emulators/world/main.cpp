@@ -172,8 +172,13 @@ class Station {
     return {};
   }
 
+  void unplug() {
+    port_.reset();
+    falcon_.motors_off(emulator::monotonic_ns());
+  }
+
   void give_power(bool on) {
-    hand_.amplifier_on = on;
+    hand_.power(on, emulator::monotonic_ns());
     (void)drives_.command(on ? "switch-on" : "switch-off");
   }
 
@@ -184,7 +189,7 @@ class Station {
       return drives_.command(behind("drive "));
     }
     if (line == "falcon unplug") {
-      port_.reset();
+      unplug();
       return {};
     }
     if (line == "falcon plug") {
@@ -225,7 +230,7 @@ class Station {
       if (port_ && !port_->talk(*usb_)) {
         tools::complain("punctum-world: the USB host has let go" +
                         (usb_->problem().empty() ? std::string{} : ": " + usb_->problem()));
-        port_.reset();
+        unplug();
       }
       if (!options_.can.empty() && !drives_.serve()) {
         return wire_is_off(options_.can + ": the interface is gone");
@@ -364,6 +369,9 @@ int run(int argc, char** argv) {
   }
   if (options.can.empty() && !options.usb && options.gpio.empty() && options.video.empty()) {
     return bad("no wire, allowed: --can, --usb, --gpio and --video");
+  }
+  if (const std::string problem = emulator::check_nodes(options.nodes); !problem.empty()) {
+    return bad("--nodes: " + problem);
   }
   const auto scene = tools::load_scene(options.scene, options.overrides);
   if (!scene) {

@@ -74,12 +74,19 @@ class HandOnGrip final : public Hand {
   explicit HandOnGrip(WiredWorld& world) : world_(world) {}
   Grip grip(std::int64_t /*now_ns*/) override { return world_.grip(); }
   void push(const Triple& force_N, std::int64_t now_ns) override {
-    world_.push_hand(amplifier_on ? force_N : Triple{}, now_ns);
+    world_.push_hand(amplifier_on_ ? force_N : Triple{}, now_ns);
   }
-  bool amplifier_on = true;
+  // Off: the hand is without force at once. On: it is until the next frame.
+  void power(bool on, std::int64_t now_ns) {
+    amplifier_on_ = on;
+    if (!on) {
+      world_.push_hand({}, now_ns);
+    }
+  }
 
  private:
   WiredWorld& world_;
+  bool amplifier_on_ = true;
 };
 
 }  // namespace punctum::emulator

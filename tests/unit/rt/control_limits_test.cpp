@@ -458,6 +458,10 @@ TEST(StageLimits, say_which_limit_holds_the_needle) {
   const double chord = 2 * std::sqrt(60e-6 * 60e-6 - 45e-6 * 45e-6);
   EXPECT_LE(c.membrane.depth_m(stage.set_point().tip_m), chord - limits.far_wall_m + 1e-9);
   EXPECT_EQ(alarms(Vec3(500e-6, 0, 0)) & alarm_travel_limited, alarm_travel_limited);
+  c.depth_limit_m = 30e-6;  // as commanded
+  stage.restart(Vec3(30e-6, 0, 0), -Vec3::UnitX());
+  EXPECT_EQ(alarms(Vec3(-200e-6, 0, 0)) & alarm_depth_limited, alarm_depth_limited);
+  EXPECT_NEAR(c.membrane.depth_m(stage.set_point().tip_m), 30e-6, 1e-9);
 }
 
 TEST(StageLimits, let_the_needle_no_further_in_than_the_encoders_allow_whatever_vision_says_of_the_cell) {

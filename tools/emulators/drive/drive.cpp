@@ -463,7 +463,7 @@ void Drive::go(DriveState state) {
     return;
   }
   state_ = state;
-  homing_ = false;
+  end_homing();
   following_since_ns_ = -1;
   if (state == DriveState::operation_enabled) {
     demand_ = motor_.position();
@@ -539,7 +539,9 @@ void Drive::control(std::uint16_t word) {
       homing_ = true;
       homed_ = homing_error_ = false;
     }
-    homing_ = homing_ && start;
+    if (!start) {
+      end_homing();
+    }
   }
 }
 
@@ -657,6 +659,14 @@ void Drive::advance(std::int64_t now_ns) {
   objects_.set(0x60F4, 0, std::llround(demand_ - shown));
 }
 
+// A mode that was written meanwhile is taken now.
+void Drive::end_homing() {
+  const bool was = std::exchange(homing_, false);
+  if (was && mode_ != objects_.get(0x6060)) {
+    take_mode();
+  }
+}
+
 void Drive::take_mode() {
   mode_ = static_cast<int>(objects_.get(0x6060));
   demand_ = motor_.position();
@@ -664,11 +674,7 @@ void Drive::take_mode() {
 }
 
 void Drive::follow_set_point(double dt_s, std::int64_t now_ns) {
-  if (!homing_ && mode_ != objects_.get(0x6060)) {  // it was written while homing
-    take_mode();
-  }
   const auto quick = static_cast<double>(objects_.get(0x6085));
-  const bool slows_down = objects_.get(0x605A) == 1 || objects_.get(0x605A) == 5;
   limited_ = false;
   switch (state_) {
     case DriveState::operation_enabled:
@@ -679,7 +685,7 @@ void Drive::follow_set_point(double dt_s, std::int64_t now_ns) {
       }
       break;
     case DriveState::quick_stop_active:
-      stop_on_ramp(slows_down ? static_cast<double>(objects_.get(0x6084)) : quick, dt_s);
+      stop_on_ramp(dt_s);
       return;
     case DriveState::fault_reaction:
       motor_.brake(quick, dt_s);
@@ -716,13 +722,14 @@ void Drive::follow_set_point(double dt_s, std::int64_t now_ns) {
   }
 }
 
-void Drive::stop_on_ramp(double deceleration_counts_s2, double dt_s) {
+void Drive::stop_on_ramp(double dt_s) {
   const std::int64_t option = objects_.get(0x605A);
+  const bool slows_down = option == 1 || option == 5;
   if (option == 0) {
     go(DriveState::switch_on_disabled);
     return;
   }
-  motor_.brake(deceleration_counts_s2, dt_s);
+  motor_.brake(static_cast<double>(objects_.get(slows_down ? 0x6084 : 0x6085)), dt_s);
   demand_ = motor_.position();
   if (motor_.stands() && option < 5) {
     go(DriveState::switch_on_disabled);
@@ -734,7 +741,9 @@ void Drive::home(double dt_s) {
   const std::int64_t method = objects_.get(0x6098);
   if (!homing_ || homed_) {
     motor_.brake(ramp, dt_s);
-    homing_ = homing_ && !(homed_ && motor_.stands());
+    if (homed_ && motor_.stands()) {
+      end_homing();
+    }
     return;
   }
   if (method == 17 || method == 18) {

@@ -86,13 +86,14 @@ class Drive {
   void raise_fault(std::uint16_t code, std::uint8_t error_register);
   void link_lost(std::uint16_t code);
   void take_mode();
+  void end_homing();
   void communication_error(std::uint16_t code);
   void communication_back(std::uint16_t code);
   void emergency(std::uint16_t code);
   void advance(std::int64_t now_ns);
   void follow_set_point(double dt_s, std::int64_t now_ns);
   void home(double dt_s);
-  void stop_on_ramp(double deceleration_counts_s2, double dt_s);
+  void stop_on_ramp(double dt_s);
   void watch_time_outs(std::int64_t now_ns);
   void go(DriveState state);
   void send(std::uint32_t id, std::uint8_t size, const std::uint8_t* data);

@@ -8,7 +8,7 @@
 namespace punctum::rt {
 namespace {
 
-constexpr double kSoftHysteresis = 0.9;  // of the soft limit of the tip force: its noise is less than a tenth
+constexpr double kSoftHysteresis = 0.9;  // of the soft limit of the tip force, so that it does not flicker
 constexpr double kLongestStep = 2;       // nominal periods: a late tick is no licence for a leap
 
 // What is left of `last`, straight towards zero by `falls` at most, of what `wanted` has no more of.

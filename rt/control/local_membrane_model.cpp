@@ -18,8 +18,8 @@ constexpr double kLetGo = 0.8;
 // Before the needle touches a cell it may be pushed by its holder; a cell that is further off than half its
 // radius is another one.
 constexpr double kStrayPart = 0.5;
-// Width of the dimple over sqrt(2 R w_d), which a sphere that is cut flat has: 0.45 at the cells of the
-// paper.
+// Width of the dimple over sqrt(2 R w_d), the width of a sphere that is cut flat at that depth. A scene says
+// 0.6 where nobody has measured it; a dimple far from that is a wrong contour.
 constexpr double kScaleMin = 0.1;
 constexpr double kScaleMax = 3;
 // Stage minus picture: a change slower than this time constant is drift. After a disagreement, the two agree

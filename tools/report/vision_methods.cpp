@@ -22,7 +22,7 @@ std::vector<VisionMethod> vision_methods() {
        {8, 16, 32, 64, 128},
        {16, 64},
        [](VisionConfig c, double nodes, int w, int h) {
-         c.refine = false;
+         c.method = vision::Method::paper;
          c.snake.nodes = static_cast<int>(nodes);
          return tracked(c, w, h);
        }},
@@ -31,7 +31,7 @@ std::vector<VisionMethod> vision_methods() {
        {1, 2, 4},
        {},
        [](VisionConfig c, double radius, int w, int h) {
-         c.refine = false;
+         c.method = vision::Method::paper;
          c.snake.nodes = 64;
          c.snake.radius_px = static_cast<int>(radius);
          return tracked(c, w, h);

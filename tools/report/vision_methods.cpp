@@ -17,7 +17,7 @@ std::vector<VisionMethod> vision_methods() {
   using vision::VisionConfig;
   const VisionConfig shipped;
   return {
-      {"greedy snake",
+      {"paper's method",
        "{} nodes",
        {8, 16, 32, 64, 128},
        {16, 64},
@@ -26,7 +26,7 @@ std::vector<VisionMethod> vision_methods() {
          c.snake.nodes = static_cast<int>(nodes);
          return tracked(c, w, h);
        }},
-      {"greedy snake (64 nodes)",
+      {"paper's method (64 nodes)",
        "search +-{} px",
        {1, 2, 4},
        {},

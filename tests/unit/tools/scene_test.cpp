@@ -385,7 +385,8 @@ const std::vector<Broken>& broken() {
        "b.toml:9:7: camera.fps: is too fast for the servo, allowed: at most rate_hz / 2 = 500"},
       {"truth of recorded frames",
        kLeast + "[camera]\ndevice = \"recorded\"\nframes = \"f\"\n[vision]\nmethod = \"truth\"\n",
-       "b.toml:9:10: vision.method: \"truth\" is known of a simulated camera only, allowed: \"paper\" or \"tracker\""},
+       "b.toml:9:10: vision.method: \"truth\" is known of a simulated camera only, allowed: \"paper\" or "
+       "\"tracker\""},
       {"recorded frames from nowhere", kLeast + "[camera]\ndevice = \"recorded\"\n[vision]\n",
        "b.toml:5:2: camera.frames: is missing, allowed: a folder, a glob or a video file"},
       {"recorded frames in virtual time",

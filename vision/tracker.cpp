@@ -30,9 +30,9 @@ constexpr double kUntouched_px = 12;      // further outside, nothing touches th
 constexpr double kLeastDimple_px = 0.7;   // depth from which the width of a dimple can be measured
 constexpr double kNear_px = 8;            // nearer, the needle may touch the membrane
 constexpr double kTipNoise_px = 0.1;
-// The paper keeps the large variations of the gradient only. Of the usual edge of a membrane: a share of a
-// half makes needle and cell merge when they are still 4 px apart, this one 2 px.
-constexpr double kLargeGradient = 0.75;
+// The paper keeps the large variations of the gradient only. Of the usual edge of a membrane: with 0.4 needle
+// and cell merge when they are still 4 px apart, with 0.75 they part again over a deep dimple.
+constexpr double kLargeGradient = 0.6;
 
 Side opposite(Side side) { return side == Side::right ? Side::left : Side::right; }
 

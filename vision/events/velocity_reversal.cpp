@@ -6,12 +6,13 @@ namespace punctum::vision {
 
 bool VelocityReversal::update(bool contact, const std::optional<MembraneAtNeedle>& now) {
   velocity_px_s_ = 0;
-  if (!contact) {
-    *this = VelocityReversal(least_px_);
-    return false;
-  }
   if (!now) {
     return punctured_;
+  }
+  const bool outside = (now->membrane - now->tip).dot(now->axis) > 0;
+  if (!contact && outside) {
+    *this = VelocityReversal(least_px_);
+    return false;
   }
   if (last_ && now->t_ns > last_->t_ns) {
     const double moved = (now->membrane - last_->membrane).dot(now->axis);

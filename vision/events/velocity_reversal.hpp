@@ -21,8 +21,8 @@ class VelocityReversal {
   // least_px: motion of the membrane between two frames, against the needle, that is a reversal.
   explicit VelocityReversal(double least_px) : least_px_(least_px) {}
 
-  // now: empty where needle or contact points are not seen. True from the puncture until needle and cell
-  // touch no longer.
+  // now: empty where needle or contact points are not seen. True from the puncture until the tip is outside
+  // the membrane and the classes have parted.
   bool update(bool contact, const std::optional<MembraneAtNeedle>& now);
   // 0 unless this frame and one before it show the membrane at the needle.
   [[nodiscard]] double membrane_velocity_px_s() const noexcept { return velocity_px_s_; }

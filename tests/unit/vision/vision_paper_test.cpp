@@ -254,6 +254,14 @@ TEST(VelocityReversal,
   EXPECT_TRUE(s.step(9, 12));  // and the next one is told
 }
 
+TEST(VelocityReversal, does_not_forget_the_push_while_the_classes_part_over_a_deep_dimple) {
+  Frames s;
+  s.push(12);
+  EXPECT_FALSE(s.step(13, 14, false));  // the contact points still lie behind the tip
+  EXPECT_FALSE(s.step(14, 15, false));
+  EXPECT_TRUE(s.step(9, 15, false));
+}
+
 TEST(VelocityReversal, is_no_puncture_when_the_membrane_follows_a_needle_that_withdraws) {
   Frames s;
   s.push(12);

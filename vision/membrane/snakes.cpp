@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <initializer_list>
 #include <opencv2/core.hpp>
 #include <utility>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "vision/image/median.hpp"
 #include "vision/image/snake.hpp"
 #include "vision/image/spline.hpp"
+#include "vision/membrane/edge_candidates.hpp"
 
 namespace punctum::vision {
 

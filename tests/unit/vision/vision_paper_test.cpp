@@ -165,7 +165,7 @@ TEST(PaperMethod, comes_to_rest_where_equation_three_with_the_squared_gradient_i
 TEST(PaperMethod, bridges_an_erased_arc_instead_of_shrinking_there) {
   const RoundCell cell;
   const VisionConfig config = config_of_the_cell_alone();
-  const Polygon pipette{{215, 128}, {320, 128}, {320, 152}, {215, 152}};  // over the node at angle 0
+  const Polygon pipette{{231, 128}, {320, 128}, {320, 152}, {231, 152}};  // over the node at angle 0
   const ClearedPicture picture = cleared(picture_of(cell), {pipette});
   FollowedMembrane m;
   m.known = true;

@@ -14,10 +14,9 @@ namespace {
 
 constexpr double kSaturation = 0.7;   // times the usual edge: a stronger one is not better
 constexpr double kBesideHalf = 0.24;  // rad to either side of the entry: the steep part of a dimple
-constexpr double kHardlySunk =
-    0.15;                          // of the tip's depth: a dimple's steep part is two to five times as deep
-constexpr double kNearHalf = 0.5;  // rad to either side of the entry: the dimple and its rim
-constexpr double kApart_px = 1.5;  // nearer, two paths are the same edge
+constexpr double kHardlySunk = 0.15;  // of the tip's depth; the steep part of a dimple is deeper
+constexpr double kNearHalf = 0.5;     // rad to either side of the entry: the dimple and its rim
+constexpr double kApart_px = 1.5;     // nearer, two paths are the same edge
 
 }  // namespace
 

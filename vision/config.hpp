@@ -9,8 +9,10 @@
 
 namespace punctum::vision {
 
+// tracker: all that goes beyond the paper, and what ships.
+// paper: the paper's method and nothing else, to compare with.
 // truth: the observation comes from the simulated world, and no picture is drawn.
-enum class Method : std::uint8_t { paper, truth };
+enum class Method : std::uint8_t { paper, tracker, truth };
 
 // Border of the picture.
 enum class Side : std::uint8_t { automatic, left, right };
@@ -43,16 +45,16 @@ constexpr auto keys_of(const SnakeParams*) {
 }
 
 struct VisionConfig {
-  Method method = Method::paper;
+  Method method = Method::tracker;
   double pixel_m = 0.825e-6;
   std::optional<HolderVision> holder = HolderVision{};
   bool needle = true;                  // an injection pipette is in the scene
   Side needle_from = Side::automatic;  // the border it enters through; the holder enters through the other
   bool inner = true;                   // the inner membrane is followed too
   SnakeParams snake;
-  bool refine = true;        // beyond the paper: the contour follows the edge, sub-pixel, at every angle
   int contour_points = 256;  // of a closed contour, at least 128
-  int dilation_px = 4;       // vertical, before the classes of needle and cell are labelled
+  int dilation_px = 4;  // rows of the vertical element that dilates needle and cell before they are labelled;
+                        // the tracker takes one more, so that the element has a middle
   double puncture_px = 1.5;  // least recoil of the contact points against the needle at a puncture
   double R_min_m = 35e-6;    // radii of the circular Hough transform, outer membrane
   double R_max_m = 80e-6;
@@ -64,10 +66,10 @@ struct VisionConfig {
   [[nodiscard]] double px(double m) const noexcept { return m / pixel_m; }
 };
 constexpr auto keys_of(const VisionConfig*) {
-  return hal::keys(hal::choice("method", &VisionConfig::method, "paper", "truth"),
+  return hal::keys(hal::choice("method", &VisionConfig::method, "paper", "tracker", "truth"),
                    hal::flag("needle", &VisionConfig::needle),
                    hal::choice("needle_from", &VisionConfig::needle_from, "automatic", "left", "right"),
-                   hal::flag("inner", &VisionConfig::inner), hal::flag("refine", &VisionConfig::refine),
+                   hal::flag("inner", &VisionConfig::inner),
                    hal::whole("contour_points", &VisionConfig::contour_points, 128, 4096),
                    hal::whole("dilation_px", &VisionConfig::dilation_px, 0, 40),
                    hal::real("puncture_px", &VisionConfig::puncture_px, 0.1, 50),

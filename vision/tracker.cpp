@@ -7,11 +7,14 @@
 #include "vision/events/contact.hpp"
 #include "vision/events/phase.hpp"
 #include "vision/events/puncture.hpp"
+#include "vision/events/velocity_reversal.hpp"
 #include "vision/image/median.hpp"
 #include "vision/image/polar_contour.hpp"
+#include "vision/membrane/contact_points.hpp"
 #include "vision/membrane/dimple.hpp"
 #include "vision/membrane/membrane_on_needle.hpp"
 #include "vision/membrane/membrane_start.hpp"
+#include "vision/membrane/snakes.hpp"
 #include "vision/pipettes/holding_pipette.hpp"
 #include "vision/pipettes/injection_pipette.hpp"
 #include "vision/pipettes/wide_tube.hpp"
@@ -27,6 +30,9 @@ constexpr double kUntouched_px = 12;      // further outside, nothing touches th
 constexpr double kLeastDimple_px = 0.7;   // depth from which the width of a dimple can be measured
 constexpr double kNear_px = 8;            // nearer, the needle may touch the membrane
 constexpr double kTipNoise_px = 0.1;
+// The paper keeps the large variations of the gradient only. Of the usual edge of a membrane: with 0.4 needle
+// and cell merge when they are still 4 px apart, with 0.75 they part again over a deep dimple.
+constexpr double kLargeGradient = 0.6;
 
 Side opposite(Side side) { return side == Side::right ? Side::left : Side::right; }
 
@@ -58,6 +64,8 @@ struct Tracker::Impl {
   bool was_contact = false;
   Puncture puncture;
   InnerPuncture inner_puncture;
+  VelocityReversal reversal, inner_reversal;  // in place of the two, as the paper has it
+  bool punctured = false;                     // the outer membrane
 
   Impl(const VisionConfig& c, int w, int h)
       : config(checked(c)),
@@ -65,7 +73,9 @@ struct Tracker::Impl {
         height(h),
         holder(c.holder.value_or(HolderVision{})),
         needle(c.needle_from, c.px(c.c_m)),
-        puncture(c.puncture_px) {
+        puncture(c.puncture_px),
+        reversal(c.puncture_px),
+        inner_reversal(c.puncture_px) {
     cv::setNumThreads(1);
   }
 
@@ -77,6 +87,7 @@ struct Tracker::Impl {
   [[nodiscard]] cv::Rect area_to_search(bool starting) const;
   void locate_needle();
   void locate_holder();
+  [[nodiscard]] Point end_of_holder() const;
   void clear_picture(double needle_margin);
   [[nodiscard]] bool start();
   void follow_membranes(Stopwatch& watch);
@@ -87,6 +98,9 @@ struct Tracker::Impl {
   [[nodiscard]] std::optional<double> look_for_contact();
   [[nodiscard]] std::optional<InnerOnNeedle> inner_on_needle() const;
   void classify_contact(const std::optional<double>& membrane_behind_tip);
+  void events_of_the_paper();
+  void events_without_the_cell();
+  void measure_depth(double membrane_px);
   void decide_phase();
 };
 
@@ -144,18 +158,22 @@ const Result& Tracker::Impl::process(const hal::Frame& frame) {
     measure();
     result.us.measure = watch.lap_us();
     const bool untouched = result.gap_px && *result.gap_px > kUntouched_px;
-    std::optional<double> membrane_behind_tip;
-    if (result.needle.ok && result.outer.ok && !untouched) {
-      membrane_behind_tip = look_for_contact();
+    if (config.method == Method::paper) {
+      events_of_the_paper();
       result.us.contact = watch.lap_us();
+    } else {
+      std::optional<double> membrane_behind_tip;
+      if (result.needle.ok && result.outer.ok && !untouched) {
+        membrane_behind_tip = look_for_contact();
+        result.us.contact = watch.lap_us();
+      }
+      classify_contact(membrane_behind_tip);
     }
-    classify_contact(membrane_behind_tip);
     if (result.needle.ok && !result.contact && (untouched || !result.gap_px)) {
       needle.learn(picture.field, result.needle, picture.noise);
     }
   } else {
-    result.punctured = puncture.update({.t_ns = result.exposure_ns});
-    result.inner_punctured = inner_puncture.update(result.punctured, std::nullopt, 0);
+    events_without_the_cell();
   }
   decide_phase();
   result.verdict = verdict_on(result, config);
@@ -188,7 +206,7 @@ void Tracker::Impl::locate_needle() {
   }
   NeedlePose& n = result.needle;
   n = needle.find(picture.field, picture.noise);
-  if (n.ok && was_contact && !puncture.punctured() && outer.known) {
+  if (config.method == Method::tracker && n.ok && was_contact && !punctured && outer.known) {
     n.tip += membrane_ahead_of_tip(picture.field, n, outer.polarity, outer.level) * n.axis;
   }
 }
@@ -217,13 +235,25 @@ void Tracker::Impl::locate_holder() {
   }
 }
 
+// To which the holding pipette is erased. The paper's snake needs the membrane that the pipette touches:
+// there the contact with the membrane is the end of what is erased.
+Point Tracker::Impl::end_of_holder() const {
+  constexpr double kInto_px = 2;  // the blur of the pipette's face reaches so far
+  const Point mouth = picture.holder_face->mouth, axis = holder_tube->axis;
+  if (config.method != Method::paper || !outer.known) {
+    return mouth;
+  }
+  const auto membrane = entry_point(outer.contour(), mouth, axis);
+  return membrane ? mouth - std::max(0.0, (mouth - *membrane).dot(axis) - kInto_px) * axis : mouth;
+}
+
 void Tracker::Impl::clear_picture(double needle_margin) {
   std::vector<Polygon> pipettes;
   if (result.needle.ok) {
     pipettes.push_back(needle_polygon(result.needle, picture.grey.size(), needle_margin, 1.5));
   }
   if (picture.holder_face) {
-    pipettes.push_back(holder_polygon(*holder_tube, picture.holder_face->mouth, picture.grey.size(), 2, -1));
+    pipettes.push_back(holder_polygon(*holder_tube, end_of_holder(), picture.grey.size(), 2, -1));
   }
   picture.cover(pipettes);
 
@@ -233,14 +263,16 @@ void Tracker::Impl::clear_picture(double needle_margin) {
       membranes.push_back(m->contour());
     }
   }
-  const double strong = std::max(5 * picture.gradient_noise, 0.25 * std::max(outer.level, inner.level));
+  const double share = config.method == Method::paper ? kLargeGradient : 0.25;
+  const double strong = std::max(5 * picture.gradient_noise, share * std::max(outer.level, inner.level));
   const double cell_r = median_of(outer.known ? outer.r : inner.r);
   result.impurities = picture.cover_impurities(membranes, strong, 0.45 * cell_r);
 }
 
 bool Tracker::Impl::start() {
   const RestOutline outer_rest = std::move(outer.rest), inner_rest = std::move(inner.rest);
-  StartedMembranes begun = start_membranes(picture, config, seed);
+  StartedMembranes begun = config.method == Method::paper ? start_snakes(picture, config, seed)
+                                                          : start_membranes(picture, config, seed);
   outer = std::move(begun.outer);
   inner = std::move(begun.inner);
   result.outer.reason = begun.reason;
@@ -249,7 +281,7 @@ bool Tracker::Impl::start() {
   }
   // The learnt rest shape is kept if this is the same cell in the same place. It is learnt anew if only a few
   // frames told it, or if nothing touches the cell now.
-  const bool needed = was_contact || puncture.punctured() || result.phase != rt::Phase::free;
+  const bool needed = was_contact || punctured || result.phase != rt::Phase::free;
   if (outer.known && needed && outer_rest.reliable() &&
       undeformed.same_cell(outer.contour(), outer.centre, result.needle)) {
     outer.rest = outer_rest;
@@ -264,18 +296,30 @@ bool Tracker::Impl::start() {
 Surroundings Tracker::Impl::surroundings() const {
   return {.needle = result.needle,
           .last_tip = tip.last,
-          .punctured = puncture.punctured(),
+          .punctured = punctured,
           .undeformed = undeformed.shape() ? &*undeformed.shape() : nullptr};
 }
 
 void Tracker::Impl::follow_membranes(Stopwatch& watch) {
+  if (config.method == Method::paper) {
+    if (result.needle.ok && outer.known) {
+      result.points = contact_points(picture, result.needle, outer.contour(), outer.level);
+    }
+    result.outer = follow_snake(outer, picture, config, result.points);
+    result.us.outer = watch.lap_us();
+    if (config.inner) {
+      result.inner = follow_snake(inner, picture, config, {});
+      result.us.inner = watch.lap_us();
+    }
+    return;
+  }
   Surroundings around_outer = surroundings();
   around_outer.within = &inner;
   result.outer = follow(outer, picture, config, around_outer);
   result.us.outer = watch.lap_us();
   if (config.inner) {
     const bool outer_seen = outer.known && result.outer.ok;
-    if (config.refine && outer_seen && (!inner.known || inner.lost())) {
+    if (outer_seen && (!inner.known || inner.lost())) {
       if (auto begun = start_inner(picture, config, outer)) {
         begun->rest = std::move(inner.rest);
         inner = std::move(*begun);
@@ -322,7 +366,7 @@ int Tracker::Impl::fit_undeformed_membrane() {
   if (!now) {
     return 0;
   }
-  const bool touched = entry || was_contact || puncture.punctured() || needle_hidden();
+  const bool touched = entry || was_contact || punctured || needle_hidden();
   const Point shift = undeformed.update(*now, touched, mouth);
   for (FollowedMembrane* m : {&outer, &inner}) {
     m->rest.centre += shift;
@@ -354,7 +398,7 @@ void Tracker::Impl::measure_gap(int fitted_points) {
 std::optional<double> Tracker::Impl::look_for_contact() {
   // The paper's test: needle and cell are two classes until they touch.
   const Contour& contour = result.outer.contour;
-  result.merged = needle_merges_with_cell(picture, result.needle, contour, config.dilation_px);
+  result.merged = needle_merges_with_cell(picture, result.needle, contour, config.dilation_px + 1);
   result.contact = touches(result.gap_px, result.merged, was_contact);
   const MembraneOnNeedle on_needle =
       membrane_on_needle(picture, result.needle, contour, outer.polarity, outer.level);
@@ -397,21 +441,63 @@ void Tracker::Impl::classify_contact(const std::optional<double>& membrane_behin
     in.membrane_px = in.tip_px - *membrane_behind_tip;
     in.depth_px = in.membrane_px;
   }
-  result.punctured = puncture.update(in);
+  punctured = result.punctured = puncture.update(in);
   result.inner_punctured =
       inner_puncture.update(result.punctured, inner_on_needle(), result.needle.half_width);
   result.membrane_velocity_px_s = puncture.membrane_velocity_px_s();
   was_contact = in.contact;
+  measure_depth(in.depth_px);
+}
+
+// membrane_px: depth of the contact points past the undeformed membrane.
+void Tracker::Impl::measure_depth(double membrane_px) {
   if (!result.gap_px) {
     return;
   }
   // Until the puncture the membrane lies on the tip. Afterwards its contour tells the rest of the dimple.
-  const double depth = result.punctured ? in.depth_px : -*result.gap_px;
+  const double depth = result.punctured ? membrane_px : -*result.gap_px;
   result.wd_px = result.contact ? std::max(0.0, depth) : 0.0;
   if (*result.wd_px > kLeastDimple_px) {
     result.a_px = dimple_half_width(result.outer.contour, *undeformed.shape(), *result.entry, *result.wd_px,
                                     result.needle.half_width);
   }
+}
+
+// The cell is not found.
+void Tracker::Impl::events_without_the_cell() {
+  if (config.method == Method::paper) {
+    result.punctured = reversal.update(was_contact, std::nullopt);
+    result.inner_punctured = inner_reversal.update(result.punctured, std::nullopt);
+  } else {
+    result.punctured = puncture.update({.t_ns = result.exposure_ns});
+    result.inner_punctured = inner_puncture.update(result.punctured, std::nullopt, 0);
+  }
+  punctured = result.punctured;
+}
+
+// Contact is when the two classes merge; a membrane is punctured when the velocity of its contact points
+// reverses.
+void Tracker::Impl::events_of_the_paper() {
+  const NeedlePose& n = result.needle;
+  std::optional<MembraneAtNeedle> outer_now, inner_now;
+  double behind_tip = 0;
+  if (n.ok && result.outer.ok) {
+    result.merged = needle_merges_with_cell(picture, n, result.outer.contour, config.dilation_px);
+    result.contact = result.merged;
+    const auto& [left, right] = result.points.point;
+    if (left && right) {
+      outer_now = {result.exposure_ns, 0.5 * (*left + *right), n.tip, n.axis};
+      behind_tip = 0.5 * (result.points.behind_tip[0] + result.points.behind_tip[1]);
+    }
+    if (const auto seen = inner_on_needle()) {
+      inner_now = {result.exposure_ns, n.at(seen->behind_tip_px, 0), n.tip, n.axis};
+    }
+  }
+  was_contact = needle_hidden() ? was_contact : result.contact;
+  punctured = result.punctured = reversal.update(was_contact, outer_now);
+  result.inner_punctured = inner_reversal.update(result.punctured, inner_now);
+  result.membrane_velocity_px_s = reversal.membrane_velocity_px_s();
+  measure_depth(-result.gap_px.value_or(0) - behind_tip);
 }
 
 void Tracker::Impl::decide_phase() {

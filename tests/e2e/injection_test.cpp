@@ -27,7 +27,7 @@ TEST_F(Programs, an_injection_that_the_relay_breaks_off_is_begun_anew) {
 }
 
 TEST_F(Programs, an_injection_goes_through_its_phases_in_order) {
-  for (const char* method : {"truth", "paper"}) {
+  for (const char* method : {"truth", "tracker"}) {
     ASSERT_EQ(punctum({"run", "icsi", "--clock", "virtual", "--set", std::string("vision.method=") + method}),
               0)
         << said_;
@@ -59,7 +59,7 @@ TEST_F(Programs, an_injection_of_nothing_is_not_done) {
 }
 
 TEST_F(Programs, the_same_seed_gives_the_same_bytes_with_vision_in_the_loop) {
-  for (const char* method : {"truth", "paper"}) {
+  for (const char* method : {"truth", "tracker"}) {
     const Strings args{"run",     "icsi",
                        "--clock", "virtual",
                        "--seed",  "3",

@@ -32,7 +32,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if ((data[2] & 4) != 0) {
     config.holder.reset();
   }
-  config.refine = (data[2] & 8) == 0;
+  config.method = (data[2] & 8) == 0 ? vision::Method::tracker : vision::Method::paper;
   config.R_min_m = (data[2] & 16) != 0 ? 10e-6 : 35e-6;
   vision::Tracker tracker(config, width, height);
   const std::size_t bytes = size - 3;

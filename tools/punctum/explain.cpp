@@ -251,7 +251,8 @@ std::string frame_text(const Scene& s) {
   out += fmt::format("  {}{}impurities, outer membrane{} (snake, {} nodes{}), {}w_d, a, R\n",
                      v.holder ? "holding pipette (correlation), " : "",
                      v.needle ? "injection pipette and tip, erase pipettes, " : "",
-                     v.inner ? " and inner membrane" : "", v.snake.nodes, v.refine ? ", refined" : "",
+                     v.inner ? " and inner membrane" : "", v.snake.nodes,
+                     v.method == vision::Method::tracker ? ", refined" : "",
                      v.needle ? "contact, puncture, " : "");
   const int far = vision_stages(v);
   return out + (v.needle
@@ -273,7 +274,7 @@ std::string left_out_text(const Scene& s) {
       }
     }
   }
-  if (s.vision && s.vision->method == vision::Method::paper && !s.vision->inner) {
+  if (s.vision && s.vision->method != vision::Method::truth && !s.vision->inner) {
     absent += fmt::format("  {:<15} {}\n", "vision.inner", "no edge is looked for inside the outer membrane");
   }
   return absent.empty() ? ""

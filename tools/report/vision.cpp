@@ -272,7 +272,7 @@ void Output::add_noise_level(const std::vector<Trial>& trials, const Measurement
       add_point("closed path (shipped)", noise, works[i].error, Style::line_points);
     }
     if (is_paper(t, m)) {
-      add_point("greedy snake (16 nodes)", noise, works[i].error, Style::line_points);
+      add_point("the paper's method (16 nodes)", noise, works[i].error, Style::line_points);
     }
   }
   const std::string bound_name = fmt::format("Cramer-Rao, {} modes", kModes);
@@ -301,7 +301,8 @@ std::string reading(const Measurement& m, const Trial& shipped, const Trial& pap
   return fmt::format(
       "At noise {:g} the shipped tracker sees the outer membrane to {:.2f} um rms ({:.1f} times the "
       "Cramer-Rao "
-      "bound) in {:.1f} ms a frame, a start takes {:.0f} ms; the paper's 16-node snake errs by {:.2f} um in "
+      "bound) in {:.1f} ms a frame, a start takes {:.0f} ms; the paper's method, a snake of 16 nodes, errs "
+      "by {:.2f} um in "
       "{:.1f} ms; what is seen puts the force {:.0f} % off; on this front: {}. {}",
       shipped.noise, shipped.outer_frames.rms(),
       shipped.outer_frames.rms() / contour_bound_um(shipped.noise, shipped.length_px, lens),

@@ -17,21 +17,21 @@ std::vector<VisionMethod> vision_methods() {
   using vision::VisionConfig;
   const VisionConfig shipped;
   return {
-      {"greedy snake",
+      {"paper's method",
        "{} nodes",
        {8, 16, 32, 64, 128},
        {16, 64},
        [](VisionConfig c, double nodes, int w, int h) {
-         c.refine = false;
+         c.method = vision::Method::paper;
          c.snake.nodes = static_cast<int>(nodes);
          return tracked(c, w, h);
        }},
-      {"greedy snake (64 nodes)",
+      {"paper's method (64 nodes)",
        "search +-{} px",
        {1, 2, 4},
        {},
        [](VisionConfig c, double radius, int w, int h) {
-         c.refine = false;
+         c.method = vision::Method::paper;
          c.snake.nodes = 64;
          c.snake.radius_px = static_cast<int>(radius);
          return tracked(c, w, h);

@@ -277,7 +277,8 @@ Found check_zaber(const Scene& s) {
 
 Found check_backends(const Scene& s) {
   if (s.vision && s.vision->method == vision::Method::truth && !s.simulated_camera()) {
-    return Problem{"vision.method", "\"truth\" is known of a simulated camera only, allowed: \"paper\""};
+    return Problem{"vision.method",
+                   "\"truth\" is known of a simulated camera only, allowed: \"paper\" or \"tracker\""};
   }
   if (s.clock == ClockKind::virtual_time) {
     if (s.recorded) {

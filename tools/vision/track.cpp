@@ -41,7 +41,9 @@ Or<vision::VisionConfig> vision_of(const TrackOptions& options) {
     return wrong(fmt::format("{}: it has no [vision], so there is nothing to look for", options.scene));
   }
   vision::VisionConfig config = *scene->vision;
-  config.method = vision::Method::paper;  // recorded pictures have no simulated truth
+  if (config.method == vision::Method::truth) {  // recorded pictures have none
+    config.method = vision::Method::tracker;
+  }
   return config;
 }
 

@@ -23,15 +23,15 @@ int largest_label(const std::vector<int>& count) {
 }  // namespace
 
 Classes merge_classes(const cv::Mat& binary, const cv::Mat& needle_pixels, const cv::Mat& cell_pixels,
-                      int dilation_px) {
+                      int rows) {
   Classes out;
   if (binary.empty() || needle_pixels.size() != binary.size() || cell_pixels.size() != binary.size()) {
     return out;
   }
   cv::Mat grown, labels;
-  if (dilation_px > 0) {
-    const cv::Mat column = cv::Mat::ones(dilation_px + 1, 1, CV_8U);
-    cv::dilate(binary, grown, column, cv::Point(0, dilation_px / 2), 1, cv::BORDER_CONSTANT, cv::Scalar(0));
+  if (rows > 1) {
+    const cv::Mat column = cv::Mat::ones(rows, 1, CV_8U);
+    cv::dilate(binary, grown, column, cv::Point(0, (rows - 1) / 2), 1, cv::BORDER_CONSTANT, cv::Scalar(0));
   } else {
     grown = binary;
   }
@@ -52,7 +52,7 @@ Classes merge_classes(const cv::Mat& binary, const cv::Mat& needle_pixels, const
 }
 
 bool needle_merges_with_cell(const ClearedPicture& picture, const NeedlePose& needle, const Contour& outer,
-                             int dilation_px) {
+                             int rows) {
   const Point offset(picture.field.area.x, picture.field.area.y);
   cv::Mat needle_pixels = cv::Mat::zeros(picture.strong.size(), CV_8U), cell_pixels = needle_pixels.clone();
   Polygon polygon = needle_polygon(needle, picture.grey.size(), 1.5, 0.5);
@@ -68,7 +68,7 @@ bool needle_merges_with_cell(const ClearedPicture& picture, const NeedlePose& ne
                  cv::Scalar(255), cv::FILLED);
     }
   }
-  return merge_classes(picture.strong, needle_pixels, cell_pixels, dilation_px).merged;
+  return merge_classes(picture.strong, needle_pixels, cell_pixels, rows).merged;
 }
 
 bool touches(const std::optional<double>& gap_px, bool merged, bool touched_before) {

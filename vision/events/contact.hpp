@@ -16,11 +16,12 @@ struct Classes {
 };
 
 // binary: CV_8U, 255 = strong gradient, with the pipettes, without the impurities. needle_pixels,
-// cell_pixels: CV_8U, > 0 where each is expected. dilation_px: height of the dilation.
+// cell_pixels: CV_8U, > 0 where each is expected. rows: height of the structuring element; 1 or less changes
+// nothing.
 [[nodiscard]] Classes merge_classes(const cv::Mat& binary, const cv::Mat& needle_pixels,
-                                    const cv::Mat& cell_pixels, int dilation_px);
+                                    const cv::Mat& cell_pixels, int rows);
 [[nodiscard]] bool needle_merges_with_cell(const ClearedPicture& picture, const NeedlePose& needle,
-                                           const Contour& outer, int dilation_px);
+                                           const Contour& outer, int rows);
 
 // Where the gap is known it decides, with hysteresis, and the merged classes confirm it; otherwise the merged
 // classes decide alone.

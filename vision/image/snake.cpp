@@ -83,7 +83,8 @@ struct Neighbourhood {
 
 }  // namespace
 
-Contour evolve(const cv::Mat& edge, Contour nodes, const SnakeParams& params, double floor) {
+Contour evolve(const cv::Mat& edge, Contour nodes, const SnakeParams& params, double floor,
+               const cv::Mat& erased) {
   const std::size_t n = nodes.size();
   if (n < 3 || edge.empty()) {
     return nodes;
@@ -102,6 +103,10 @@ Contour evolve(const cv::Mat& edge, Contour nodes, const SnakeParams& params, do
     spacing /= static_cast<double>(n);
     int moved = 0;
     for (std::size_t i = 0; i < n; ++i) {
+      const cv::Point at(static_cast<int>(nodes[i].x), static_cast<int>(nodes[i].y));
+      if (!erased.empty() && erased.at<std::uint8_t>(at) > 0) {
+        continue;
+      }
       around.fill(edge, nodes[(i + n - 1) % n], nodes[i], nodes[(i + 1) % n], spacing, radius);
       const std::size_t best = around.best(params, floor);
       if (best != around.here) {

@@ -18,8 +18,11 @@ namespace punctum::vision {
 [[nodiscard]] double external_energy(double g, double lo, double hi, double floor);
 
 // Returns the nodes where they come to rest, on whole pixels, after at most params.iterations iterations.
-// edge: Sobel magnitude, CV_32F, 0 where pipettes and impurities are. floor: spread of the magnitude that
-// noise alone makes, in the units of edge. Fewer than three nodes come back unchanged.
-[[nodiscard]] Contour evolve(const cv::Mat& edge, Contour nodes, const SnakeParams& params, double floor);
+// edge: what is large along the contour, CV_32F: the Sobel magnitude, or its square as in eq. 3; 0 where
+// pipettes and impurities are. floor: spread that noise alone makes, in the units of edge. erased (CV_8U; or
+// empty): a node on a pixel > 0 stays, since there only the bending would move it, and always inwards. Fewer
+// than three nodes come back unchanged.
+[[nodiscard]] Contour evolve(const cv::Mat& edge, Contour nodes, const SnakeParams& params, double floor,
+                             const cv::Mat& erased = {});
 
 }  // namespace punctum::vision

@@ -33,29 +33,6 @@ Contour snake_from(const Contour& nodes, const ClearedPicture& picture, const Sn
   return local;
 }
 
-// The paper's contour: the spline through the snake's nodes.
-void take_snake(FollowedMembrane& m, const ClearedPicture& picture, Membrane& out) {
-  const int angles = static_cast<int>(m.r.size());
-  out.contour = spline_through(m.nodes, angles);
-  const Point centre = centroid(out.contour);
-  const std::vector<double> r = polar_radii(out.contour, centre, angles);
-  const double area = signed_area(out.contour), before = signed_area(m.contour());
-  double strength = 0;
-  for (const Point& p : m.nodes) {
-    strength += cv::norm(picture.field.gradient(p)) / static_cast<double>(m.nodes.size());
-  }
-  if (r.empty() || area < 0.6 * before || area > 1.6 * before || strength < picture.edge_floor()) {
-    out.reason = "snake lost the edge";
-    m.known = false;
-    return;
-  }
-  m.centre = centre;
-  m.r = r;
-  out.support = 1;
-  out.visible = 1;
-  out.ok = true;
-}
-
 // Median motion of the nodes; 0 when it is less than the snake can tell.
 Point common_motion(const Contour& from, const Contour& to) {
   std::vector<double> dx, dy;
@@ -161,15 +138,9 @@ Membrane follow(FollowedMembrane& m, const ClearedPicture& picture, const Vision
     out.reason = "not found";
     return out;
   }
-  const Contour nodes =
-      config.refine || m.nodes.size() < 3 ? spline_through(m.contour(), config.snake.nodes) : m.nodes;
+  const Contour nodes = spline_through(m.contour(), config.snake.nodes);
   m.nodes = snake_from(nodes, picture, config.snake);
   out.nodes = m.nodes;
-  if (!config.refine) {
-    take_snake(m, picture, out);
-    return out;
-  }
-
   const Point shift = common_motion(nodes, m.nodes);
   const MembraneSearch search(m, picture, surroundings, shift);
   const EdgeFound found = pushed_or_free(search);

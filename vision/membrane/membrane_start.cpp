@@ -16,9 +16,8 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr int kCircles = 6;             // candidates that are tried
-constexpr double kCircleScore = 0.35;   // share of a circumference that must have voted
-constexpr double kInnerOfOuter = 0.86;  // radius of the inner membrane's first circle
+constexpr int kCircles = 6;            // candidates that are tried
+constexpr double kCircleScore = 0.35;  // share of a circumference that must have voted
 
 // For a dark line with a face on either side and no other edge. It is the zona, with a brighter space inside
 // and an ooplasm too faint to be seen; or else the rim of the ooplasm itself, which is as dark inside.
@@ -107,24 +106,6 @@ StartedMembranes tell_apart(const MainEdge& found, const ClearedPicture& picture
   return out;
 }
 
-// The paper's start: the snakes' first nodes are on circles.
-StartedMembranes start_by_snake(const Circle& circle, const VisionConfig& config) {
-  const auto start = [&config](const Circle& c) {
-    FollowedMembrane m;
-    m.known = true;
-    m.centre = c.centre;
-    m.r.assign(static_cast<std::size_t>(config.contour_points), c.r);
-    m.nodes = circle_contour(c, config.snake.nodes);
-    return m;
-  };
-  StartedMembranes out;
-  out.outer = start(circle);
-  if (config.inner) {
-    out.inner = start({circle.centre, kInnerOfOuter * circle.r, 0});
-  }
-  return out;
-}
-
 // The gradient (grey levels per px) below which seven tenths of the picture are.
 double texture(const GradientField& field) {
   cv::Mat sample;
@@ -162,9 +143,6 @@ StartedMembranes start_membranes(const ClearedPicture& picture, const VisionConf
     nothing.reason = "no circle found between " + std::to_string(std::lround(config.px(config.R_min_m))) +
                      " and " + std::to_string(std::lround(config.px(config.R_max_m))) + " px radius";
     return nothing;
-  }
-  if (!config.refine) {
-    return start_by_snake(circles.front(), config);
   }
   // A long cell gives a circle at either end: the mean of the circles is tried as well.
   if (circles.size() > 2) {

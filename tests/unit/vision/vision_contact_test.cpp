@@ -50,6 +50,19 @@ TEST(Contact, vertical_dilation_joins_the_needles_two_walls) {
   EXPECT_TRUE(merge_classes(m.binary, one, lower, 4).merged);
 }
 
+// An element of n rows closes gaps of up to n - 1 rows; of the paper's 4 rows, 3.
+TEST(Contact, joins_over_as_many_rows_as_the_element_is_high_less_one) {
+  for (const int rows : {1, 2, 3, 4, 5}) {
+    for (int gap = 0; gap <= 6; ++gap) {
+      cv::Mat upper(40, 40, CV_8U, cv::Scalar(0)), lower = upper.clone();
+      upper(cv::Rect(5, 10, 30, 2)).setTo(255);
+      lower(cv::Rect(5, 12 + gap, 30, 2)).setTo(255);
+      EXPECT_EQ(merge_classes(upper | lower, upper, lower, rows).merged, gap <= rows - 1)
+          << rows << " " << gap;
+    }
+  }
+}
+
 TEST(Contact, is_not_found_in_empty_pictures) {
   EXPECT_FALSE(merge_classes(cv::Mat(), cv::Mat(), cv::Mat(), 4).merged);
   const cv::Mat none(10, 10, CV_8U, cv::Scalar(0));

@@ -14,7 +14,9 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr float kForbidden = 1e6F;   // cost of a sample outside the limits
+constexpr float kForbidden = 1e6F;  // cost of a sample outside the limits
+constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+constexpr float kNoWay = std::numeric_limits<float>::max();
 constexpr double kAnchorWeight = 4;  // in the smoothing; an edge weighs at most 1
 constexpr double kAnchorStiffness = 0.3;
 constexpr double kBridgeWeight = 0.01;  // of the straight bridge over an arc without edges
@@ -55,10 +57,10 @@ class BandSearch {
   }
 
   void set_rays();
-  [[nodiscard]] double visibility(std::size_t angle, const Point& p, double r) const;
   void sample_edges();
   void set_costs(double floor, double saturation);
   void find_shortest_closed_path();
+  void cheapest_steps(const std::vector<float>& before, const std::vector<float>& bend);
   void find_shortest_path(int from, int fixed, const std::vector<float>& bend);
   [[nodiscard]] int top_of_edge(int i) const;
   [[nodiscard]] double vertex_beside(int i, int j) const;
@@ -72,12 +74,14 @@ class BandSearch {
   const EdgeBand& band_;
   Polarity polarity_;
   int n_, m_, half_;
-  std::vector<Point> ray_, normal_;  // per angle, unit
-  double arc_ = 0;                   // between two angles, px
-  std::vector<float> edge_, cost_;   // per sample; edge: grey levels per px
-  std::vector<double> shown_;        // > 0: this angle is visible near the middle of the band
-  std::vector<int> path_;            // offset per angle
-  std::vector<double> weight_;       // per angle, in the smoothing
+  std::vector<Point> ray_, normal_;          // per angle, unit
+  double arc_ = 0;                           // between two angles, px
+  std::vector<float> edge_, cost_;           // per sample; edge: grey levels per px
+  std::vector<std::uint8_t> shown_;          // 1: this angle is visible near the middle of the band
+  std::vector<int> path_;                    // offset per angle
+  std::vector<float> before_, best_, step_;  // of the shortest path: one angle's samples
+  std::vector<std::int8_t> back_;            // per sample: the step that led there
+  std::vector<double> weight_;               // per angle, in the smoothing
   EdgePath out_;
 };
 
@@ -101,43 +105,46 @@ void BandSearch::set_rays() {
   }
 }
 
-double BandSearch::visibility(std::size_t angle, const Point& p, double r) const {
-  const cv::Rect& a = field_.area;
-  // The gradient is not known within one pixel of the border of the field.
-  if (p.x < a.x + 1 || p.y < a.y + 1 || p.x > a.x + a.width - 2 || p.y > a.y + a.height - 2) {
-    return 0;
-  }
-  const bool hidden_ray = !band_.hidden.empty() && band_.hidden[angle] != 0;
-  if (!(r > 2) || hidden_ray) {
-    return 0;
-  }
-  return band_.visible ? band_.visible(p) : 1;
-}
-
+// Whether the rays are visible, and the edge there. Nothing is visible within one pixel of the border of the
+// field, where the gradient is not known, and near the centre. What does not change is in variables of its
+// own: this is where a frame's time goes.
 void BandSearch::sample_edges() {
-  const std::size_t samples = static_cast<std::size_t>(n_) * static_cast<std::size_t>(m_);
-  edge_.resize(samples);
-  cost_.resize(samples);
-  shown_.assign(band_.middle.size(), 0.0);
-  for (int i = 0; i < n_; ++i) {
-    const std::size_t a = angle(i);
+  const std::size_t m = static_cast<std::size_t>(m_), samples = band_.middle.size() * m;
+  edge_.assign(samples, 0.0F);
+  cost_.assign(samples, 1.0F);
+  shown_.assign(band_.middle.size(), 0);
+  const cv::Rect& area = field_.area;
+  const double left = area.x + 1, top = area.y + 1;
+  const double right = area.x + area.width - 2, bottom = area.y + area.height - 2;
+  const cv::Mat &gx = field_.gx, &gy = field_.gy, &covered = band_.covered;
+  const double sign = polarity_ == Polarity::darker_out ? -1 : 1, step = band_.step;
+  const Point centre = band_.centre;
+  const int first_near = half_ - half_ / 2, last_near = half_ + half_ / 2;
+  for (std::size_t a = 0; a < band_.middle.size(); ++a) {
+    const Point ray = ray_[a], normal = sign * normal_[a];
+    const double middle = band_.middle[a];
+    const double lower = band_.lower.empty() ? -kNoLimit : band_.lower[a];
+    const double upper = band_.upper.empty() ? kNoLimit : band_.upper[a];
+    const bool hidden_ray = !band_.hidden.empty() && band_.hidden[a] != 0;
+    float *edge = edge_.data() + a * m, *cost = cost_.data() + a * m;
+    bool shown_near = false;
     for (int j = 0; j < m_; ++j) {
-      const double r = radius(i, j);
-      const Point p = band_.centre + r * ray_[a];
-      const double v = visibility(a, p, r);
-      double e = 0;
-      if (v > 0) {
-        e = field_.gradient(p).dot(normal_[a]);
-        e = polarity_ == Polarity::any ? std::abs(e) : polarity_ == Polarity::darker_out ? -e : e;
-        e *= v;
+      const double r = middle + (j - half_) * step;
+      const Point p = centre + r * ray;
+      const bool known = p.x >= left && p.y >= top && p.x <= right && p.y <= bottom && r > 2 && !hidden_ray;
+      if (known &&
+          (covered.empty() || covered.ptr(static_cast<int>(p.y + 0.5))[static_cast<int>(p.x + 0.5)] == 0)) {
+        const Bilinear place(p.x - area.x, p.y - area.y);
+        const double e = place.of(gx) * normal.x + place.of(gy) * normal.y;
+        edge[j] = static_cast<float>(polarity_ == Polarity::any ? std::abs(e) : e);
+        cost[j] = 0;
+        shown_near = shown_near || (j >= first_near && j <= last_near);
       }
-      const bool near_middle = std::abs(j - half_) < half_ / 2 + 1;
-      shown_[a] = std::max(shown_[a], v * (near_middle ? 1.0 : 0.0));
-      edge_[id(i, j)] = static_cast<float>(e);
-      const bool allowed =
-          (band_.lower.empty() || r >= band_.lower[a]) && (band_.upper.empty() || r <= band_.upper[a]);
-      cost_[id(i, j)] = !allowed ? kForbidden : v > 0 ? 0.0F : 1.0F;
+      if (!(r >= lower && r <= upper)) {
+        cost[j] = kForbidden;
+      }
     }
+    shown_[a] = shown_near ? 1 : 0;
   }
 }
 
@@ -151,7 +158,7 @@ void BandSearch::set_costs(double floor, double saturation) {
         all.push_back(std::abs(edge_[id(i, j)]));
       }
     }
-    if (shown_[angle(i)] > 0) {
+    if (shown_[angle(i)] != 0) {
       strongest.push_back(top);
     }
   }
@@ -187,50 +194,59 @@ void BandSearch::find_shortest_closed_path() {
   find_shortest_path(opposite, path_[angle(opposite)], bend);
 }
 
+// The cheapest step from the angle before to each sample of this one, `reach` samples inwards to `reach`
+// outwards: of two that cost the same, the one further in. `before` has `reach` samples more on either side,
+// which no path may use. Each loop runs over the samples, so that a compiler makes several of them at once.
+void BandSearch::cheapest_steps(const std::vector<float>& before, const std::vector<float>& bend) {
+  const std::size_t m = best_.size(), reach = bend.size() - 1;
+  for (std::size_t j = 0; j < m; ++j) {
+    best_[j] = before[j] + bend[reach];
+    step_[j] = -static_cast<float>(reach);
+  }
+  for (std::size_t k = 1; k <= 2 * reach; ++k) {
+    const float bent = bend[k > reach ? k - reach : reach - k];
+    const float step = static_cast<float>(k) - static_cast<float>(reach);
+    const float* from = before.data() + k;
+    for (std::size_t j = 0; j < m; ++j) {
+      const float c = from[j] + bent;
+      step_[j] = c < best_[j] ? step : step_[j];
+      best_[j] = c < best_[j] ? c : best_[j];
+    }
+  }
+}
+
 // Dynamic programming from the angle `from` once round. With `fixed` >= 0 the path begins and ends there.
 void BandSearch::find_shortest_path(int from, int fixed, const std::vector<float>& bend) {
-  const int reach = static_cast<int>(bend.size()) - 1;
-  std::vector<float> total(cost_.size());
-  std::vector<std::int8_t> back(cost_.size());
+  const std::size_t m = static_cast<std::size_t>(m_), reach = bend.size() - 1;
+  before_.assign(m + 2 * reach, kNoWay);
+  best_.resize(m);
+  step_.resize(m);
+  back_.resize(cost_.size());
+  float* total = before_.data() + reach;
   for (int j = 0; j < m_; ++j) {
-    total[id(0, j)] = fixed < 0 || j == fixed ? cost_[id(from, j)] : kForbidden * 100;
+    total[j] = fixed < 0 || j == fixed ? cost_[id(from, j)] : kForbidden * 100;
   }
   for (int i = 1; i < n_; ++i) {
-    const int at = (from + i) % n_;
-    for (int j = 0; j < m_; ++j) {
-      float best = std::numeric_limits<float>::max();
-      int best_k = 0;
-      for (int k = -reach; k <= reach; ++k) {
-        const int q = j + k;
-        if (q < 0 || q >= m_) {
-          continue;
-        }
-        const float c = total[id(i - 1, q)] + bend[static_cast<std::size_t>(std::abs(k))];
-        if (c < best) {
-          best = c;
-          best_k = k;
-        }
-      }
-      total[id(i, j)] = best + cost_[id(at, j)];
-      back[id(i, j)] = static_cast<std::int8_t>(best_k);
+    cheapest_steps(before_, bend);
+    const float* cost = cost_.data() + id((from + i) % n_, 0);
+    std::int8_t* back = back_.data() + id(i, 0);
+    for (std::size_t j = 0; j < m; ++j) {
+      total[j] = best_[j] + cost[j];
+      back[j] = static_cast<std::int8_t>(step_[j]);
     }
   }
   int end = 0;
-  float best = std::numeric_limits<float>::max();
+  float best = kNoWay;
   for (int j = 0; j < m_; ++j) {
-    const int k = fixed < 0 ? 0 : std::abs(j - fixed);
-    if (k > reach) {
-      continue;
-    }
-    const float c = total[id(n_ - 1, j)] + bend[static_cast<std::size_t>(k)];
-    if (c < best) {
-      best = c;
+    const std::size_t k = fixed < 0 ? 0 : static_cast<std::size_t>(std::abs(j - fixed));
+    if (k <= reach && total[j] + bend[k] < best) {
+      best = total[j] + bend[k];
       end = j;
     }
   }
   for (int i = n_ - 1; i >= 0; --i) {
     path_[angle(from + i)] = end;
-    end += i > 0 ? back[id(i, end)] : 0;
+    end += i > 0 ? back_[id(i, end)] : 0;
   }
 }
 
@@ -284,7 +300,7 @@ void BandSearch::measure_edges(double floor) {
     const double e = static_cast<double>(edge_[id(i, j)]);
     out_.raw[a] = band_.middle[a] + (j - half_ + vertex_beside(i, j)) * band_.step;
     out_.strength[a] = static_cast<float>(e);
-    if (shown_[a] > 0) {
+    if (shown_[a] != 0) {
       ++visible;
       levels.push_back(static_cast<float>(e));
       if (e > floor) {

@@ -7,7 +7,7 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
+#include <opencv2/core.hpp>
 #include <utility>
 #include <vector>
 
@@ -31,9 +31,9 @@ struct EdgeBand {
   double stiffness = 0.25;           // cost of that change, per (px/px)^2 and angle
   std::vector<double> lower, upper;  // hard limits per angle; or empty
   std::vector<std::uint8_t> hidden;  // 1: nothing is visible along this ray; or empty
-  // 0: the pixel belongs to something else (a pipette, an impurity, the outside), where there is neither an
-  // edge nor a cost.
-  std::function<double(const Point&)> visible;
+  // CV_8U, of the whole picture; or empty. Not 0: the pixel belongs to something else (a pipette, an
+  // impurity), where there is neither an edge nor a cost.
+  cv::Mat covered;
   // Places that the contour passes (the needle's end face while it pushes): index of the angle, radius.
   std::vector<std::pair<int, double>> anchors;
 };

@@ -6,18 +6,6 @@
 
 namespace punctum::vision {
 
-namespace {
-
-double bilinear(const cv::Mat& m, double x, double y) {
-  const int x0 = static_cast<int>(x), y0 = static_cast<int>(y);
-  const float *a = m.ptr<float>(y0) + x0, *b = m.ptr<float>(y0 + 1) + x0;
-  const double u = x - x0, v = y - y0;
-  return (1 - v) * ((1 - u) * static_cast<double>(a[0]) + u * static_cast<double>(a[1])) +
-         v * ((1 - u) * static_cast<double>(b[0]) + u * static_cast<double>(b[1]));
-}
-
-}  // namespace
-
 void GradientField::compute(const cv::Mat& grey_in, cv::Rect wanted, double sigma_px) {
   picture = grey_in.size();
   area = wanted & cv::Rect(0, 0, grey_in.cols, grey_in.rows);
@@ -41,22 +29,6 @@ double GradientField::noise_of_gradient(double noise_grey) const {
   // Derivative of a Gaussian against white noise: sigma_n / (sqrt(8 pi) sigma^2), with the 3x3 Sobel's own
   // smoothing (variance 2/3 px^2 along and 1/2 px^2 across, on average 0.6) added to sigma^2.
   return noise_grey / (std::sqrt(8 * std::numbers::pi) * (sigma * sigma + 0.6));
-}
-
-Point GradientField::gradient(const Point& p) const {
-  const double x = p.x - area.x, y = p.y - area.y;
-  if (!(x >= 0) || !(y >= 0) || x >= gx.cols - 1 || y >= gx.rows - 1) {
-    return {};
-  }
-  return {bilinear(gx, x, y), bilinear(gy, x, y)};
-}
-
-double GradientField::grey(const Point& p) const {
-  const double x = p.x - area.x, y = p.y - area.y;
-  if (!(x >= 0) || !(y >= 0) || x >= smooth.cols - 1 || y >= smooth.rows - 1) {
-    return 0;
-  }
-  return bilinear(smooth, x, y);
 }
 
 }  // namespace punctum::vision

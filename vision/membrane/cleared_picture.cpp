@@ -87,10 +87,6 @@ bool ClearedPicture::hidden(const Point& p) const {
   return x < 0 || y < 0 || x >= covered.cols || y >= covered.rows || covered.at<std::uint8_t>(y, x) > 0;
 }
 
-std::function<double(const Point&)> ClearedPicture::visibility() const {
-  return [this](const Point& p) { return hidden(p) ? 0.0 : 1.0; };
-}
-
 void ClearedPicture::exclude_holder(EdgeBand& band, const std::vector<double>& expected) const {
   if (!holder_face) {
     return;

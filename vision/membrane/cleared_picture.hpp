@@ -1,7 +1,6 @@
 // A picture made ready for the membranes: its gradient, and what pipettes and impurities hide of it.
 #pragma once
 
-#include <functional>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <string>
@@ -38,8 +37,7 @@ struct ClearedPicture {
   int cover_impurities(const std::vector<Contour>& membranes, double threshold, double max_side);
 
   [[nodiscard]] double edge_floor() const noexcept { return 3 * gradient_noise; }  // less is no edge
-  [[nodiscard]] bool hidden(const Point& p) const;                       // covered, or outside the picture
-  [[nodiscard]] std::function<double(const Point&)> visibility() const;  // for EdgeBand; refers to this
+  [[nodiscard]] bool hidden(const Point& p) const;  // covered, or outside the picture
 
   // For a membrane that is pressed against the holding pipette. Behind the face of the pipette the membrane
   // cannot be; along the face it is not visible, because of the dark line of the face. expected: radius of

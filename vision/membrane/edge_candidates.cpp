@@ -32,7 +32,7 @@ EdgePath closed_edge_round(const Point& centre, const Radii& radii, const Cleare
   band.middle.assign(static_cast<std::size_t>(angles), (radii.from + radii.to) / 2);
   band.slope = 1.5;
   band.stiffness = 0.5;
-  band.visible = picture.visibility();
+  band.covered = picture.covered;
   picture.exclude_holder(band, std::vector<double>(band.middle.size(), 1.08 * radii.expected));
   return closed_path(picture.field, band, polarity, picture.edge_floor(), saturation);
 }
@@ -157,7 +157,7 @@ SecondEdge find_second(const std::vector<double>& r1, const Point& centre, Polar
     }
     band.slope = 1.0;
     band.stiffness = 0.8;
-    band.visible = picture.visibility();
+    band.covered = picture.covered;
     EdgePath p = closed_path(picture.field, band, q, picture.edge_floor(), 0);
     if (p.r.empty() || p.visible < 0.4) {
       continue;

@@ -32,7 +32,7 @@ MembraneSearch::MembraneSearch(const FollowedMembrane& followed, const ClearedPi
   band.middle = m.r;
   band.half_width = std::clamp(0.11 * usual_r, 6.0, 14.0);
   band.slope = 1.0;
-  band.visible = picture.visibility();
+  band.covered = picture.covered;
   rest = m.rest.seen_from(band.centre);
   keep_membranes_apart();
 

@@ -122,7 +122,8 @@ TEST(ClosedPath, follows_the_given_sign_and_bridges_hidden_arcs) {
   band.half_width = 10;
   const double floor = 3 * f.noise_of_gradient(2);
   EXPECT_LT(closed_path(f, band, Polarity::darker_out, floor, 4).support, 0.5);
-  band.visible = [&](const Point& p) { return p.x > centre.x + 40 ? 0.0 : 1.0; };
+  band.covered = cv::Mat::zeros(m.size(), CV_8U);
+  band.covered.colRange(141, 200).setTo(255);
   const EdgePath p = closed_path(f, band, Polarity::brighter_out, floor, 4);
   EXPECT_LT(p.visible, 0.8);
   EXPECT_GT(p.support, 0.95);

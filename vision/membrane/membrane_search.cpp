@@ -211,42 +211,28 @@ double MembraneSearch::sunk_beside_needle(const EdgePath& path) const {
   return n > 3 ? sum / n : depth_of_tip();
 }
 
-bool MembraneSearch::dented(const EdgePath& path) const {
-  for (int i = 0; i < angles; ++i) {
-    const std::size_t k = static_cast<std::size_t>(i);
-    if (from_needle(i) < kNearHalf && rest[k] - path.raw[k] > kApart_px) {
-      return true;
-    }
-  }
-  return false;
-}
-
 EdgeFound pushed_or_free(const MembraneSearch& s) {
-  const bool outermost = s.surroundings.outermost, punctured = s.surroundings.punctured;
-  if (!s.needle || s.rest.empty() || (outermost && s.depth_of_tip() <= 1.0)) {
+  if (!s.needle || s.rest.empty() || s.depth_of_tip() <= 1.0) {
     return {s.path_in(s.band)};
   }
   EdgePath path;
-  if (outermost && !punctured) {
+  if (s.surroundings.outermost && !s.surroundings.punctured) {
     path = s.path_pushed();
   }
   if (path.r.empty() || !s.reaches_the_tip(path)) {
     path = s.path_in(s.band);
   }
-  // The dimple of the outer membrane reaches the inner one before the tip does.
-  if (path.r.empty() || (!outermost && !s.dented(path))) {
-    return {std::move(path)};
-  }
   EdgePath free = s.path_free();
-  if (free.r.empty()) {
+  if (path.r.empty() || free.r.empty()) {
     return {std::move(path)};
   }
   // Where another edge lies further out than the dimple and is seen as well, the dimple belongs to another
   // membrane. But an edge that is nearer to the dimple than to the rest outline is the wall of the dimple.
   const Differing outside = s.where_further_out(free, path);
-  const double least = punctured && outermost ? 0.4 : 0.7;
+  const double least = s.surroundings.punctured && s.surroundings.outermost ? 0.4 : 0.7;
   // And where the membrane beside the needle is hardly lower than at rest, the needle has gone through it.
-  const bool through = outermost && s.sunk_beside_needle(free) < kHardlySunk * s.depth_of_tip();
+  const bool through =
+      s.surroundings.outermost && s.sunk_beside_needle(free) < kHardlySunk * s.depth_of_tip();
   const bool is_free = through || (outside.by > outside.from_rest && outside.seen > least);
   return {is_free ? std::move(free) : std::move(path), is_free};
 }

@@ -64,7 +64,6 @@ struct MembraneSearch {
   [[nodiscard]] double depth_of_tip() const;                            // px below the rest outline
   [[nodiscard]] double sunk_beside_needle(const EdgePath& path) const;  // px
   [[nodiscard]] bool reaches_the_tip(const EdgePath& pushed) const;
-  [[nodiscard]] bool dented(const EdgePath& path) const;  // near the needle
   [[nodiscard]] Differing where_further_out(const EdgePath& path, const EdgePath& other) const;
 
  private:

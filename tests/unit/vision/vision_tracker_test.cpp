@@ -35,6 +35,7 @@ struct Drawing {
   unsigned seed = 1;
   bool needle = true;
   double dent_half_rad = 0.42;
+  bool granules = false;  // in the ooplasm, where a dimple's sides may be
 };
 
 cv::Mat draw(const Drawing& d) {
@@ -59,6 +60,9 @@ cv::Mat draw(const Drawing& d) {
         }
         if (r < kInner - in * 0.9) {
           g -= 34;  // ooplasm
+        }
+        if (d.granules && std::hypot(q.x - kInner + 12, std::abs(q.y) - 5) < 4) {
+          g -= 40;
         }
         const double s = p.x - d.tip, u = std::abs(p.y - kCentre.y);
         if (d.needle && s > 0) {
@@ -290,6 +294,29 @@ TEST(Tracker, follows_a_narrow_dimple_to_its_bottom) {
       farthest = std::max(farthest, std::abs(cv::norm(q) - kR + dent(std::atan2(q.y, q.x), w, kHalf_rad)));
     }
     EXPECT_LT(farthest, 2.5) << depth;
+  }
+}
+
+// A granule lies where the dimple was, and the cell was never seen without the needle.
+TEST(Tracker, tells_the_inner_membrane_from_the_dimple_that_it_had) {
+  Tracker tracker({}, kW, kH);
+  const double surface = kCentre.x + kR;
+  std::uint64_t n = 0;
+  const auto look = [&](double depth, double dented) -> const Result& {
+    Drawing drawn{surface - depth, dented, 2, static_cast<unsigned>(n) + 1};
+    drawn.granules = true;
+    drawn.dent_half_rad = 0.14;
+    return tracker.process(frame_of(draw(drawn), n++));
+  };
+  for (double depth = -6; depth <= 10; ++depth) {
+    ASSERT_TRUE(look(depth, std::max(0.0, depth)).inner.ok) << depth;
+  }
+  for (int k = 0; k < 6; ++k) {
+    const Result& r = look(10, 0);
+    ASSERT_TRUE(r.inner.ok) << r.verdict;
+    if (k >= 2) {
+      EXPECT_LT(rms_error(r.inner.contour, kInner, 0, 0), 0.7) << k;
+    }
   }
 }
 

@@ -380,6 +380,9 @@ int Tracker::Impl::fit_undeformed_membrane() {
     outer.rest.r = polar_radii(undeformed.shape()->shape, outer.centre, config.contour_points);
     outer.rest.centre = outer.centre;
   }
+  if (inner.rest.r.empty() && inner.known && result.inner.ok && entry) {
+    inner.rest = outline_within(outer.rest, inner.centre, inner.r, *entry);
+  }
   result.undeformed = undeformed.shape()->circle;
   return static_cast<int>(std::count_if(weights.begin(), weights.end(), [](double w) { return w > 0; }));
 }

@@ -12,6 +12,9 @@ namespace punctum::vision {
 
 namespace {
 
+// The median along a whole path is believed earlier than a single edge: the best path through pure noise has
+// 1.6 to 1.9 times the gradient's noise.
+constexpr double kPathClear_noise = 2.7;
 constexpr double kContrast = 4;           // of a second edge: times the median edge of its band
 constexpr double kOvalDeviation = 0.055;  // of the radius, rms: a cell is nearly an oval
 
@@ -123,7 +126,7 @@ std::optional<MainEdge> strongest_closed_edge(const Circle& circle, bool seeded,
   }
   const EdgePath& path = best.edge.path;
   if (path.visible < 0.45 || path.support < 0.6 || path.level < 1.8 * path.background ||
-      path.level < kEdgeClear_noise * picture.gradient_noise) {
+      path.level < kPathClear_noise * picture.gradient_noise) {
     return std::nullopt;
   }
   return best;
@@ -179,7 +182,7 @@ SecondEdge find_second(const std::vector<double>& r1, const Point& centre, Polar
 
 bool clear_enough(const SecondEdge& edge, double first_level, const ClearedPicture& picture) {
   // A path that is not nearly an oval has followed something else.
-  return edge.quality >= kContrast && edge.path.level >= kEdgeClear_noise * picture.gradient_noise &&
+  return edge.quality >= kContrast && edge.path.level >= kPathClear_noise * picture.gradient_noise &&
          edge.path.level >= 0.12 * first_level && nearly_oval(edge.path.r);
 }
 

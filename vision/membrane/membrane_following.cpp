@@ -9,6 +9,7 @@
 #include "vision/image/median.hpp"
 #include "vision/image/snake.hpp"
 #include "vision/image/spline.hpp"
+#include "vision/membrane/edge_shape.hpp"
 
 namespace punctum::vision {
 
@@ -17,6 +18,10 @@ namespace {
 constexpr double kSnakeFloor_noise = 4;  // times the gradient's noise: spread of a flat neighbourhood
 constexpr double kMotionMax_px = 2.0;    // of the whole membrane, per frame and direction
 constexpr double kMotionLeast_px = 1.2;  // the nodes are on whole pixels: less is no motion
+constexpr double kOuterModes = 12;       // periods round the cell: finer waves a stiff shell does not have
+constexpr double kInnerModes = 9;        // granules beside the inner membrane look like waves of it
+constexpr double kWallTolerance = 0.15;  // of the wall's thickness: cells differ from the scene's
+constexpr double kSoftHalf = 1.2;        // rad to either side of the entry: where a dimple bends the membrane
 constexpr double kNeedleHalf = 1.2;      // rad to either side of the entry: what a needle may dent
 
 // One evolution of the snake, in the coordinates of the whole picture.
@@ -82,6 +87,46 @@ double thin_wall_bias(const MembraneSearch& search, const EdgePath& path, double
   }
   const double seen = median_of(apart);
   return seen < 2.6 * sigma ? std::max(0.0, 0.5 * (seen - thickness)) : 0;
+}
+
+// The path moved to where the edge looks as it does all round.
+Contour refined(const MembraneSearch& search, const EdgePath& path, const VisionConfig& config,
+                const Surroundings& surroundings) {
+  Contour contour = from_polar(search.band.centre, path.r);
+  if (search.m.polarity != Polarity::any) {
+    std::vector<double> soft(contour.size(), 0.0);
+    for (int i = 0; i < search.angles && search.needle; ++i) {
+      soft[static_cast<std::size_t>(i)] = std::clamp((kSoftHalf - search.from_needle(i)) / 0.6, 0.0, 1.0);
+    }
+    const double wall = config.px(config.h_m);
+    EdgeShape edge;
+    if (surroundings.outermost) {
+      edge.modes = kOuterModes;
+      edge.nearby = {-wall, kWallTolerance * wall};
+    } else {
+      edge.inside = 6;
+      edge.outside = 5;
+      edge.modes = kInnerModes;
+      if (surroundings.around) {
+        const double gap = mean_radius(surroundings.around->contour()) - mean_radius(contour) - wall;
+        if (gap > 1) {
+          edge.nearby = {gap, 0};
+        }
+      }
+    }
+    if (auto shaped = shaped_edge(search.picture, contour, soft, edge)) {
+      return *std::move(shaped);
+    }
+  }
+  if (surroundings.outermost) {
+    const double bias = thin_wall_bias(search, path, config.px(config.h_m));
+    std::vector<double> face = path.r;
+    for (double& r : face) {
+      r -= bias;
+    }
+    contour = from_polar(search.band.centre, face);
+  }
+  return contour;
 }
 
 // Away from the needle a membrane keeps its outline. An arc that has left the outline follows something else.
@@ -150,14 +195,7 @@ Membrane follow(FollowedMembrane& m, const ClearedPicture& picture, const Vision
     ++m.lost_frames;
     return out;
   }
-  std::vector<double> face = path.r;
-  if (surroundings.outermost) {
-    const double bias = thin_wall_bias(search, path, config.px(config.h_m));
-    for (double& r : face) {
-      r -= bias;
-    }
-  }
-  out.contour = from_polar(search.band.centre, face);
+  out.contour = refined(search, path, config, surroundings);
   out.support = path.support;
   out.visible = path.visible;
   out.residual_px = path.residual;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 
 #include "vision/image/median.hpp"
 #include "vision/image/polar_contour.hpp"
@@ -12,7 +13,10 @@ namespace punctum::vision {
 namespace {
 
 constexpr double kSaturation = 0.7;   // times the usual edge: a stronger one is not better
-constexpr double kBesideHalf = 0.24;  // rad to either side of the entry: the steep part of the dimple
+constexpr double kBesideHalf = 0.24;  // rad to either side of the entry: the steep part of a dimple
+constexpr double kHardlySunk = 0.15;  // of the tip's depth; the steep part of a dimple is deeper
+constexpr double kNearHalf = 0.5;     // rad to either side of the entry: the dimple and its rim
+constexpr double kApart_px = 1.5;     // nearer, two paths are the same edge
 
 }  // namespace
 
@@ -138,45 +142,99 @@ EdgePath MembraneSearch::path_pushed() const {
   return path_in(pushed);
 }
 
-// Over the visible angles; 0 if there are none.
-double MembraneSearch::mean_beside_needle(const std::vector<double>& per_angle) const {
+// A membrane that has given way ends beside the needle, far behind the tip, before the puncture is known.
+bool MembraneSearch::reaches_the_tip(const EdgePath& pushed) const {
+  constexpr double kSteepest = 2.5;  // px per px of arc, of a dimple's wall
+  const std::vector<std::pair<int, double>> face = end_face();
+  const auto wrapped = [this](int i) { return static_cast<std::size_t>((i % angles + angles) % angles); };
+  const auto on_face = [&](int i) {
+    return std::any_of(face.begin(), face.end(),
+                       [&](const auto& a) { return wrapped(a.first) == wrapped(i); });
+  };
+  double rise = 0, run = 0;
+  for (const int side : {-1, 1}) {
+    int i = needle->tip_index;
+    double last = needle->tip_r;
+    for (; on_face(i); i += side) {
+      last = pushed.r[wrapped(i)];
+    }
+    for (int k = 1; k < angles / 8; ++k, i += side) {
+      if (pushed.seen[wrapped(i)] != 0 && !picture.hidden(on_ray(band.centre, static_cast<int>(wrapped(i)),
+                                                                 angles, pushed.raw[wrapped(i)]))) {
+        rise += pushed.raw[wrapped(i)] - last;
+        run += k * usual_r * 2 * std::numbers::pi / angles;
+        break;
+      }
+    }
+  }
+  return rise <= kSteepest * run;
+}
+
+Differing MembraneSearch::where_further_out(const EdgePath& path, const EdgePath& other) const {
+  Differing out;
+  int n = 0;
+  for (int i = 0; i < angles; ++i) {
+    const std::size_t k = static_cast<std::size_t>(i);
+    const double by = path.raw[k] - other.raw[k];
+    if (from_needle(i) < kNearHalf && by > kApart_px &&
+        !picture.hidden(on_ray(band.centre, i, angles, path.raw[k]))) {
+      out.seen += std::clamp(static_cast<double>(path.strength[k]) / saturation, 0.0, 1.0);
+      out.by += by;
+      out.from_rest += std::abs(path.raw[k] - rest[k]);
+      ++n;
+    }
+  }
+  if (n > 0) {
+    for (double* sum : {&out.seen, &out.by, &out.from_rest}) {
+      *sum /= n;
+    }
+  }
+  return out;
+}
+
+double MembraneSearch::depth_of_tip() const {
+  return rest[static_cast<std::size_t>(needle->tip_index)] - needle->tip_r;
+}
+
+// Mean over the visible rays; as deep as the tip where there is none.
+double MembraneSearch::sunk_beside_needle(const EdgePath& path) const {
   double sum = 0;
   int n = 0;
   for (int i = 0; i < angles; ++i) {
     const std::size_t k = static_cast<std::size_t>(i);
-    if (from_needle(i) < kBesideHalf && !picture.hidden(on_ray(band.centre, i, angles, rest[k]))) {
-      sum += per_angle[k];
+    if (from_needle(i) < kBesideHalf && path.seen[k] != 0 &&
+        !picture.hidden(on_ray(band.centre, i, angles, path.raw[k]))) {
+      sum += rest[k] - path.raw[k];
       ++n;
     }
   }
-  return n > 0 ? sum / n : 0.0;
+  return n > 3 ? sum / n : depth_of_tip();
 }
 
 EdgeFound pushed_or_free(const MembraneSearch& s) {
-  const auto tip_inside = [&] {
-    return s.needle->tip_r < s.rest[static_cast<std::size_t>(s.needle->tip_index)] - 1.0;
-  };
-  if (!s.needle || s.rest.empty() || !tip_inside()) {
+  if (!s.needle || s.rest.empty() || s.depth_of_tip() <= 1.0) {
     return {s.path_in(s.band)};
   }
+  EdgePath path;
+  if (s.surroundings.outermost && !s.surroundings.punctured) {
+    path = s.path_pushed();
+  }
+  if (path.r.empty() || !s.reaches_the_tip(path)) {
+    path = s.path_in(s.band);
+  }
   EdgePath free = s.path_free();
-  EdgePath pushed = s.surroundings.outermost ? s.path_pushed() : s.path_in(s.band);
-  if (free.r.empty() || pushed.r.empty()) {
-    return {std::move(pushed)};
+  if (path.r.empty() || free.r.empty()) {
+    return {std::move(path)};
   }
-  std::vector<double> seen, apart, from_rest;
-  for (std::size_t k = 0; k < free.r.size(); ++k) {
-    seen.push_back(std::clamp(static_cast<double>(free.strength[k]) / s.saturation, 0.0, 1.0));
-    apart.push_back(std::max(0.0, free.r[k] - pushed.r[k]));
-    from_rest.push_back(std::abs(free.r[k] - s.rest[k]));
-  }
-  const double free_seen = s.mean_beside_needle(seen), between = s.mean_beside_needle(apart);
   // Where another edge lies further out than the dimple and is seen as well, the dimple belongs to another
   // membrane. But an edge that is nearer to the dimple than to the rest outline is the wall of the dimple.
-  const bool is_free = s.surroundings.punctured && s.surroundings.outermost
-                           ? free_seen > 0.4
-                           : between > 1.5 && between > s.mean_beside_needle(from_rest) && free_seen > 0.7;
-  return {is_free ? std::move(free) : std::move(pushed), is_free};
+  const Differing outside = s.where_further_out(free, path);
+  const double least = s.surroundings.punctured && s.surroundings.outermost ? 0.4 : 0.7;
+  // And where the membrane beside the needle is hardly lower than at rest, the needle has gone through it.
+  const bool through =
+      s.surroundings.outermost && s.sunk_beside_needle(free) < kHardlySunk * s.depth_of_tip();
+  const bool is_free = through || (outside.by > outside.from_rest && outside.seen > least);
+  return {is_free ? std::move(free) : std::move(path), is_free};
 }
 
 }  // namespace punctum::vision

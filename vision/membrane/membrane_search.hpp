@@ -29,6 +29,14 @@ struct NeedleSeen {
   double tip_r = 0;        // px
 };
 
+// Of the visible rays near the needle on which one path lies further out than another: means, 0 if there are
+// none.
+struct Differing {
+  double seen = 0;       // edge, as a share of the saturated one
+  double by = 0;         // px
+  double from_rest = 0;  // px, of the path further out
+};
+
 struct MembraneSearch {
   const FollowedMembrane& m;
   const ClearedPicture& picture;
@@ -53,7 +61,10 @@ struct MembraneSearch {
   [[nodiscard]] EdgePath path_free() const;
   [[nodiscard]] EdgePath path_pushed() const;
   [[nodiscard]] std::vector<std::pair<int, double>> end_face() const;
-  [[nodiscard]] double mean_beside_needle(const std::vector<double>& per_angle) const;
+  [[nodiscard]] double depth_of_tip() const;                            // px below the rest outline
+  [[nodiscard]] double sunk_beside_needle(const EdgePath& path) const;  // px
+  [[nodiscard]] bool reaches_the_tip(const EdgePath& pushed) const;
+  [[nodiscard]] Differing where_further_out(const EdgePath& path, const EdgePath& other) const;
 
  private:
   void keep_membranes_apart();

@@ -40,6 +40,32 @@ void RestOutline::learn(const Point& now_centre, const std::vector<double>& now_
   }
 }
 
+RestOutline outline_within(const RestOutline& around, const Point& centre, const std::vector<double>& r,
+                           const Point& entry) {
+  constexpr double kBlend = 0.3;  // rad
+  const std::vector<double> outer = around.seen_from(centre);
+  const int angles = static_cast<int>(r.size());
+  if (outer.size() != r.size()) {
+    return {};
+  }
+  const Point towards = entry - centre;
+  RestOutline out{centre, r, 0};
+  std::vector<double> near(r.size()), gap;
+  for (std::size_t k = 0; k < r.size(); ++k) {
+    const double from_needle =
+        angle_between(polar_angle(static_cast<int>(k), angles), std::atan2(towards.y, towards.x));
+    near[k] = std::clamp((kDentHalf + kBlend - from_needle) / kBlend, 0.0, 1.0);
+    if (near[k] <= 0) {
+      gap.push_back(outer[k] - r[k]);
+    }
+  }
+  const double usual = median_of(std::move(gap));
+  for (std::size_t k = 0; k < r.size(); ++k) {
+    out.r[k] += near[k] * (outer[k] - usual - r[k]);
+  }
+  return out;
+}
+
 Point LearntUndeformed::update(const Undeformed& now, bool touched, const std::optional<Point>& mouth) {
   if (!shape_ || (!touched && now.round)) {
     if (shape_ && shape_->round && now.round &&

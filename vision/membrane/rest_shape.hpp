@@ -20,6 +20,12 @@ struct RestOutline {
   void learn(const Point& now_centre, const std::vector<double>& now_r);
 };
 
+// Of a membrane that was never seen without the needle: what is seen of it away from the needle, and near the
+// needle as far within the outline of the membrane around it as elsewhere. r: seen from `centre`; entry: of
+// the needle.
+[[nodiscard]] RestOutline outline_within(const RestOutline& around, const Point& centre,
+                                         const std::vector<double>& r, const Point& entry);
+
 // Fitted shape of the outer membrane. It moves with the holding pipette.
 class LearntUndeformed {
  public:

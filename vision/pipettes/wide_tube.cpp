@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <numeric>
 #include <opencv2/core.hpp>
+#include <tuple>
 #include <vector>
 
 #include "vision/image/parabola.hpp"
@@ -17,9 +18,9 @@ namespace punctum::vision {
 namespace {
 
 constexpr double kStride_px = 1.5;
-constexpr std::size_t kUsualStations = 6;  // at the border they tell how strong the edges usually are
-constexpr double kContinued = 0.4;         // of the usual edge: the tube goes on
-constexpr double kGiveUp = 3;              // so far below its best value the sum does not recover
+constexpr std::size_t kUsualStations = 10;  // at the border they tell what the walls look like
+constexpr double kContinued = 0.5;          // of that: the tube goes on
+constexpr double kGiveUp = 3;               // so far below its best value the sum does not recover
 
 struct Stations {
   std::vector<double> along, middle, half, similarity;
@@ -30,35 +31,64 @@ struct Stations {
   }
 };
 
-// Follows both outer edges, each within 3 px of where it was. The tube ends where the sum of
-// (similarity - kContinued) is largest. Empty when it does not end in the picture.
+// What a wall looks like across the tube, without its mean: grey levels at equal steps.
+constexpr double kAcross_px = 4, kWallStep_px = 0.5;
+using WallProfile = std::array<double, 17>;
+static_assert(kAcross_px / kWallStep_px * 2 + 1 == std::tuple_size_v<WallProfile>);
+
+WallProfile wall_at(const GradientField& field, const Point& p, const Point& along, const Point& across) {
+  WallProfile out{};
+  double mean = 0;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const Point q = p + (static_cast<double>(i) * kWallStep_px - kAcross_px) * across;
+    out[i] = 0.5 * (field.grey(q - 0.4 * along) + field.grey(q + 0.4 * along));
+    mean += out[i] / static_cast<double>(out.size());
+  }
+  for (double& grey : out) {
+    grey -= mean;
+  }
+  return out;
+}
+
+double dot(const WallProfile& a, const WallProfile& b) {
+  return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
+}
+
+// Follows both outer edges, each within 3 px of where it was, by what they look like at the border. The tube
+// ends where the sum of (similarity - kContinued) is largest. Empty when it does not end in the picture.
 std::optional<Stations> follow_edges(const GradientField& field, const TubeTrace& t, const Point& across) {
-  std::array<double, 2> at{-t.half_width, t.half_width}, usual{};
+  std::array<double, 2> at{-t.half_width, t.half_width};
+  std::array<WallProfile, 2> usual{};
+  for (std::size_t k = 0; k < 2; ++k) {
+    for (std::size_t i = 0; i < kUsualStations; ++i) {
+      const double s = static_cast<double>(i) * kStride_px;
+      const WallProfile wall = wall_at(field, t.root + s * t.axis + at[k] * across, t.axis, across);
+      for (std::size_t j = 0; j < wall.size(); ++j) {
+        usual[k][j] += wall[j] / kUsualStations;
+      }
+    }
+    if (!(dot(usual[k], usual[k]) > 0)) {
+      return std::nullopt;
+    }
+  }
   Stations out;
   const double longest = 0.85 * field.area.width / std::abs(t.axis.x);
   double sum = 0, sum_best = 0;
   std::size_t last = 0;
   for (double s = 0; s < longest; s += kStride_px) {
-    std::array<double, 2> place = at, strength{};
+    std::array<double, 2> place = at, like{-1, -1};
     for (std::size_t k = 0; k < 2; ++k) {
-      for (double du = -3; du <= 3; du += 0.5) {
+      for (double du = -3; du <= 3; du += kWallStep_px) {
         const Point p = t.root + s * t.axis + (at[k] + du) * across;
-        const double e = std::abs(field.gradient(p).dot(across));
-        if (e > strength[k]) {
-          strength[k] = e;
+        const double as_usual = dot(wall_at(field, p, t.axis, across), usual[k]) / dot(usual[k], usual[k]);
+        if (as_usual > like[k]) {
+          like[k] = as_usual;
           place[k] = at[k] + du;
         }
       }
     }
+    const double similarity = std::clamp(std::min(like[0], like[1]), 0.0, 1.0);
     const std::size_t count = out.along.size();
-    if (count < kUsualStations) {
-      for (std::size_t k = 0; k < 2; ++k) {
-        usual[k] += strength[k] / kUsualStations;
-      }
-    }
-    const double ratio =
-        count < kUsualStations ? 1.0 : std::min(strength[0] / usual[0], strength[1] / usual[1]);
-    const double similarity = std::clamp(ratio, 0.0, 1.0);
     out.along.push_back(s);
     out.middle.push_back(0.5 * (place[0] + place[1]));
     out.half.push_back(0.5 * (place[1] - place[0]));
@@ -71,7 +101,7 @@ std::optional<Stations> follow_edges(const GradientField& field, const TubeTrace
     if (sum < sum_best - kGiveUp) {
       break;
     }
-    if (ratio > kContinued) {
+    if (similarity > kContinued) {
       at[0] += 0.4 * (place[0] - at[0]);
       at[1] += 0.4 * (place[1] - at[1]);
     }
@@ -120,14 +150,14 @@ std::optional<TubeTrace> trace_wide_tube(const GradientField& field, Side side, 
 
 std::optional<double> end_face(const GradientField& field, const Point& guess, const Point& axis,
                                double half_width, double reach, double noise) {
-  constexpr double kStep_px = 0.25;
+  constexpr double kFine_px = 0.25;
   const Point across(-axis.y, axis.x);
-  const int n = 2 * static_cast<int>(reach / kStep_px) + 1;
+  const int n = 2 * static_cast<int>(reach / kFine_px) + 1;
   std::vector<double> g(static_cast<std::size_t>(n));
   const double half = std::max(1.0, half_width);
   const int lanes = 2 * static_cast<int>(half) + 1;
   for (int i = 0; i < n; ++i) {
-    const double s = (i - n / 2) * kStep_px;
+    const double s = (i - n / 2) * kFine_px;
     double sum = 0;
     for (int k = 0; k < lanes; ++k) {
       const double u = lanes > 1 ? (2.0 * k / (lanes - 1) - 1) * half : 0;
@@ -141,7 +171,7 @@ std::optional<double> end_face(const GradientField& field, const Point& guess, c
     return std::nullopt;
   }
   const auto i = static_cast<std::size_t>(top - g.begin());
-  return (static_cast<int>(i) - n / 2 + vertex_offset(g[i - 1], *top, g[i + 1])) * kStep_px;
+  return (static_cast<int>(i) - n / 2 + vertex_offset(g[i - 1], *top, g[i + 1])) * kFine_px;
 }
 
 }  // namespace punctum::vision

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 #include <random>
 
 #include "vision/image/correlation.hpp"
@@ -104,6 +105,54 @@ TEST(HoldingPipette, is_followed_in_its_window_and_its_loss_is_reported) {
   EXPECT_GT(fix.score, 0.8);
   EXPECT_FALSE(fix.ok);
   EXPECT_FALSE(fix.reason.empty());
+}
+
+// Two dark walls that end before a granular cell with a dark rim: the cell has edges where the walls would go
+// on.
+TEST(HoldingPipette, ends_at_the_cell_that_it_holds) {
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    constexpr double kEnd = 150;
+    const cv::Point2d centre(kEnd + 70, 160);
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal(0, 1);
+    cv::Mat granules(320, 480, CV_64F);
+    for (int y = 0; y < granules.rows; ++y) {
+      for (int x = 0; x < granules.cols; ++x) {
+        granules.at<double>(y, x) = 40 * normal(random);
+      }
+    }
+    cv::GaussianBlur(granules, granules, cv::Size(0, 0), 2);
+    cv::Mat m(granules.size(), CV_64F);
+    for (int y = 0; y < m.rows; ++y) {
+      for (int x = 0; x < m.cols; ++x) {
+        const double r = cv::norm(cv::Point2d(x, y) - centre), wall = std::abs(std::abs(y - 160.0) - 48);
+        double grey = 150;
+        if (r < 72) {
+          grey = r > 66 ? 118 : 125 + granules.at<double>(y, x);
+        } else if (x < kEnd && wall < 1) {
+          grey = 105;
+        } else if (x < kEnd && std::abs(y - 160.0) < 48) {
+          grey = 160;
+        }
+        m.at<double>(y, x) = grey;
+      }
+    }
+    cv::GaussianBlur(m, m, cv::Size(0, 0), 1.2);
+    cv::Mat grey(m.size(), CV_8U);
+    for (int y = 0; y < m.rows; ++y) {
+      for (int x = 0; x < m.cols; ++x) {
+        grey.at<std::uint8_t>(y, x) =
+            cv::saturate_cast<std::uint8_t>(m.at<double>(y, x) + 4 * normal(random));
+      }
+    }
+    GradientField field;
+    field.compute(grey, cv::Rect(0, 0, grey.cols, grey.rows), 1.2);
+    const Side left[] = {Side::left};
+    const auto tube = find_holder_tube(field, left, 320, 97, 4);
+    ASSERT_TRUE(tube) << seed;
+    EXPECT_NEAR(tube->end().x, kEnd, 12) << seed;
+    EXPECT_NEAR(tube->end_half_width, 48, 3) << seed;
+  }
 }
 
 }  // namespace

@@ -23,8 +23,8 @@ const Point kCentre(280.3, 206.8);
 constexpr double kR = 74, kInner = 63, kZona = 6, kNeedle = 5;
 
 // Depth of the outer membrane past the undeformed one at polar angle t, for a dimple of depth w at angle 0.
-double dent(double t, double w) {
-  const double u = std::remainder(t, 2 * CV_PI) / 0.42;
+double dent(double t, double w, double half_rad = 0.42) {
+  const double u = std::remainder(t, 2 * CV_PI) / half_rad;
   return w * std::exp(-0.5 * u * u);
 }
 
@@ -34,6 +34,8 @@ struct Drawing {
   double noise = 2;
   unsigned seed = 1;
   bool needle = true;
+  double dent_half_rad = 0.42;
+  bool granules = false;  // in the ooplasm, where a dimple's sides may be
 };
 
 cv::Mat draw(const Drawing& d) {
@@ -48,7 +50,7 @@ cv::Mat draw(const Drawing& d) {
         // Beyond the membrane it does not matter how far.
         const double r = std::abs(q.x) < kR && std::abs(q.y) < kR ? cv::norm(q) : kR;
         const bool dented = d.dent > 0 && r < kR && r >= std::min(kR - kZona, kInner) - d.dent;
-        const double in = dented ? dent(std::atan2(q.y, q.x), d.dent) : 0;
+        const double in = dented ? dent(std::atan2(q.y, q.x), d.dent, d.dent_half_rad) : 0;
         double g = 150;
         if (r < kR - in) {
           g -= 32;  // zona
@@ -58,6 +60,9 @@ cv::Mat draw(const Drawing& d) {
         }
         if (r < kInner - in * 0.9) {
           g -= 34;  // ooplasm
+        }
+        if (d.granules && std::hypot(q.x - kInner + 12, std::abs(q.y) - 5) < 4) {
+          g -= 40;
         }
         const double s = p.x - d.tip, u = std::abs(p.y - kCentre.y);
         if (d.needle && s > 0) {
@@ -268,6 +273,50 @@ TEST(Tracker, does_not_report_a_puncture_when_the_needle_only_withdraws) {
   }
   for (double d = 12; d > -20; d -= 1.5) {
     step(d);
+  }
+}
+
+// A dimple of a fifth of the radius that is hardly wider than the needle: few rays show its walls.
+TEST(Tracker, follows_a_narrow_dimple_to_its_bottom) {
+  constexpr double kHalf_rad = 0.12;
+  Tracker tracker({}, kW, kH);
+  const double surface = kCentre.x + kR;
+  std::uint64_t n = 0;
+  for (double depth = -26; depth <= 16; depth += depth < 0 ? 4 : 1) {
+    const double w = std::max(0.0, depth);
+    Drawing drawn{surface - depth, w, 3, static_cast<unsigned>(n) + 1};
+    drawn.dent_half_rad = kHalf_rad;
+    const Result& r = tracker.process(frame_of(draw(drawn), n++));
+    ASSERT_TRUE(r.outer.ok) << depth << r.verdict;
+    double farthest = 0;
+    for (const Point& p : r.outer.contour) {
+      const Point q = p - kCentre;
+      farthest = std::max(farthest, std::abs(cv::norm(q) - kR + dent(std::atan2(q.y, q.x), w, kHalf_rad)));
+    }
+    EXPECT_LT(farthest, 2.5) << depth;
+  }
+}
+
+// A granule lies where the dimple was, and the cell was never seen without the needle.
+TEST(Tracker, tells_the_inner_membrane_from_the_dimple_that_it_had) {
+  Tracker tracker({}, kW, kH);
+  const double surface = kCentre.x + kR;
+  std::uint64_t n = 0;
+  const auto look = [&](double depth, double dented) -> const Result& {
+    Drawing drawn{surface - depth, dented, 2, static_cast<unsigned>(n) + 1};
+    drawn.granules = true;
+    drawn.dent_half_rad = 0.14;
+    return tracker.process(frame_of(draw(drawn), n++));
+  };
+  for (double depth = -6; depth <= 10; ++depth) {
+    ASSERT_TRUE(look(depth, std::max(0.0, depth)).inner.ok) << depth;
+  }
+  for (int k = 0; k < 6; ++k) {
+    const Result& r = look(10, 0);
+    ASSERT_TRUE(r.inner.ok) << r.verdict;
+    if (k >= 2) {
+      EXPECT_LT(rms_error(r.inner.contour, kInner, 0, 0), 0.7) << k;
+    }
   }
 }
 

@@ -1,0 +1,472 @@
+#include "vision/membrane/edge_shape.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <opencv2/core.hpp>
+
+#include "vision/image/median.hpp"
+#include "vision/image/periodic_smoothing.hpp"
+
+namespace punctum::vision {
+
+namespace {
+
+constexpr double kSample_px = 0.5;      // between two samples across the contour
+constexpr int kRounds = 3;              // shape and places in turn; a fourth changes less than 0.01 px
+constexpr double kMost_px = 2.5;        // a place further from the contour is another edge's
+constexpr int kLeastSamples = 12;       // of a profile
+constexpr double kLeastShare = 0.35;    // of the points must be seen
+constexpr double kLeastLikeness = 0.5;  // median share of a profile's variance that the shape explains
+constexpr double kTukey = 4.7;          // times the scale: 95 % efficiency for normally distributed errors
+constexpr double kLeastScale_px = 0.05;
+constexpr double kSoft = 0.02;       // of the stiffness, where the membrane may have any shape
+constexpr double kGainReach = 0.04;  // of the circumference to either side, over which contrast is averaged
+constexpr double kShapeNoise = 0.5;  // grey levels: what the common shape itself is worth
+constexpr double kBlurFirst_px = 1.8, kBlurLeast_px = 0.6, kBlurMost_px = 5;
+
+// Of a smoothing that leaves out waves of more than `modes` periods round the contour.
+double stiffness_of(double modes, double soft, std::size_t points) {
+  return std::pow(static_cast<double>(points) / (2 * std::numbers::pi * modes), 4) * std::pow(kSoft, soft);
+}
+
+// The contour without finer waves, moved along the rays from its centre.
+Contour smoothed(const Contour& contour, const std::vector<double>& soft, double modes) {
+  const std::size_t n = contour.size();
+  const Point centre = centroid(contour);
+  std::vector<double> stiffness(n), r(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    stiffness[i] = stiffness_of(modes, soft[i], n);
+    r[i] = cv::norm(contour[i] - centre);
+  }
+  const std::vector<double> smooth = smooth_periodic(r, std::vector<double>(n, 1.0), stiffness);
+  Contour out(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    out[i] = centre + smooth[i] / std::max(r[i], 1e-9) * (contour[i] - centre);
+  }
+  return out;
+}
+
+// The picture across the contour: for every point a row of samples along its normal.
+struct Profiles {
+  std::size_t points, samples;
+  std::vector<Point> normal;  // outwards
+  std::vector<double> grey;
+  std::vector<std::uint8_t> seen;
+  std::vector<std::uint8_t> whole;  // per point: every sample is seen
+
+  Profiles(const ClearedPicture& picture, const Contour& contour, const EdgeShape& edge)
+      : points(contour.size()),
+        samples(static_cast<std::size_t>((edge.inside + edge.outside) / kSample_px) + 1),
+        normal(points),
+        grey(points * samples),
+        seen(points * samples),
+        whole(points, 1) {
+    for (std::size_t i = 0; i < points; ++i) {
+      const Point along = contour[(i + 2) % points] - contour[(i + points - 2) % points];
+      const double l = cv::norm(along);
+      normal[i] = l > 0 ? Point(along.y / l, -along.x / l) : Point(1, 0);
+      for (std::size_t j = 0; j < samples; ++j) {
+        const Point p = contour[i] + (static_cast<double>(j) * kSample_px - edge.inside) * normal[i];
+        const std::size_t k = i * samples + j;
+        const cv::Mat& m = picture.grey;
+        seen[k] = p.x >= 0 && p.y >= 0 && p.x < m.cols - 1 && p.y < m.rows - 1 && !picture.hidden(p);
+        whole[i] &= seen[k];
+        grey[k] = seen[k] != 0 ? sample(m, p) : 0;
+      }
+    }
+  }
+
+ private:
+  static double sample(const cv::Mat& m, const Point& p) {
+    const int x = static_cast<int>(p.x), y = static_cast<int>(p.y);
+    const std::uint8_t *a = m.ptr<std::uint8_t>(y) + x, *b = m.ptr<std::uint8_t>(y + 1) + x;
+    const double u = p.x - x, v = p.y - y;
+    return (1 - v) * ((1 - u) * a[0] + u * a[1]) + v * ((1 - u) * b[0] + u * b[1]);
+  }
+};
+
+// The common shape of all profiles, and each profile's place: grey = level + gain shape(s - place).
+class CommonShape {
+ public:
+  CommonShape(const Profiles& profiles, const std::vector<double>& soft, double modes)
+      : profiles_(profiles),
+        soft_(soft),
+        modes_(modes),
+        shape_(profiles.samples),
+        trust_(profiles.samples, 1.0),
+        place_(profiles.points),
+        raw_(profiles.points),
+        weight_(profiles.points),
+        gain_(profiles.points, 1.0),
+        gain_raw_(profiles.points, 1.0),
+        misfit_(profiles.points),
+        likeness_(profiles.points),
+        moved_shape_(profiles.samples),
+        moved_slope_(profiles.samples) {}
+
+  [[nodiscard]] bool find() {
+    average();
+    for (int round = 0; round < kRounds; ++round) {
+      if (!place_all()) {
+        return false;
+      }
+      average_gains();
+      smooth_places();
+      average();
+    }
+    std::vector<double> likeness;
+    for (std::size_t i = 0; i < profiles_.points; ++i) {
+      if (weight_[i] > 0) {
+        likeness.push_back(likeness_[i]);
+      }
+    }
+    return median_of(std::move(likeness)) > kLeastLikeness;
+  }
+  [[nodiscard]] const std::vector<double>& shape() const { return shape_; }   // grey levels, per sample
+  [[nodiscard]] const std::vector<double>& places() const { return place_; }  // px, per point
+
+ private:
+  void average();
+  void move_shape(double place_px);
+  [[nodiscard]] bool place_all();
+  [[nodiscard]] bool place(std::size_t i, double shape_energy, std::vector<double>& square,
+                           std::vector<int>& count);
+  void average_gains();
+  void smooth_places();
+
+  const Profiles& profiles_;
+  const std::vector<double>& soft_;
+  double modes_;
+  std::vector<double> shape_;
+  std::vector<double> trust_;  // per sample: the less other things differ there, the more
+  std::vector<double> place_, raw_, weight_, gain_, gain_raw_;
+  std::vector<double> misfit_;    // grey levels, rms
+  std::vector<double> likeness_;  // share of the variance that is explained
+  std::vector<double> moved_shape_, moved_slope_, values_;
+};
+
+// Mean of the middle half: as robust as is needed against impurities, and less noisy than the median.
+double middle_mean(std::vector<double>& v) {
+  if (v.size() < 8) {
+    return 0;
+  }
+  const auto quarter = static_cast<std::ptrdiff_t>(v.size() / 4);
+  std::nth_element(v.begin(), v.begin() + quarter, v.end());
+  std::nth_element(v.begin() + quarter, v.end() - quarter, v.end());
+  double sum = 0;
+  for (auto it = v.begin() + quarter; it != v.end() - quarter; ++it) {
+    sum += *it;
+  }
+  return sum / static_cast<double>(v.end() - v.begin() - 2 * quarter);
+}
+
+void CommonShape::average() {
+  const std::size_t m = profiles_.samples;
+  std::vector<double> level(profiles_.points);
+  for (std::size_t i = 0; i < profiles_.points; ++i) {
+    const double* row = &profiles_.grey[i * m];
+    for (std::size_t j = 0; j < m; ++j) {
+      level[i] += row[j] / static_cast<double>(m);
+    }
+  }
+  for (std::size_t j = 0; j < m; ++j) {
+    values_.clear();
+    for (std::size_t i = 0; i < profiles_.points; ++i) {
+      if (profiles_.whole[i] != 0 && soft_[i] < 0.5) {
+        const double x =
+            std::clamp(static_cast<double>(j) + place_[i] / kSample_px, 0.0, static_cast<double>(m) - 1.001);
+        const auto low = static_cast<std::size_t>(x);
+        const double u = x - static_cast<double>(low);
+        const double* row = &profiles_.grey[i * m];
+        values_.push_back(((1 - u) * row[low] + u * row[low + 1] - level[i]) / gain_[i]);
+      }
+    }
+    shape_[j] = middle_mean(values_);
+  }
+}
+
+// The shape and its slope (per px) at the samples of a profile whose place that is.
+void CommonShape::move_shape(double place_px) {
+  const auto m = static_cast<std::ptrdiff_t>(shape_.size());
+  const double shift = place_px / kSample_px, whole = std::ceil(shift), u = whole - shift;
+  const auto at = [&](std::ptrdiff_t j) {
+    return shape_[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(j, 0, m - 1))];
+  };
+  for (std::ptrdiff_t j = 0; j < m; ++j) {
+    const std::ptrdiff_t k = j - static_cast<std::ptrdiff_t>(whole);
+    const double before = at(k - 1), here = at(k), after = at(k + 1), next = at(k + 2);
+    moved_shape_[static_cast<std::size_t>(j)] = (1 - u) * here + u * after;
+    moved_slope_[static_cast<std::size_t>(j)] =
+        ((1 - u) * (after - before) + u * (next - here)) / (2 * kSample_px);
+  }
+}
+
+bool CommonShape::place_all() {
+  double shape_energy = 0;
+  move_shape(0);
+  for (const double slope : moved_slope_) {
+    shape_energy += slope * slope;
+  }
+  if (!(shape_energy > 0)) {
+    return false;
+  }
+  std::vector<double> square(profiles_.samples, 0.0);  // of what the shape leaves, per sample
+  std::vector<int> count(profiles_.samples, 0);
+  std::size_t used = 0;
+  for (std::size_t i = 0; i < profiles_.points; ++i) {
+    raw_[i] = place_[i];
+    weight_[i] = 0;
+    used += place(i, shape_energy, square, count);
+  }
+  double usual = 0;
+  for (std::size_t j = 0; j < square.size(); ++j) {
+    square[j] = count[j] > 0 ? square[j] / count[j] : 0;
+    usual += square[j] / static_cast<double>(square.size());
+  }
+  for (std::size_t j = 0; j < square.size(); ++j) {
+    trust_[j] = usual / std::max(square[j], 0.05 * usual + 1e-9);
+  }
+  return static_cast<double>(used) >= kLeastShare * static_cast<double>(profiles_.points);
+}
+
+// One step of Gauss and Newton. False: too little of the edge is seen, or it is another one.
+bool CommonShape::place(std::size_t i, double shape_energy, std::vector<double>& square,
+                        std::vector<int>& count) {
+  move_shape(place_[i]);
+  // Weighted normal equations for level, gain and step; the derivative by the place is -gain slope.
+  cv::Matx33d a = cv::Matx33d::zeros();
+  cv::Vec3d b = cv::Vec3d::all(0);
+  double energy = 0, slopes = 0;
+  int n = 0;
+  const double* grey = &profiles_.grey[i * profiles_.samples];
+  const std::uint8_t* seen = &profiles_.seen[i * profiles_.samples];
+  for (std::size_t j = 0; j < profiles_.samples; ++j) {
+    if (seen[j] == 0) {
+      continue;
+    }
+    const double w = trust_[j], t = moved_shape_[j], d = -gain_[i] * moved_slope_[j];
+    a(0, 0) += w;
+    a(0, 1) += w * t;
+    a(0, 2) += w * d;
+    a(1, 1) += w * t * t;
+    a(1, 2) += w * t * d;
+    a(2, 2) += w * d * d;
+    b += w * grey[j] * cv::Vec3d(1, t, d);
+    energy += w * grey[j] * grey[j];
+    slopes += moved_slope_[j] * moved_slope_[j];
+    ++n;
+  }
+  if (n < kLeastSamples || slopes < 0.5 * shape_energy) {
+    return false;
+  }
+  a(1, 0) = a(0, 1);
+  a(2, 0) = a(0, 2);
+  a(2, 1) = a(1, 2);
+  const cv::Vec3d x = a.solve(b, cv::DECOMP_CHOLESKY);
+  if (!(x[1] > 0)) {
+    return false;
+  }
+  gain_raw_[i] = std::clamp(x[1], 0.2, 5.0);
+  const double spread = energy - b[0] * b[0] / a(0, 0), left = std::max(0.0, energy - x.dot(b));
+  likeness_[i] = spread > 0 ? std::max(0.0, 1 - left / spread) : 0;
+  misfit_[i] = std::sqrt(left / a(0, 0));
+  // The place with the neighbourhood's contrast: of one profile alone contrast and place are hard to tell
+  // apart.
+  const double g = gain_[i], b0 = b[0] - g * a(0, 1), b2 = b[2] - g * a(2, 1);
+  const double det = a(0, 0) * a(2, 2) - a(0, 2) * a(0, 2);
+  if (!(det > 0)) {
+    return false;
+  }
+  const double level = (b0 * a(2, 2) - b2 * a(0, 2)) / det, step = (a(0, 0) * b2 - a(0, 2) * b0) / det;
+  raw_[i] = std::clamp(place_[i] + step, -kMost_px, kMost_px);
+  weight_[i] = 1;
+  for (std::size_t j = 0; j < profiles_.samples; ++j) {
+    if (seen[j] != 0) {
+      square[j] += std::pow(grey[j] - level - g * (moved_shape_[j] - step * moved_slope_[j]), 2);
+      ++count[j];
+    }
+  }
+  return true;
+}
+
+void CommonShape::average_gains() {
+  const std::size_t n = profiles_.points;
+  const auto reach = static_cast<std::size_t>(kGainReach * static_cast<double>(n));
+  for (std::size_t i = 0; i < n; ++i) {
+    values_.clear();
+    for (std::size_t k = n - reach; k <= n + reach; k += 2) {
+      const std::size_t q = (i + k) % n;
+      if (weight_[q] > 0) {
+        values_.push_back(gain_raw_[q]);
+      }
+    }
+    if (values_.size() >= 4) {
+      gain_[i] = median_of(values_);
+    }
+  }
+}
+
+void CommonShape::smooth_places() {
+  const std::size_t n = profiles_.points;
+  values_.clear();
+  for (std::size_t i = 0; i < n; ++i) {
+    if (weight_[i] > 0) {
+      values_.push_back(misfit_[i]);
+    }
+  }
+  const double usual = std::max(median_of(values_), 1e-3);
+  std::vector<double> stiffness(n), robust(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    // An impurity on the edge makes the profile fit badly, and pulls.
+    const double bad = 2 * std::max(0.0, misfit_[i] / usual - 1);
+    weight_[i] *= std::min(1.0, gain_[i] * gain_[i]) / (1 + bad * bad);
+    stiffness[i] = stiffness_of(modes_, soft_[i], n);
+  }
+  robust = weight_;
+  for (int round = 0; round < 2; ++round) {
+    place_ = smooth_periodic(raw_, robust, stiffness);
+    values_.clear();
+    for (std::size_t i = 0; i < n; ++i) {
+      if (weight_[i] > 0) {
+        values_.push_back(std::abs(raw_[i] - place_[i]));
+      }
+    }
+    const double limit = kTukey * std::max(kSdOfMedian * median_of(values_), kLeastScale_px);
+    for (std::size_t i = 0; i < n; ++i) {
+      const double t = (raw_[i] - place_[i]) / limit;
+      robust[i] = std::abs(t) < 1 ? weight_[i] * std::pow(1 - t * t, 2) : 0;
+    }
+  }
+  place_ = smooth_periodic(raw_, robust, stiffness);
+  for (double& p : place_) {
+    p = std::clamp(p, -kMost_px, kMost_px);
+  }
+}
+
+// The common shape as one or two blurred steps. Unknown are the place of the own step, the blur, and the
+// place of the nearby one against it; for given ones, level and heights follow by linear least squares.
+class BlurredSteps {
+ public:
+  BlurredSteps(const std::vector<double>& shape, const EdgeShape& edge) : shape_(shape), edge_(edge) {}
+
+  // Where the own step lies, px from the contour; empty when no such step explains the shape.
+  [[nodiscard]] std::optional<double> own_place() {
+    cv::Vec3d x(0, kBlurFirst_px, edge_.nearby ? edge_.nearby->at : 0);
+    double cost = residuals(x, now_), damping = 1e-3;
+    for (int round = 0; round < 25 && damping < 1e4; ++round) {
+      const cv::Vec3d y = x + step(x, damping);
+      const double next = residuals(y, ahead_);
+      if (!(next < cost)) {
+        damping *= 10;
+        continue;
+      }
+      const bool settled = cost - next < 1e-4 * cost;
+      x = y;
+      cost = next;
+      now_ = ahead_;
+      damping = std::max(damping / 5, 1e-6);
+      if (settled) {
+        break;
+      }
+    }
+    const bool plausible = std::abs(x[0]) < kMost_px && x[1] > kBlurLeast_px && x[1] < kBlurMost_px;
+    return plausible ? std::optional(x[0]) : std::nullopt;
+  }
+
+ private:
+  [[nodiscard]] bool free(int k) const { return k < 2 || (edge_.nearby && edge_.nearby->tolerance_px > 0); }
+  // Returns the sum of their squares.
+  double residuals(const cv::Vec3d& x, std::vector<double>& out) const {
+    const double blur = std::clamp(x[1], 0.3, 8.0) * std::numbers::sqrt2;
+    std::vector<cv::Vec3d> column(shape_.size());
+    cv::Matx33d a = cv::Matx33d::zeros();
+    cv::Vec3d b = cv::Vec3d::all(0);
+    for (std::size_t j = 0; j < shape_.size(); ++j) {
+      const double s = static_cast<double>(j) * kSample_px - edge_.inside - x[0];
+      column[j] = {1, std::erfc(-s / blur), edge_.nearby ? std::erfc(-(s - x[2]) / blur) : 0};
+      a += column[j] * column[j].t();
+      b += shape_[j] * column[j];
+    }
+    for (int p = 0; p < 3; ++p) {
+      a(p, p) += 1e-9 * static_cast<double>(shape_.size());
+    }
+    const cv::Vec3d h = a.solve(b, cv::DECOMP_CHOLESKY);
+    out.clear();
+    double cost = 0;
+    for (std::size_t j = 0; j < shape_.size(); ++j) {
+      out.push_back(shape_[j] - h.dot(column[j]));
+      cost += out.back() * out.back();
+    }
+    if (free(2)) {
+      out.push_back(kShapeNoise * (x[2] - edge_.nearby->at) / edge_.nearby->tolerance_px);
+      cost += out.back() * out.back();
+    }
+    return cost;
+  }
+  // Of Levenberg and Marquardt, with differences.
+  cv::Vec3d step(const cv::Vec3d& x, double damping) {
+    constexpr double kDifference = 1e-4;
+    std::array<std::vector<double>, 3> slope;
+    cv::Matx33d a = cv::Matx33d::eye();
+    cv::Vec3d b = cv::Vec3d::all(0);
+    for (int p = 0; p < 3; ++p) {
+      if (free(p)) {
+        cv::Vec3d y = x;
+        y[p] += kDifference;
+        residuals(y, slope[static_cast<std::size_t>(p)]);
+      }
+    }
+    for (int p = 0; p < 3; ++p) {
+      for (int q = 0; q <= p && free(p); ++q) {
+        a(p, q) = 0;
+        for (std::size_t j = 0; j < now_.size(); ++j) {
+          a(p, q) += (slope[static_cast<std::size_t>(p)][j] - now_[j]) *
+                     (slope[static_cast<std::size_t>(q)][j] - now_[j]) / (kDifference * kDifference);
+        }
+        a(q, p) = a(p, q);
+      }
+      for (std::size_t j = 0; j < now_.size() && free(p); ++j) {
+        b[p] -= (slope[static_cast<std::size_t>(p)][j] - now_[j]) / kDifference * now_[j];
+      }
+      a(p, p) = a(p, p) * (1 + damping) + 1e-9;
+    }
+    cv::Vec3d d = a.solve(b, cv::DECOMP_CHOLESKY);
+    for (int p = 0; p < 3; ++p) {
+      d[p] = free(p) ? std::clamp(d[p], -1.0, 1.0) : 0;
+    }
+    return d;
+  }
+
+  const std::vector<double>& shape_;
+  const EdgeShape& edge_;
+  std::vector<double> now_, ahead_;
+};
+
+}  // namespace
+
+std::optional<Contour> shaped_edge(const ClearedPicture& picture, const Contour& contour,
+                                   const std::vector<double>& soft, const EdgeShape& edge) {
+  if (contour.size() < 64 || soft.size() != contour.size()) {
+    return std::nullopt;
+  }
+  const Contour base = smoothed(contour, soft, edge.modes);
+  const Profiles profiles(picture, base, edge);
+  CommonShape common(profiles, soft, edge.modes);
+  if (!common.find()) {
+    return std::nullopt;
+  }
+  const auto own = BlurredSteps(common.shape(), edge).own_place();
+  if (!own) {
+    return std::nullopt;
+  }
+  Contour out(base.size());
+  for (std::size_t i = 0; i < base.size(); ++i) {
+    out[i] = base[i] + (common.places()[i] + *own) * profiles.normal[i];
+  }
+  return out;
+}
+
+}  // namespace punctum::vision

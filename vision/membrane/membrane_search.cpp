@@ -14,7 +14,8 @@ namespace {
 
 constexpr double kSaturation = 0.7;   // times the usual edge: a stronger one is not better
 constexpr double kBesideHalf = 0.24;  // rad to either side of the entry: the steep part of a dimple
-constexpr double kHardlySunk = 0.15;  // of the tip's depth; the steep part of a dimple is deeper
+// Of the tip's depth; the steep part of a dimple is deeper. The zona dents over a narrower arc than what is within it.
+constexpr double kHardlySunk = 0.15, kHardlySunkInner = 0.25;
 constexpr double kNearHalf = 0.5;     // rad to either side of the entry: the dimple and its rim
 constexpr double kApart_px = 1.5;     // nearer, two paths are the same edge
 
@@ -231,8 +232,8 @@ EdgeFound pushed_or_free(const MembraneSearch& s) {
   const Differing outside = s.where_further_out(free, path);
   const double least = s.surroundings.punctured && s.surroundings.outermost ? 0.4 : 0.7;
   // And where the membrane beside the needle is hardly lower than at rest, the needle has gone through it.
-  const bool through =
-      s.surroundings.outermost && s.sunk_beside_needle(free) < kHardlySunk * s.depth_of_tip();
+  const double hardly = s.surroundings.outermost ? kHardlySunk : kHardlySunkInner;
+  const bool through = s.sunk_beside_needle(free) < hardly * s.depth_of_tip();
   const bool is_free = through || (outside.by > outside.from_rest && outside.seen > least);
   return {is_free ? std::move(free) : std::move(path), is_free};
 }

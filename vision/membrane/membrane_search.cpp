@@ -12,12 +12,14 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr double kSaturation = 0.7;   // times the usual edge: a stronger one is not better
-constexpr double kBesideHalf = 0.24;  // rad to either side of the entry: the steep part of a dimple
-// Of the tip's depth; the steep part of a dimple is deeper. The zona dents over a narrower arc than what is within it.
-constexpr double kHardlySunk = 0.15, kHardlySunkInner = 0.25;
-constexpr double kNearHalf = 0.5;     // rad to either side of the entry: the dimple and its rim
-constexpr double kApart_px = 1.5;     // nearer, two paths are the same edge
+constexpr double kSaturation = 0.7;  // times the usual edge: a stronger one is not better
+// Of the tip's depth, or of kDeep_px where it is deeper: so far sunk at most beside the needle, a membrane
+// has let it through. The zona dents over a narrower arc than what is within it.
+constexpr double kHardlySunk = 0.15, kHardlySunkInner = 0.4;
+constexpr double kDeep_px = 12;  // a free membrane is looked for within kFreeHalf_px of its outline at rest
+constexpr double kFreeHalf_px = 7;
+constexpr double kNearHalf = 0.5;  // rad to either side of the entry: the dimple and its rim
+constexpr double kApart_px = 1.5;  // nearer, two paths are the same edge
 
 }  // namespace
 
@@ -107,7 +109,7 @@ EdgePath MembraneSearch::path_free() const {
     const double weight = std::clamp((1.1 - from_needle(i)) / 0.3, 0.0, 1.0);
     free.middle[k] += weight * (rest[k] - free.middle[k]);
   }
-  free.half_width = std::min(band.half_width, 7.0);
+  free.half_width = std::min(band.half_width, kFreeHalf_px);
   return path_in(free);
 }
 
@@ -197,24 +199,37 @@ double MembraneSearch::depth_of_tip() const {
   return rest[static_cast<std::size_t>(needle->tip_index)] - needle->tip_r;
 }
 
-// Mean over the visible rays; as deep as the tip where there is none.
+// As a share of the tip's depth, where it is seen nearest to the needle on either side; 1 where it is not
+// seen.
 double MembraneSearch::sunk_beside_needle(const EdgePath& path) const {
+  constexpr int kNearest = 3;        // rays on either side
+  constexpr double kFurthest = 0.5;  // rad from the needle
+  const auto ray = [this](int i) { return ((i % angles) + angles) % angles; };
   double sum = 0;
   int n = 0;
-  for (int i = 0; i < angles; ++i) {
-    const std::size_t k = static_cast<std::size_t>(i);
-    if (from_needle(i) < kBesideHalf && path.seen[k] != 0 &&
-        !picture.hidden(on_ray(band.centre, i, angles, path.raw[k]))) {
-      sum += rest[k] - path.raw[k];
-      ++n;
+  for (const int side : {-1, 1}) {
+    int seen = 0;
+    for (int i = needle->tip_index; seen < kNearest && from_needle(ray(i)) < kFurthest; i += side) {
+      const std::size_t k = static_cast<std::size_t>(ray(i));
+      if (path.seen[k] != 0 && !picture.hidden(on_ray(band.centre, ray(i), angles, path.raw[k]))) {
+        sum += rest[k] - path.raw[k];
+        ++seen;
+        ++n;
+      }
     }
   }
-  return n > 3 ? sum / n : depth_of_tip();
+  return n >= kNearest ? sum / n / std::min(depth_of_tip(), kDeep_px) : 1;
 }
 
 EdgeFound pushed_or_free(const MembraneSearch& s) {
-  if (!s.needle || s.rest.empty() || s.depth_of_tip() <= 1.0) {
+  if (!s.needle || s.rest.empty()) {
     return {s.path_in(s.band)};
+  }
+  if (s.depth_of_tip() <= 1.0) {
+    // Nothing pushes an inner membrane then: the outer one, which dents it before the tip is there, has given
+    // way.
+    const bool is_free = s.surroundings.punctured && !s.surroundings.outermost;
+    return {is_free ? s.path_free() : s.path_in(s.band), is_free};
   }
   EdgePath path;
   if (s.surroundings.outermost && !s.surroundings.punctured) {
@@ -233,7 +248,7 @@ EdgeFound pushed_or_free(const MembraneSearch& s) {
   const double least = s.surroundings.punctured && s.surroundings.outermost ? 0.4 : 0.7;
   // And where the membrane beside the needle is hardly lower than at rest, the needle has gone through it.
   const double hardly = s.surroundings.outermost ? kHardlySunk : kHardlySunkInner;
-  const bool through = s.sunk_beside_needle(free) < hardly * s.depth_of_tip();
+  const bool through = s.sunk_beside_needle(free) < hardly;
   const bool is_free = through || (outside.by > outside.from_rest && outside.seen > least);
   return {is_free ? std::move(free) : std::move(path), is_free};
 }

@@ -62,7 +62,7 @@ struct MembraneSearch {
   [[nodiscard]] EdgePath path_pushed() const;
   [[nodiscard]] std::vector<std::pair<int, double>> end_face() const;
   [[nodiscard]] double depth_of_tip() const;                            // px below the rest outline
-  [[nodiscard]] double sunk_beside_needle(const EdgePath& path) const;  // px
+  [[nodiscard]] double sunk_beside_needle(const EdgePath& path) const;  // as a share of the tip's depth
   [[nodiscard]] bool reaches_the_tip(const EdgePath& pushed) const;
   [[nodiscard]] Differing where_further_out(const EdgePath& path, const EdgePath& other) const;
 

@@ -1,0 +1,161 @@
+// Whole injections drawn by the renderer in $PUNCTUM_DATA/../frames, or ../shared/frames: other people's
+// code, optics and dimple. It is not part of this tree, and needs Python's numpy and OpenCV.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "vision/tracker.hpp"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace punctum;
+using namespace punctum::vision;
+
+constexpr int kFrames = 40;
+constexpr double kPixel_um = 0.825;
+constexpr double kRight_px = 2, kWrong_px = 4;  // nowhere further away; somewhere further away
+
+fs::path renderer() {
+  const char* named = std::getenv("PUNCTUM_DATA");
+  return fs::path(named != nullptr ? named : "../shared/data") / "../frames/render.py";
+}
+
+Contour contour_of(const nlohmann::json& points) {
+  Contour contour;
+  for (const auto& p : points) {
+    contour.emplace_back(p[0].get<double>(), p[1].get<double>());
+  }
+  return contour;
+}
+
+double distance(const Point& p, const Contour& closed) {
+  double nearest = std::numeric_limits<double>::max();
+  for (std::size_t i = 0; i < closed.size(); ++i) {
+    const Point a = closed[i], d = closed[(i + 1) % closed.size()] - a;
+    const double t = std::clamp((p - a).dot(d) / std::max(d.dot(d), 1e-12), 0.0, 1.0);
+    nearest = std::min(nearest, cv::norm(a + t * d - p));
+  }
+  return nearest;
+}
+
+// Of one membrane in the frames of one phase. A frame in which it is not claimed is not right.
+struct Score {
+  int frames = 0, right = 0, wrong = 0;
+  double sum2_px2 = 0;
+  std::size_t points = 0;
+
+  void add(const Contour& truth, const Membrane& seen) {
+    ++frames;
+    if (!seen.ok) {
+      return;
+    }
+    double furthest = 0;
+    for (const Point& p : truth) {
+      const double d = distance(p, seen.contour);
+      sum2_px2 += d * d;
+      furthest = std::max(furthest, d);
+    }
+    points += truth.size();
+    for (const Point& p : seen.contour) {
+      furthest = std::max(furthest, distance(p, truth));
+    }
+    right += furthest < kRight_px ? 1 : 0;
+    wrong += furthest > kWrong_px ? 1 : 0;
+  }
+  [[nodiscard]] double rms_um() const {
+    return kPixel_um * std::sqrt(sum2_px2 / static_cast<double>(std::max<std::size_t>(points, 1)));
+  }
+};
+
+struct Sequence {
+  int seed, noise;            // grey levels
+  double outer_um, inner_um;  // rms at most, where nothing moves the membrane
+};
+
+class ForeignFrames : public testing::TestWithParam<Sequence> {
+ protected:
+  void SetUp() override {
+    if (!fs::exists(renderer())) {
+      GTEST_SKIP() << renderer() << " is not there: the renderer is not part of this tree";
+    }
+    if (std::system("/usr/bin/python3 -c 'import numpy, cv2, scipy' 2>/dev/null") != 0) {
+      GTEST_SKIP() << "the renderer needs python3-numpy, python3-opencv and python3-scipy";
+    }
+    folder = fs::path(testing::TempDir()) /
+             ("foreign_" + std::to_string(GetParam().seed) + "_" + std::to_string(GetParam().noise));
+    const std::string draw = "/usr/bin/python3 " + renderer().string() + " " + folder.string() + " " +
+                             std::to_string(GetParam().seed) + " " + std::to_string(GetParam().noise) + " " +
+                             std::to_string(kFrames) + " >/dev/null";
+    ASSERT_EQ(std::system(draw.c_str()), 0) << draw;
+  }
+  void TearDown() override { fs::remove_all(folder); }
+
+  fs::path folder;
+};
+
+TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
+  nlohmann::json truth;
+  std::ifstream(folder / "truth.json") >> truth;
+  ASSERT_EQ(truth.size(), kFrames);
+  VisionConfig config;
+  config.pixel_m = kPixel_um * 1e-6;
+  std::optional<Tracker> tracker;
+  std::map<std::string, Score> outer, inner;
+  for (int k = 0; k < kFrames; ++k) {
+    char name[32];
+    std::snprintf(name, sizeof name, "frame_%04d.png", k);
+    const cv::Mat picture = cv::imread((folder / name).string(), cv::IMREAD_GRAYSCALE);
+    ASSERT_FALSE(picture.empty()) << name;
+    if (!tracker) {
+      tracker.emplace(config, picture.cols, picture.rows);
+    }
+    hal::Frame frame;
+    frame.pixels = picture.data;
+    frame.width = picture.cols;
+    frame.height = picture.rows;
+    frame.stride = static_cast<int>(picture.step);
+    frame.sequence = static_cast<std::uint64_t>(k);
+    frame.exposure_ns = k * 40'000'000LL;
+    const Result& seen = tracker->process(frame);
+    const nlohmann::json& t = truth[static_cast<std::size_t>(k)];
+    const std::string phase = t["phase"];
+    const std::string part = phase == "contact" || phase == "puncture" ? phase : "at rest";
+    outer[part].add(contour_of(t["outer"]), seen.outer);
+    inner[part].add(contour_of(t["inner"]), seen.inner);
+  }
+  int right = 0, wrong = 0;
+  for (const auto& [membrane, parts] : {std::pair{"outer", outer}, std::pair{"inner", inner}}) {
+    for (const auto& [part, score] : parts) {
+      std::printf("%s %-8s %2d frames, %2d right, %d wrong, rms %.3f um\n", membrane, part.c_str(),
+                  score.frames, score.right, score.wrong, score.rms_um());
+      right += score.right;
+      wrong += score.wrong;
+    }
+  }
+  EXPECT_EQ(outer["at rest"].right, outer["at rest"].frames);
+  EXPECT_GE(inner["at rest"].right, inner["at rest"].frames * 7 / 10);
+  EXPECT_LT(outer["at rest"].rms_um(), GetParam().outer_um);
+  EXPECT_LT(inner["at rest"].rms_um(), GetParam().inner_um);
+  EXPECT_GE(right, 2 * kFrames * 8 / 10) << "of both membranes in all frames";
+  EXPECT_LE(wrong, 2 * kFrames / 20) << "claimed";
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, ForeignFrames,
+                         testing::Values(Sequence{106, 2, 0.08, 0.3}, Sequence{107, 5, 0.13, 0.35},
+                                         Sequence{108, 10, 0.2, 0.4}),
+                         [](const auto& of) { return "noise_" + std::to_string(of.param.noise); });
+
+}  // namespace

@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/programs.hpp"
 #include "vision/tracker.hpp"
 
 namespace {
@@ -85,21 +86,24 @@ struct Sequence {
   double outer_um, inner_um;  // rms at most, where nothing moves the membrane
 };
 
+int python(const std::vector<std::string>& arguments) {
+  return e2e::Running(arguments, "/dev/null", "python3").wait();
+}
+
 class ForeignFrames : public testing::TestWithParam<Sequence> {
  protected:
   void SetUp() override {
     if (!fs::exists(renderer())) {
       GTEST_SKIP() << renderer() << " is not there: the renderer is not part of this tree";
     }
-    if (std::system("/usr/bin/python3 -c 'import numpy, cv2, scipy' 2>/dev/null") != 0) {
+    if (python({"-c", "import numpy, cv2, scipy"}) != 0) {
       GTEST_SKIP() << "the renderer needs python3-numpy, python3-opencv and python3-scipy";
     }
-    folder = fs::path(testing::TempDir()) /
-             ("foreign_" + std::to_string(GetParam().seed) + "_" + std::to_string(GetParam().noise));
-    const std::string draw = "/usr/bin/python3 " + renderer().string() + " " + folder.string() + " " +
-                             std::to_string(GetParam().seed) + " " + std::to_string(GetParam().noise) + " " +
-                             std::to_string(kFrames) + " >/dev/null";
-    ASSERT_EQ(std::system(draw.c_str()), 0) << draw;
+    const auto& [seed, noise, outer_um, inner_um] = GetParam();
+    folder = fs::path(testing::TempDir()) / ("foreign_" + std::to_string(seed) + "_" + std::to_string(noise));
+    ASSERT_EQ(python({renderer().string(), folder.string(), std::to_string(seed), std::to_string(noise),
+                      std::to_string(kFrames)}),
+              0);
   }
   void TearDown() override { fs::remove_all(folder); }
 

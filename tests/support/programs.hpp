@@ -50,10 +50,13 @@ class Running {
     pid_ = fork();
     if (pid_ == 0) {
       const int out = open(output_.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+      const int null = open("/dev/null", O_RDONLY);
+      if (out < 0 || null < 0) {
+        _exit(127);
+      }
+      dup2(null, 0);
       dup2(out, 1);
       dup2(out, 2);
-      const int null = open("/dev/null", O_RDONLY);
-      dup2(null, 0);
       const std::string program = std::string(PUNCTUM_BIN_DIR) + "/" + name;
       std::vector<char*> argv{const_cast<char*>(program.c_str())};
       for (const auto& a : args) {

@@ -13,13 +13,13 @@ namespace punctum::vision {
 namespace {
 
 constexpr double kSaturation = 0.7;  // times the usual edge: a stronger one is not better
-// Of the tip's depth, or of kDeep_px where it is deeper: so far sunk at most beside the needle, a membrane
-// has let it through. The zona dents over a narrower arc than what is within it.
+// Beside the needle, as a share of the tip's depth: a membrane that is sunk by less has let the needle
+// through. The zona dents over a narrower arc than what is within it.
 constexpr double kHardlySunk = 0.15, kHardlySunkInner = 0.4;
-constexpr double kDeep_px = 12;  // a free membrane is looked for within kFreeHalf_px of its outline at rest
-constexpr double kFreeHalf_px = 7;
-constexpr double kNearHalf = 0.5;  // rad to either side of the entry: the dimple and its rim
-constexpr double kApart_px = 1.5;  // nearer, two paths are the same edge
+constexpr double kFreeHalf_px = 7;    // a free membrane is looked for so near to its outline at rest
+constexpr double kDeepInner_px = 12;  // and so is not sunk by more than a share of this, however deep the tip
+constexpr double kNearHalf = 0.5;     // rad to either side of the entry: the dimple and its rim
+constexpr double kApart_px = 1.5;     // nearer, two paths are the same edge
 
 }  // namespace
 
@@ -218,7 +218,8 @@ double MembraneSearch::sunk_beside_needle(const EdgePath& path) const {
       }
     }
   }
-  return n >= kNearest ? sum / n / std::min(depth_of_tip(), kDeep_px) : 1;
+  const double deep = surroundings.outermost ? depth_of_tip() : std::min(depth_of_tip(), kDeepInner_px);
+  return n >= kNearest ? sum / n / deep : 1;
 }
 
 EdgeFound pushed_or_free(const MembraneSearch& s) {

@@ -150,16 +150,20 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
     }
   }
   EXPECT_EQ(outer["at rest"].right, outer["at rest"].frames);
-  EXPECT_GE(inner["at rest"].right, inner["at rest"].frames * 7 / 10);
+  EXPECT_GE(inner["at rest"].right, inner["at rest"].frames * 8 / 10);
   EXPECT_LT(outer["at rest"].rms_um(), GetParam().outer_um);
   EXPECT_LT(inner["at rest"].rms_um(), GetParam().inner_um);
   EXPECT_GE(right, 2 * kFrames * 8 / 10) << "of both membranes in all frames";
   EXPECT_LE(wrong, 2 * kFrames / 20) << "claimed";
 }
 
+// In 7 and 107 the inner membrane was once held in its dimple; 106 and 108 were never tuned on.
 INSTANTIATE_TEST_SUITE_P(Seeds, ForeignFrames,
-                         testing::Values(Sequence{106, 2, 0.08, 0.3}, Sequence{107, 5, 0.13, 0.35},
-                                         Sequence{108, 10, 0.2, 0.4}),
-                         [](const auto& of) { return "noise_" + std::to_string(of.param.noise); });
+                         testing::Values(Sequence{7, 2, 0.08, 0.3}, Sequence{106, 2, 0.08, 0.3},
+                                         Sequence{107, 5, 0.13, 0.35}, Sequence{108, 10, 0.2, 0.4}),
+                         [](const auto& of) {
+                           return "seed_" + std::to_string(of.param.seed) + "_noise_" +
+                                  std::to_string(of.param.noise);
+                         });
 
 }  // namespace

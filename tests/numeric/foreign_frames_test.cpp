@@ -100,7 +100,9 @@ class ForeignFrames : public testing::TestWithParam<Sequence> {
       GTEST_SKIP() << "the renderer needs python3-numpy, python3-opencv and python3-scipy";
     }
     const auto& [seed, noise, outer_um, inner_um] = GetParam();
-    folder = fs::path(testing::TempDir()) / ("foreign_" + std::to_string(seed) + "_" + std::to_string(noise));
+    // Its own: the sanitizers' build of this test may run at the same time.
+    folder =
+        fs::path(testing::TempDir()) / ("foreign_" + std::to_string(seed) + "_" + std::to_string(getpid()));
     ASSERT_EQ(python({renderer().string(), folder.string(), std::to_string(seed), std::to_string(noise),
                       std::to_string(kFrames)}),
               0);

@@ -17,7 +17,7 @@ constexpr double kSaturation = 0.7;  // times the usual edge: a stronger one is 
 // through. The zona dents over a narrower arc than what is within it.
 constexpr double kHardlySunk = 0.15, kHardlySunkInner = 0.4;
 constexpr double kFreeHalf_px = 7;    // a free membrane is looked for so near to its outline at rest
-constexpr double kDeepInner_px = 12;  // and so is not sunk by more than a share of this, however deep the tip
+constexpr double kDeepInner_px = 12;  // counts as the depth of a tip that is deeper inside the inner membrane
 constexpr double kNearHalf = 0.5;     // rad to either side of the entry: the dimple and its rim
 constexpr double kApart_px = 1.5;     // nearer, two paths are the same edge
 

@@ -35,7 +35,8 @@ struct Drawing {
   unsigned seed = 1;
   bool needle = true;
   double dent_half_rad = 0.42;
-  bool granules = false;  // in the ooplasm, where a dimple's sides may be
+  double inner_dent = -1;  // px; < 0: 0.9 of the outer membrane's
+  bool granules = false;   // in the ooplasm, where a dimple's sides may be
 };
 
 cv::Mat draw(const Drawing& d) {
@@ -58,7 +59,8 @@ cv::Mat draw(const Drawing& d) {
         if (r < kR - kZona - in) {
           g += 26;  // perivitelline space
         }
-        if (r < kInner - in * 0.9) {
+        const double inner_in = d.inner_dent < 0 ? in * 0.9 : dent(std::atan2(q.y, q.x), d.inner_dent);
+        if (r < kInner - inner_in) {
           g -= 34;  // ooplasm
         }
         if (d.granules && std::hypot(q.x - kInner + 12, std::abs(q.y) - 5) < 4) {
@@ -317,6 +319,28 @@ TEST(Tracker, tells_the_inner_membrane_from_the_dimple_that_it_had) {
     if (k >= 2) {
       EXPECT_LT(rms_error(r.inner.contour, kInner, 0, 0), 0.7) << k;
     }
+  }
+}
+
+// The needle is through the zona and pushes what is within.
+TEST(Tracker, follows_an_inner_membrane_that_the_needle_pushes) {
+  Tracker tracker({}, kW, kH);
+  std::uint64_t n = 0;
+  const auto look = [&](double depth, double outer, double inner) -> const Result& {
+    Drawing drawn{kCentre.x + kR - depth, outer, 2, static_cast<unsigned>(n) + 1};
+    drawn.inner_dent = inner;
+    return tracker.process(frame_of(draw(drawn), n++));
+  };
+  const double gap = kR - kInner;
+  for (double depth = -26; depth <= 8; depth += depth < 0 ? 4 : 1) {
+    (void)look(depth, std::max(0.0, depth), 0);
+  }
+  for (double depth = 8; depth <= gap + 22; ++depth) {
+    const double pushed = std::max(0.0, depth - gap);
+    const Result& r = look(depth, 0, pushed);
+    ASSERT_TRUE(r.inner.ok) << depth << r.verdict;
+    EXPECT_LT(rms_error(r.inner.contour, kInner, pushed, 1), 1.0) << depth;
+    EXPECT_FALSE(r.inner_punctured) << depth;
   }
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "hal/math/elementary.hpp"
 #include "vision/events/contact.hpp"
 #include "vision/events/phase.hpp"
 #include "vision/events/puncture.hpp"
@@ -29,6 +30,7 @@ constexpr double kNeedleMargin_px = 2.5;  // the blur reaches so far beyond the 
 constexpr double kUntouched_px = 12;      // further outside, nothing touches the tip
 constexpr double kLeastDimple_px = 0.7;   // depth from which the width of a dimple can be measured
 constexpr double kNear_px = 8;            // nearer, the needle may touch the membrane
+constexpr double kClear_px = 3;           // further away, it does not: its blur ends before
 constexpr double kTipNoise_px = 0.1;
 // The paper keeps the large variations of the gradient only. Of the usual edge of a membrane: with 0.4 needle
 // and cell merge when they are still 4 px apart, with 0.75 they part again over a deep dimple.
@@ -57,6 +59,7 @@ struct Tracker::Impl {
   bool template_given = false;
   int holder_tries = 0;
   InjectionPipette needle;
+  TipOnMembrane tip_on_membrane;
   TipMotion tip;
 
   FollowedMembrane outer, inner;
@@ -93,6 +96,7 @@ struct Tracker::Impl {
   void follow_membranes(Stopwatch& watch);
   [[nodiscard]] Surroundings surroundings() const;
   void measure();
+  [[nodiscard]] Undeformed at_rest() const;
   [[nodiscard]] int fit_undeformed_membrane();
   void measure_gap(int fitted_points);
   [[nodiscard]] std::optional<double> look_for_contact();
@@ -172,6 +176,10 @@ const Result& Tracker::Impl::process(const hal::Frame& frame) {
     if (result.needle.ok && !result.contact && (untouched || !result.gap_px)) {
       needle.learn(picture.field, result.needle, picture.noise);
     }
+    if (result.needle.ok && !result.contact && result.gap_px &&
+        *result.gap_px > TipOnMembrane::kClearAhead_px) {
+      tip_on_membrane.learn(picture.field, result.needle);
+    }
   } else {
     events_without_the_cell();
   }
@@ -207,7 +215,7 @@ void Tracker::Impl::locate_needle() {
   NeedlePose& n = result.needle;
   n = needle.find(picture.field, picture.noise);
   if (config.method == Method::tracker && n.ok && was_contact && !punctured && outer.known) {
-    n.tip += membrane_ahead_of_tip(picture.field, n, outer.polarity, outer.level) * n.axis;
+    n.tip += tip_on_membrane.ahead(picture.field, picture.noise, n).value_or(0) * n.axis;
   }
 }
 
@@ -346,14 +354,27 @@ void Tracker::Impl::measure() {
   }
 }
 
+// The outer membrane as it was seen with nothing touching it; if it never was, the shape that is fitted to
+// what does not touch anything.
+Undeformed Tracker::Impl::at_rest() const {
+  Undeformed out = *undeformed.shape();
+  if (outer.rest.frames > 0) {
+    out.shape = from_polar(outer.rest.centre, outer.rest.r);
+  }
+  return out;
+}
+
 // Returns the number of contour points that tell the undeformed membrane.
 int Tracker::Impl::fit_undeformed_membrane() {
   const Contour& contour = result.outer.contour;
   const NeedlePose& n = result.needle;
   std::optional<Point> entry;  // if the needle is near
+  bool clear = !n.ok;
   if (n.ok) {
-    entry = entry_point(undeformed.known() ? undeformed.shape()->shape : contour, n.tip, n.axis);
-    if (entry && (*entry - n.tip).dot(n.axis) >= kNear_px) {
+    entry = entry_point(undeformed.known() ? at_rest().shape : contour, n.tip, n.axis);
+    const double gap = entry ? (*entry - n.tip).dot(n.axis) : kNear_px;
+    clear = gap >= kClear_px;
+    if (gap >= kNear_px) {
       entry.reset();
     }
   }
@@ -366,12 +387,13 @@ int Tracker::Impl::fit_undeformed_membrane() {
   if (!now) {
     return 0;
   }
-  const bool touched = entry || was_contact || punctured || needle_hidden();
+  const bool touched_before = was_contact || punctured || needle_hidden();
+  const bool touched = entry || touched_before;
   const Point shift = undeformed.update(*now, touched, mouth);
   for (FollowedMembrane* m : {&outer, &inner}) {
     m->rest.centre += shift;
   }
-  if (!touched) {
+  if (clear && !touched_before) {
     outer.rest.learn(outer.centre, outer.r);
     if (inner.known && result.inner.ok) {
       inner.rest.learn(inner.centre, inner.r);
@@ -389,12 +411,12 @@ int Tracker::Impl::fit_undeformed_membrane() {
 
 void Tracker::Impl::measure_gap(int fitted_points) {
   const NeedlePose& n = result.needle;
-  result.entry = entry_point(undeformed.shape()->shape, n.tip, n.axis);
+  result.entry = entry_point(at_rest().shape, n.tip, n.axis);
   if (!result.entry) {
     return;
   }
   result.gap_px = (*result.entry - n.tip).dot(n.axis);
-  result.gap_noise_px = std::hypot(kTipNoise_px, 3 * result.outer.residual_px / std::sqrt(fitted_points));
+  result.gap_noise_px = math::hypot(kTipNoise_px, 3 * result.outer.residual_px / std::sqrt(fitted_points));
 }
 
 // Whether needle and cell touch. Returns how far behind the tip the membrane lies on the needle.
@@ -461,7 +483,7 @@ void Tracker::Impl::measure_depth(double membrane_px) {
   const double depth = result.punctured ? membrane_px : -*result.gap_px;
   result.wd_px = result.contact ? std::max(0.0, depth) : 0.0;
   if (*result.wd_px > kLeastDimple_px) {
-    result.a_px = dimple_half_width(result.outer.contour, *undeformed.shape(), *result.entry, *result.wd_px,
+    result.a_px = dimple_half_width(result.outer.contour, at_rest(), *result.entry, *result.wd_px,
                                     result.needle.half_width);
   }
 }

@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "hal/math/elementary.hpp"
 #include "vision/image/median.hpp"
 
 namespace punctum::vision {
@@ -81,7 +82,7 @@ Contour circle_contour(const Circle& circle, int points) {
   out.reserve(static_cast<std::size_t>(std::max(points, 0)));
   for (int i = 0; i < points; ++i) {
     const double t = 2 * std::numbers::pi * i / points;
-    out.push_back(circle.centre + circle.r * Point(std::cos(t), std::sin(t)));
+    out.push_back(circle.centre + circle.r * Point(math::cos(t), math::sin(t)));
   }
   return out;
 }

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <opencv2/core.hpp>
 
+#include "hal/math/elementary.hpp"
 #include "vision/image/median.hpp"
 #include "vision/image/periodic_smoothing.hpp"
 
@@ -91,7 +92,7 @@ void BandSearch::set_rays() {
   normal_.resize(band_.middle.size());
   double r_mean = 0;
   for (int i = 0; i < n_; ++i) {
-    ray_[angle(i)] = Point(std::cos(i * turn), std::sin(i * turn));
+    ray_[angle(i)] = Point(math::cos(i * turn), math::sin(i * turn));
     r_mean += band_.middle[angle(i)] / n_;
   }
   arc_ = std::max(0.5, r_mean * turn);
@@ -367,10 +368,11 @@ void BandSearch::bridge_gaps() {
 // the anchors.
 std::vector<double> BandSearch::stiffness_per_angle() const {
   std::vector<double> stiffness(band_.middle.size());
+  const double finer = n_ / 256.0;
   for (int i = 0; i < n_; ++i) {
     const double bend = band_.middle[angle(i - 3)] - 2 * band_.middle[angle(i)] + band_.middle[angle(i + 3)];
     const double curvature = std::abs(bend) / (9 * arc_ * arc_);
-    stiffness[angle(i)] = 30 * std::pow(n_ / 256.0, 4) / (1 + std::pow(curvature * 100, 2));
+    stiffness[angle(i)] = 30 * (finer * finer * (finer * finer)) / (1 + std::pow(curvature * 100, 2));
   }
   for (const auto& anchor : band_.anchors) {
     for (int d = -n_ / 16; d <= n_ / 16; ++d) {

@@ -7,6 +7,8 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "hal/math/elementary.hpp"
+
 namespace punctum::vision {
 
 namespace {
@@ -145,7 +147,7 @@ void refine_circle(const std::vector<Vote>& votes, CircleCandidate& c) {
       const double l = cv::norm(d);
       if (std::abs(l - c.circle.r) < tolerance && std::abs(d.dot(v.n)) > 0.8 * l) {
         near.push_back(v.p);
-        const int s = static_cast<int>((std::atan2(d.y, d.x) / (2 * std::numbers::pi) + 0.5) * kSectors);
+        const int s = static_cast<int>((math::atan2(d.y, d.x) / (2 * std::numbers::pi) + 0.5) * kSectors);
         voted[std::clamp(s, 0, kSectors - 1)] = true;
       }
     }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "hal/math/elementary.hpp"
+
 namespace punctum::vision {
 
 std::vector<double> polar_radii(std::span<const Point> contour, const Point& centre, int angles) {
@@ -12,11 +14,11 @@ std::vector<double> polar_radii(std::span<const Point> contour, const Point& cen
   const double step = 2 * std::numbers::pi / angles;
   for (std::size_t i = 0; i < contour.size(); ++i) {
     const Point p = contour[i] - centre, q = contour[(i + 1) % contour.size()] - centre;
-    const double t0 = std::atan2(p.y, p.x);
-    double dt = std::atan2(p.cross(q), p.dot(q));
+    const double t0 = math::atan2(p.y, p.x);
+    double dt = math::atan2(p.cross(q), p.dot(q));
     const double lo = std::min(t0, t0 + dt), hi = std::max(t0, t0 + dt);
     for (int k = static_cast<int>(std::ceil(lo / step - 1e-9)); k * step <= hi + 1e-9; ++k) {
-      const Point d(std::cos(k * step), std::sin(k * step));
+      const Point d(math::cos(k * step), math::sin(k * step));
       const Point e = q - p;
       const double den = d.cross(e);
       if (std::abs(den) < 1e-12) {
@@ -57,7 +59,7 @@ Contour from_polar(const Point& centre, std::span<const double> radii) {
   out.reserve(radii.size());
   for (std::size_t i = 0; i < radii.size(); ++i) {
     const double t = 2 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(radii.size());
-    out.push_back(centre + radii[i] * Point(std::cos(t), std::sin(t)));
+    out.push_back(centre + radii[i] * Point(math::cos(t), math::sin(t)));
   }
   return out;
 }
@@ -65,13 +67,13 @@ Contour from_polar(const Point& centre, std::span<const double> radii) {
 double polar_angle(int i, int angles) { return 2 * std::numbers::pi * i / angles; }
 
 int polar_index(const Point& direction, int angles) {
-  const double turns = std::atan2(direction.y, direction.x) / (2 * std::numbers::pi);
+  const double turns = math::atan2(direction.y, direction.x) / (2 * std::numbers::pi);
   return (static_cast<int>(std::lround(turns * angles)) + angles) % angles;
 }
 
 Point on_ray(const Point& centre, int i, int angles, double r) {
   const double t = polar_angle(i, angles);
-  return centre + r * Point(std::cos(t), std::sin(t));
+  return centre + r * Point(math::cos(t), math::sin(t));
 }
 
 double angle_between(double a, double b) { return std::abs(std::remainder(a - b, 2 * std::numbers::pi)); }

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "hal/math/elementary.hpp"
 #include "vision/image/median.hpp"
 #include "vision/image/polar_contour.hpp"
 
@@ -55,13 +56,13 @@ bool nearly_oval(const std::vector<double>& r) {
       case 0:
         return 1.0;
       case 1:
-        return std::cos(t);
+        return math::cos(t);
       case 2:
-        return std::sin(t);
+        return math::sin(t);
       case 3:
-        return std::cos(2 * t);
+        return math::cos(2 * t);
       default:
-        return std::sin(2 * t);
+        return math::sin(2 * t);
     }
   };
   double c[kTerms] = {};

@@ -7,6 +7,8 @@
 #include <numbers>
 #include <opencv2/core.hpp>
 
+#include "hal/math/elementary.hpp"
+#include "vision/image/blurred_step.hpp"
 #include "vision/image/median.hpp"
 #include "vision/image/periodic_smoothing.hpp"
 
@@ -29,7 +31,8 @@ constexpr double kBlurFirst_px = 1.8, kBlurLeast_px = 0.6, kBlurMost_px = 5;
 
 // Of a smoothing that leaves out waves of more than `modes` periods round the contour.
 double stiffness_of(double modes, double soft, std::size_t points) {
-  return std::pow(static_cast<double>(points) / (2 * std::numbers::pi * modes), 4) * std::pow(kSoft, soft);
+  const double wave = static_cast<double>(points) / (2 * std::numbers::pi * modes);
+  return wave * wave * (wave * wave) * math::pow(kSoft, soft);
 }
 
 // The contour without finer waves, moved along the rays from its centre.
@@ -386,7 +389,7 @@ class BlurredSteps {
     cv::Vec3d b = cv::Vec3d::all(0);
     for (std::size_t j = 0; j < shape_.size(); ++j) {
       const double s = static_cast<double>(j) * kSample_px - edge_.inside - x[0];
-      column[j] = {1, std::erfc(-s / blur), edge_.nearby ? std::erfc(-(s - x[2]) / blur) : 0};
+      column[j] = {1, blurred_step(s / blur), edge_.nearby ? blurred_step((s - x[2]) / blur) : 0};
       a += column[j] * column[j].t();
       b += shape_[j] * column[j];
     }

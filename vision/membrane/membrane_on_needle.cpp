@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <vector>
 
+#include "vision/image/blurred_step.hpp"
 #include "vision/image/parabola.hpp"
 #include "vision/membrane/undeformed.hpp"
 
@@ -15,6 +17,10 @@ namespace {
 constexpr double kBesideEdge_px = 2.5;     // outside the needle's edge; the needle's blur reaches less far
 constexpr double kContourReach_px = 5;     // a contact point lies so near the contour
 constexpr double kDistancePenalty = 0.05;  // of the floor per px from the contour
+constexpr std::array kLumen = {-0.4, -0.2, 0.0, 0.2, 0.4};  // of the half-width: clear of the walls
+// Of the variance of the picture's noise, once it is smoothed and averaged across the lumen; and how far
+// along the axis neighbours tell the same.
+constexpr double kNoiseShare = 0.05, kJoined_px = 3;
 
 // Grey levels per px along the needle's axis; > 0 for the outer face of a membrane of that polarity.
 double face_strength(double along_axis, Polarity polarity) {
@@ -52,6 +58,20 @@ std::optional<double> contact_beside_edge(const GradientField& field, const Need
   return at[*best] - vertex_offset(g[*best - 1], g[*best], g[*best + 1]) * kStep_px;
 }
 
+// Mean over the inner part of the lumen, at the distance s behind the tip. Empty outside of the field.
+std::optional<double> grey_in_lumen(const GradientField& field, const NeedlePose& needle, double s) {
+  const cv::Rect& a = field.area;
+  double sum = 0;
+  for (const double u : kLumen) {
+    const Point p = needle.at(s, u * needle.half_width);
+    if (p.x < a.x + 1 || p.y < a.y + 1 || p.x > a.x + a.width - 2 || p.y > a.y + a.height - 2) {
+      return std::nullopt;
+    }
+    sum += field.grey(p);
+  }
+  return sum / kLumen.size();
+}
+
 }  // namespace
 
 MembraneOnNeedle membrane_on_needle(const ClearedPicture& picture, const NeedlePose& needle,
@@ -83,24 +103,74 @@ MembraneOnNeedle membrane_on_needle(const ClearedPicture& picture, const NeedleP
   return out;
 }
 
-double membrane_ahead_of_tip(const GradientField& field, const NeedlePose& needle, Polarity polarity,
-                             double level) {
-  constexpr double kStep_px = 0.25, kBehind_px = 2.0, kAhead_px = 3.5;
-  std::vector<double> e;
-  for (double s = -kBehind_px; s <= kAhead_px; s += kStep_px) {
-    double sum = 0;
-    for (const double u : {-0.4, -0.2, 0.0, 0.2, 0.4}) {
-      sum +=
-          face_strength(field.gradient(needle.at(-s, u * needle.half_width)).dot(needle.axis) / 5, polarity);
+void TipOnMembrane::learn(const GradientField& field, const NeedlePose& needle) {
+  std::array<double, kPlaces> now{};
+  for (std::size_t i = 0; i < kPlaces; ++i) {
+    const auto grey = grey_in_lumen(field, needle, kBack_px - static_cast<double>(i) * kStep_px);
+    if (!grey) {
+      return;
     }
-    e.push_back(sum);
+    now[i] = *grey;
   }
-  const auto top = std::max_element(e.begin() + 1, e.end() - 1);
-  const std::size_t i = static_cast<std::size_t>(top - e.begin());
-  if (*top < 0.35 * level || *top < e[i - 1] || *top < e[i + 1]) {
-    return 0;
+  constexpr int kMemory = 40;
+  frames_ = std::min(frames_ + 1, kMemory);
+  for (std::size_t i = 0; i < kPlaces; ++i) {
+    grey_[i] += (now[i] - grey_[i]) / frames_;
   }
-  return -kBehind_px + (static_cast<double>(i) + vertex_offset(e[i - 1], *top, e[i + 1])) * kStep_px;
+}
+
+// For every place of the tip the picture is compared with the learnt grey there, a step of any height at the
+// tip, and a level.
+std::optional<double> TipOnMembrane::ahead(const GradientField& field, double noise,
+                                           const NeedlePose& needle) const {
+  constexpr double kReach_px = 5;             // by which the tip may be wrong
+  constexpr double kFrom_px = 8, kTo_px = 3;  // of the tip: what is compared
+  constexpr double kBlur_px = 1.6;            // of a usual picture, smoothed
+  constexpr double kCertain_px = 0.7;         // standard deviation of a place that counts
+  constexpr int kPlacesSeen = static_cast<int>((kFrom_px + kTo_px + 2 * kReach_px) / kStep_px) + 1;
+  if (frames_ == 0) {
+    return std::nullopt;
+  }
+  std::array<double, static_cast<std::size_t>(kPlacesSeen)> seen{};  // from behind
+  for (int i = 0; i < kPlacesSeen; ++i) {
+    const auto grey = grey_in_lumen(field, needle, kFrom_px + kReach_px - i * kStep_px);
+    if (!grey) {
+      return std::nullopt;
+    }
+    seen[static_cast<std::size_t>(i)] = *grey;
+  }
+  constexpr int kTips = static_cast<int>(2 * kReach_px / kStep_px) + 1;
+  constexpr int kCompared = static_cast<int>((kFrom_px + kTo_px) / kStep_px) + 1;
+  constexpr int kLearntFrom = static_cast<int>((kBack_px - kFrom_px) / kStep_px);
+  std::array<double, static_cast<std::size_t>(kTips)> square{};
+  for (int t = 0; t < kTips; ++t) {  // the tip lies t steps ahead of the range's back end
+    double n = 0, s = 0, ss = 0, d = 0, sd = 0, dd = 0;
+    for (int i = 0; i < kCompared; ++i) {
+      const double place = i * kStep_px - kFrom_px;  // ahead of the tip
+      const double step = 0.5 * blurred_step(place / (std::numbers::sqrt2 * kBlur_px));
+      const double rest =
+          seen[static_cast<std::size_t>(t + i)] - grey_[static_cast<std::size_t>(kLearntFrom + i)];
+      n += 1;
+      s += step;
+      ss += step * step;
+      d += rest;
+      sd += step * rest;
+      dd += rest * rest;
+    }
+    const double height = (sd - s * d / n) / (ss - s * s / n);
+    square[static_cast<std::size_t>(t)] = dd - d * d / n - height * (sd - s * d / n);
+  }
+  const auto best = std::min_element(square.begin() + 1, square.end() - 1);
+  const auto i = static_cast<std::size_t>(best - square.begin());
+  // Samples that are nearer than the smoothing tell the same.
+  const double variance = noise * noise * kNoiseShare * kJoined_px / kStep_px;
+  const double curvature = (square[i - 1] - 2 * *best + square[i + 1]) / (kStep_px * kStep_px);
+  if (*best > square[i - 1] || *best > square[i + 1] ||
+      2 * variance > kCertain_px * kCertain_px * curvature) {
+    return std::nullopt;
+  }
+  return (static_cast<double>(i) + vertex_offset(-square[i - 1], -*best, -square[i + 1])) * kStep_px -
+         kReach_px;
 }
 
 }  // namespace punctum::vision

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <optional>
 
 #include "vision/membrane/cleared_picture.hpp"
@@ -25,10 +26,25 @@ struct MembraneOnNeedle {
 [[nodiscard]] MembraneOnNeedle membrane_on_needle(const ClearedPicture& picture, const NeedlePose& needle,
                                                   const Contour& outer, Polarity polarity, double level);
 
-// While the needle pushes, the outer face of the membrane lies on its end face and blurs into the ends of the
-// walls. Across the mouth of the lumen the membrane is seen by itself: it tells how many px ahead of the tip
-// the end face is. 0 when nothing is seen there.
-[[nodiscard]] double membrane_ahead_of_tip(const GradientField& field, const NeedlePose& needle,
-                                           Polarity polarity, double level);
+// While the needle pushes, the membrane lies on its end and blurs into the ends of the walls. Across the
+// mouth of the lumen both are seen: the needle's end as it looked with nothing ahead of it, and the membrane
+// as a step of grey at the outermost glass.
+class TipOnMembrane {
+ public:
+  // With nothing within kClearAhead_px ahead of the tip.
+  static constexpr double kClearAhead_px = 7;
+  void learn(const GradientField& field, const NeedlePose& needle);
+
+  // px from the tip of the pose to the outermost glass. Empty before anything was learnt, or where the
+  // picture shows no place that is clearly better than the others. noise: grey levels.
+  [[nodiscard]] std::optional<double> ahead(const GradientField& field, double noise,
+                                            const NeedlePose& needle) const;
+
+ private:
+  static constexpr double kStep_px = 0.25, kBack_px = 12, kAhead_px = 7;
+  static constexpr std::size_t kPlaces = static_cast<std::size_t>((kBack_px + kAhead_px) / kStep_px) + 1;
+  std::array<double, kPlaces> grey_{};  // along the axis, from behind; mean over the frames
+  int frames_ = 0;
+};
 
 }  // namespace punctum::vision

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <numbers>
 
+#include "hal/math/elementary.hpp"
 #include "vision/image/median.hpp"
 #include "vision/image/polar_contour.hpp"
 
@@ -53,7 +54,7 @@ MembraneSearch::MembraneSearch(const FollowedMembrane& followed, const ClearedPi
     const Point tip = s.needle.tip - band.centre;
     const auto entry = entry_point(m.contour(), s.needle.tip, s.needle.axis);
     const Point towards = entry ? *entry - band.centre : -s.needle.axis;
-    needle = {std::atan2(towards.y, towards.x), polar_index(tip, angles), cv::norm(tip)};
+    needle = {math::atan2(towards.y, towards.x), polar_index(tip, angles), cv::norm(tip)};
     if (!rest.empty()) {
       limit_depth_to_tip();
     }
@@ -75,7 +76,7 @@ void MembraneSearch::keep_membranes_apart() {
     double tip_angle = 0;
     if (surroundings.last_tip) {
       const Point tip = *surroundings.last_tip - band.centre;
-      tip_angle = std::atan2(tip.y, tip.x);
+      tip_angle = math::atan2(tip.y, tip.x);
     }
     for (std::size_t k = 0; k < band.lower.size(); ++k) {
       // The inner membrane was there one frame ago; near the needle it may have moved since.
@@ -219,7 +220,7 @@ double MembraneSearch::sunk_beside_needle(const EdgePath& path) const {
     }
   }
   const double deep = surroundings.outermost ? depth_of_tip() : std::min(depth_of_tip(), kDeepInner_px);
-  return n >= kNearest ? sum / n / deep : 1;
+  return n == 2 * kNearest ? sum / n / deep : 1;
 }
 
 EdgeFound pushed_or_free(const MembraneSearch& s) {

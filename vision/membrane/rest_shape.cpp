@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hal/math/elementary.hpp"
 #include "vision/image/median.hpp"
 #include "vision/image/polar_contour.hpp"
 
@@ -17,7 +18,7 @@ constexpr double kDentHalf = 0.9;         // rad to either side of the entry
 constexpr double kHolderHalf = 0.6;       // rad to either side of the holding pipette's mouth
 constexpr double kHolderMotion_px = 1.0;  // less is no motion of the holding pipette
 
-double angle_of(const Point& d, const Point& e) { return std::abs(std::atan2(d.cross(e), d.dot(e))); }
+double angle_of(const Point& d, const Point& e) { return std::abs(math::atan2(d.cross(e), d.dot(e))); }
 
 }  // namespace
 
@@ -53,7 +54,7 @@ RestOutline outline_within(const RestOutline& around, const Point& centre, const
   std::vector<double> near(r.size()), gap;
   for (std::size_t k = 0; k < r.size(); ++k) {
     const double from_needle =
-        angle_between(polar_angle(static_cast<int>(k), angles), std::atan2(towards.y, towards.x));
+        angle_between(polar_angle(static_cast<int>(k), angles), math::atan2(towards.y, towards.x));
     near[k] = std::clamp((kDentHalf + kBlend - from_needle) / kBlend, 0.0, 1.0);
     if (near[k] <= 0) {
       gap.push_back(outer[k] - r[k]);

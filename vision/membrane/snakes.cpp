@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "hal/math/elementary.hpp"
 #include "vision/image/hough_circles.hpp"
 #include "vision/image/median.hpp"
 #include "vision/image/snake.hpp"
@@ -122,7 +123,7 @@ Contour visible_contour(const Contour& nodes, const FollowedMembrane& m, const C
       visible.push_back(*p);
     }
   }
-  const auto angle = [&m](const Point& p) { return std::atan2(p.y - m.centre.y, p.x - m.centre.x); };
+  const auto angle = [&m](const Point& p) { return math::atan2(p.y - m.centre.y, p.x - m.centre.x); };
   std::sort(visible.begin(), visible.end(),
             [&angle](const Point& a, const Point& b) { return angle(a) < angle(b); });
   return spline_through(visible, static_cast<int>(m.r.size()));

@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "hal/math/elementary.hpp"
 #include "vision/image/polar_contour.hpp"
 
 namespace punctum::vision {
@@ -34,8 +35,8 @@ std::optional<Undeformed> fit_undeformed(const Contour& contour, std::span<const
       continue;
     }
     const Point d = contour[i] - circle->centre;
-    const double t = std::atan2(d.y, d.x), r = cv::norm(d);
-    const double f[5] = {1, std::cos(t), std::sin(t), std::cos(2 * t), std::sin(2 * t)};
+    const double t = math::atan2(d.y, d.x), r = cv::norm(d);
+    const double f[5] = {1, math::cos(t), math::sin(t), math::cos(2 * t), math::sin(2 * t)};
     for (int p = 0; p < 5; ++p) {
       for (int q = 0; q < 5; ++q) {
         a.at<double>(p, q) += weights[i] * f[p] * f[q];
@@ -52,9 +53,9 @@ std::optional<Undeformed> fit_undeformed(const Contour& contour, std::span<const
   std::vector<double> r(static_cast<std::size_t>(n));
   for (int i = 0; i < n; ++i) {
     const double t = 2 * std::numbers::pi * i / n;
-    r[static_cast<std::size_t>(i)] = x.at<double>(0) + x.at<double>(1) * std::cos(t) +
-                                     x.at<double>(2) * std::sin(t) + x.at<double>(3) * std::cos(2 * t) +
-                                     x.at<double>(4) * std::sin(2 * t);
+    r[static_cast<std::size_t>(i)] = x.at<double>(0) + x.at<double>(1) * math::cos(t) +
+                                     x.at<double>(2) * math::sin(t) + x.at<double>(3) * math::cos(2 * t) +
+                                     x.at<double>(4) * math::sin(2 * t);
   }
   out.shape = from_polar(circle->centre, r);
   return out;

@@ -6,6 +6,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "hal/math/elementary.hpp"
+
 namespace punctum::vision {
 
 namespace {
@@ -80,7 +82,7 @@ std::optional<TubeTrace> border_section(const GradientField& field, Side side, d
   std::optional<TubeTrace> best;
   double best_energy = 0;
   for (int degree = -kTiltMax_deg; degree <= kTiltMax_deg; ++degree) {
-    const double slope = std::tan(degree * CV_PI / 180);
+    const double slope = math::tan(degree * CV_PI / 180);
     const TiltedProfile profile = profile_at(field, border_x, into_x, slope, strip);
     // Four standard deviations of what the noise leaves.
     const double floor = std::max({4 * field.noise_of_gradient(noise) / std::sqrt(0.6 * profile.samples),
@@ -94,7 +96,7 @@ std::optional<TubeTrace> border_section(const GradientField& field, Side side, d
       best_energy = group.energy;
       TubeTrace t;
       t.side = side;
-      t.axis = Point(into_x, slope) / std::hypot(1.0, slope);
+      t.axis = Point(into_x, slope) / math::hypot(1.0, slope);
       t.root = Point(border_x, a.y + 0.5 * (group.lo + group.hi));
       t.half_width = 0.5 * width;
       t.edge_share = group.energy / total;

@@ -7,6 +7,7 @@
 
 #include "vision/image/correlation.hpp"
 #include "vision/pipettes/narrow_tube.hpp"
+#include "vision/pipettes/needle_end.hpp"
 #include "vision/pipettes/needle_walls.hpp"
 
 namespace punctum::vision {
@@ -86,6 +87,9 @@ bool InjectionPipette::start(const GradientField& field, double noise) {
   if (walls_agree_) {
     last_.tip = end_by_walls;
   }
+  glass_ahead_ = 0;
+  glass_frames_ = 0;
+  learn_glass(field, noise, last_);
   if (straight < 0.65 || last_.half_width > 2 * radius_px_ + 1) {
     reason_ = "what enters through the border is not a straight needle";
     return false;
@@ -104,7 +108,14 @@ bool InjectionPipette::start(const GradientField& field, double noise) {
   return true;
 }
 
+// The end that is followed is one that looks the same in every frame; the tip is the outermost glass.
 NeedlePose InjectionPipette::find(const GradientField& field, double noise) {
+  NeedlePose needle = follow(field, noise);
+  needle.tip += glass_ahead_ * needle.axis;
+  return needle;
+}
+
+NeedlePose InjectionPipette::follow(const GradientField& field, double noise) {
   NeedlePose needle = last_;
   needle.ok = false;
   needle.reason.clear();
@@ -238,19 +249,36 @@ void InjectionPipette::learn_shape_anew(const GradientField& field) {
   shape_origin_ = last_.tip;
 }
 
+// Nothing else may touch the tip: a membrane that it pushes looks like a line of glass.
+void InjectionPipette::learn_glass(const GradientField& field, double noise, NeedlePose followed) {
+  constexpr int kFrames = 30;  // by then the noise of one frame has fallen to a fifth
+  constexpr double kReach_px = 4, kCertain_px = 1;
+  if (glass_frames_ >= kFrames) {
+    return;
+  }
+  followed.tip += glass_ahead_ * followed.axis;
+  const auto end = end_of_glass(field, noise, followed, kReach_px, kReach_px);
+  if (end && end->sd < kCertain_px) {
+    glass_ahead_ += end->ahead / ++glass_frames_;
+  }
+}
+
 void InjectionPipette::learn(const GradientField& field, const NeedlePose& needle, double noise) {
   if (!needle.ok || template_.empty() || view_.blur > 0) {
     return;
   }
-  NeedlePose origin = needle;
+  NeedlePose followed = needle;
+  followed.tip -= glass_ahead_ * needle.axis;
+  learn_glass(field, noise, followed);
+  NeedlePose origin = followed;
   if (walls_agree_) {
-    origin.tip = needle.tip - walls_offset_ * needle.axis;
+    origin.tip = followed.tip - walls_offset_ * needle.axis;
     calibrate_walls(field, origin, noise);
   }
   // A needle that stands still shows the same specks beside it again and again.
   constexpr double kMoved_px = 1;
-  if (cv::norm(needle.tip - learnt_at_) > kMoved_px) {
-    learnt_at_ = needle.tip;
+  if (cv::norm(followed.tip - learnt_at_) > kMoved_px) {
+    learnt_at_ = followed.tip;
     origin.tip = shape_origin_;
     shape_.learn(field, origin);
     constexpr double kFaceRate_px = 0.2;  // per frame: the face moves by no more as the shape is averaged
@@ -258,12 +286,12 @@ void InjectionPipette::learn(const GradientField& field, const NeedlePose& needl
         std::clamp(shape_.face().value_or(shape_offset_) - shape_offset_, -kFaceRate_px, kFaceRate_px);
   }
   cv::Mat here;
-  cv::getRectSubPix(
-      field.smooth, template_.size(),
-      cv::Point2f(
-          static_cast<float>(needle.tip.x - field.area.x - tip_in_template_.x + (template_.cols - 1) / 2.0),
-          static_cast<float>(needle.tip.y - field.area.y - tip_in_template_.y + (template_.rows - 1) / 2.0)),
-      here);
+  cv::getRectSubPix(field.smooth, template_.size(),
+                    cv::Point2f(static_cast<float>(followed.tip.x - field.area.x - tip_in_template_.x +
+                                                   (template_.cols - 1) / 2.0),
+                                static_cast<float>(followed.tip.y - field.area.y - tip_in_template_.y +
+                                                   (template_.rows - 1) / 2.0)),
+                    here);
   cv::addWeighted(template_, 0.9, here, 0.1, 0, template_);
 }
 

@@ -36,6 +36,8 @@ class InjectionPipette {
   [[nodiscard]] bool find_end(const GradientField& field, double noise, NeedlePose& needle, bool& near);
   void calibrate_walls(const GradientField& field, const NeedlePose& walls, double noise);
   void learn_shape_anew(const GradientField& field);
+  void learn_glass(const GradientField& field, double noise, NeedlePose followed);
+  [[nodiscard]] NeedlePose follow(const GradientField& field, double noise);
   [[nodiscard]] NeedlePose not_recognised(const GradientField& field, double noise, NeedlePose needle);
 
   Side side_;
@@ -58,6 +60,8 @@ class InjectionPipette {
   double shape_offset_ = 0;   // from where the learnt shape has its origin to the end face, px
   double walls_offset_ = 0;   // from where the profile of the walls ends to the end face, px
   int offset_frames_ = 0;     // that walls_offset_ was learnt from
+  double glass_ahead_ = 0;    // of the end that is followed: the outermost glass, px
+  int glass_frames_ = 0;      // that it was learnt from
   double step_sign_ = 0;      // +1: it is brighter ahead of the walls, -1: darker, 0: not known yet
   bool walls_agree_ = false;  // with the shape, in the last frame
 };

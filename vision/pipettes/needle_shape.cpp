@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "hal/math/elementary.hpp"
 #include "vision/image/median.hpp"
 #include "vision/image/parabola.hpp"
 
@@ -177,7 +178,7 @@ NeedleShape::Profiles NeedleShape::blurred(double sigma_px) const {
     std::vector<double> k;
     double sum = 0;
     for (int i = -static_cast<int>(std::ceil(3 * sigma)); i <= std::ceil(3 * sigma); ++i) {
-      k.push_back(std::exp(-0.5 * i * i / (sigma * sigma)));
+      k.push_back(math::exp(-0.5 * i * i / (sigma * sigma)));
       sum += k.back();
     }
     for (double& x : k) {

@@ -4,10 +4,12 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "hal/math/elementary.hpp"
+
 namespace punctum::vision {
 
 Polygon needle_polygon(const NeedlePose& needle, cv::Size picture, double margin, double ahead) {
-  const double back = std::hypot(picture.width, picture.height);
+  const double back = math::hypot(picture.width, picture.height);
   const double w0 = needle.half_width + margin;
   const double w1 = std::min(needle.half_width_at(back), 6 * needle.half_width + 12) + margin;
   // The taper ends where the shaft has its full width.
@@ -18,7 +20,7 @@ Polygon needle_polygon(const NeedlePose& needle, cv::Size picture, double margin
 
 Polygon holder_polygon(const TubeTrace& tube, const Point& mouth, cv::Size picture, double margin,
                        double ahead) {
-  const double back = std::hypot(picture.width, picture.height);
+  const double back = math::hypot(picture.width, picture.height);
   const Point across(-tube.axis.y, tube.axis.x);
   const double w = std::max(tube.half_width, tube.end_half_width) + margin;
   const Point front = mouth + ahead * tube.axis, rear = mouth - back * tube.axis;

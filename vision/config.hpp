@@ -51,6 +51,7 @@ struct VisionConfig {
   bool needle = true;                  // an injection pipette is in the scene
   Side needle_from = Side::automatic;  // the border it enters through; the holder enters through the other
   bool inner = true;                   // the inner membrane is followed too
+  bool surface = false;                // the surfaces of the membranes are reconstructed
   SnakeParams snake;
   int contour_points = 256;  // of a closed contour, at least 128
   int dilation_px = 4;  // rows of the vertical element that dilates needle and cell before they are labelled;
@@ -69,7 +70,7 @@ constexpr auto keys_of(const VisionConfig*) {
   return hal::keys(hal::choice("method", &VisionConfig::method, "paper", "tracker", "truth"),
                    hal::flag("needle", &VisionConfig::needle),
                    hal::choice("needle_from", &VisionConfig::needle_from, "automatic", "left", "right"),
-                   hal::flag("inner", &VisionConfig::inner),
+                   hal::flag("inner", &VisionConfig::inner), hal::flag("surface", &VisionConfig::surface),
                    hal::whole("contour_points", &VisionConfig::contour_points, 128, 4096),
                    hal::whole("dilation_px", &VisionConfig::dilation_px, 0, 40),
                    hal::real("puncture_px", &VisionConfig::puncture_px, 0.1, 50),

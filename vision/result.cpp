@@ -1,6 +1,7 @@
 #include "vision/result.hpp"
 
 #include <algorithm>
+#include <iterator>
 
 namespace punctum::vision {
 
@@ -62,6 +63,28 @@ rt::Observation to_observation(const Result& r, const VisionConfig& config, int 
   o.noise_m = r.gap_noise_px * k;
   o.total_us = static_cast<std::uint64_t>(std::max(0.0, r.us.total));
   return o;
+}
+
+rt::CellSurface to_surface(const Result& r, const VisionConfig& config, int width, int height) {
+  rt::CellSurface surface;
+  surface.frame = r.frame;
+  surface.exposure_ns = r.exposure_ns;
+  const double k = config.pixel_m;
+  Section origin = Section::Zero();
+  origin.head<2>() << (width - 1) / 2.0, (height - 1) / 2.0;
+  const auto fill = [&](const std::optional<MembraneNet>& net, rt::CellSurface::Flag flag,
+                        rt::MembraneSurface& out) {
+    if (!net || !net->ok || net->size != rt::MembraneSurface::kControlPoints) {
+      return;
+    }
+    surface.flags |= flag;
+    for (std::size_t i = 0; i < std::size(out.control_m); ++i) {
+      Eigen::Map<Section>(out.control_m[i]) = k * (net->control[i] - origin);
+    }
+  };
+  fill(r.outer_net, rt::CellSurface::outer_ok, surface.outer);
+  fill(r.inner_net, rt::CellSurface::inner_ok, surface.inner);
+  return surface;
 }
 
 }  // namespace punctum::vision

@@ -6,11 +6,13 @@
 #include <string>
 
 #include "rt/station/observation.hpp"
+#include "rt/station/surface.hpp"
 #include "rt/station/telemetry.hpp"
 #include "vision/config.hpp"
 #include "vision/membrane/membrane_following.hpp"
 #include "vision/membrane/membrane_on_needle.hpp"
 #include "vision/pipettes/holding_pipette.hpp"
+#include "vision/surface/membrane_net.hpp"
 
 namespace punctum::vision {
 
@@ -25,6 +27,7 @@ struct StageTimes {
   double inner = 0;
   double contact = 0;  // contact points, dilation, labelling; only near the cell
   double measure = 0;  // undeformed shape, R and gap
+  double surface = 0;  // control nets of the membranes; only where the scene asks for them
   double total = 0;
 };
 
@@ -49,6 +52,7 @@ struct Result {
   std::optional<double> gap_px, wd_px, a_px;  // without a dimple a is empty and w_d is 0
   double membrane_velocity_px_s = 0;          // of the contact points, > 0 into the cell
   double gap_noise_px = 0;
+  std::optional<MembraneNet> outer_net, inner_net;
   rt::Phase phase = rt::Phase::free;
   int impurities = 0;
 
@@ -62,5 +66,8 @@ struct Result {
 // In metres, in the frame of the microscope: the origin is the middle of the picture, which has that size.
 [[nodiscard]] rt::Observation to_observation(const Result& result, const VisionConfig& config, int width,
                                              int height);
+// The same frame and units; the nets have as many control points as the station's.
+[[nodiscard]] rt::CellSurface to_surface(const Result& result, const VisionConfig& config, int width,
+                                         int height);
 
 }  // namespace punctum::vision

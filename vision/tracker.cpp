@@ -20,6 +20,7 @@
 #include "vision/pipettes/injection_pipette.hpp"
 #include "vision/pipettes/wide_tube.hpp"
 #include "vision/stopwatch.hpp"
+#include "vision/surface/membrane_net.hpp"
 
 namespace punctum::vision {
 
@@ -69,6 +70,7 @@ struct Tracker::Impl {
   InnerPuncture inner_puncture;
   VelocityReversal reversal, inner_reversal;  // in place of the two, as the paper has it
   bool punctured = false;                     // the outer membrane
+  std::optional<NetFit> net_fit;              // where the scene asks for surfaces
 
   Impl(const VisionConfig& c, int w, int h)
       : config(checked(c)),
@@ -80,6 +82,9 @@ struct Tracker::Impl {
         reversal(c.puncture_px),
         inner_reversal(c.puncture_px) {
     cv::setNumThreads(1);
+    if (config.surface) {
+      net_fit.emplace(rt::MembraneSurface::kControlPoints);
+    }
   }
 
   const Result& process(const hal::Frame& frame);
@@ -105,6 +110,7 @@ struct Tracker::Impl {
   void events_of_the_paper();
   void events_without_the_cell();
   void measure_depth(double membrane_px);
+  void reconstruct_surfaces();
   void decide_phase();
 };
 
@@ -179,6 +185,11 @@ const Result& Tracker::Impl::process(const hal::Frame& frame) {
     if (result.needle.ok && !result.contact && result.gap_px &&
         *result.gap_px > TipOnMembrane::kClearAhead_px) {
       tip_on_membrane.learn(picture.field, result.needle);
+    }
+    if (config.surface) {
+      (void)watch.lap_us();
+      reconstruct_surfaces();
+      result.us.surface = watch.lap_us();
     }
   } else {
     events_without_the_cell();
@@ -523,6 +534,25 @@ void Tracker::Impl::events_of_the_paper() {
   result.inner_punctured = inner_reversal.update(result.punctured, inner_now);
   result.membrane_velocity_px_s = reversal.membrane_velocity_px_s();
   measure_depth(-result.gap_px.value_or(0) - behind_tip);
+}
+
+// From where the needle meets the cell, or would; without one, from where one would come.
+void Tracker::Impl::reconstruct_surfaces() {
+  Point through = outer.centre, axis(config.needle_from == Side::left ? 1 : -1, 0);
+  if (tip.last) {
+    axis = tip.axis;
+  }
+  if (result.needle.ok) {
+    through = result.needle.tip;
+    axis = result.needle.axis;
+  }
+  const double bent = dimple_reach(result.wd_px.value_or(0), result.needle.half_width);
+  if (outer.known && result.outer.ok) {
+    net_fit->fit(result.outer.contour, through, axis, bent, result.outer_net.emplace());
+  }
+  if (inner.known && result.inner.ok) {
+    net_fit->fit(result.inner.contour, through, axis, bent, result.inner_net.emplace());
+  }
 }
 
 void Tracker::Impl::decide_phase() {

@@ -14,12 +14,14 @@
 #include "rt/station/event.hpp"
 #include "rt/station/observation.hpp"
 #include "rt/station/run_end.hpp"
+#include "rt/station/surface.hpp"
 #include "rt/station/telemetry.hpp"
 
 namespace punctum::rt {
 
 using TelemetryRing = hal::SeqRing<TelemetrySample, 8192>;
 using ObservationSlot = hal::SeqRing<Observation, 4>;  // newest wins
+using SurfaceSlot = hal::SeqRing<CellSurface, 4>;      // the same
 using EventRing = hal::SeqRing<Event, 4096>;
 using CommandQueue = hal::CommandQueue<Command, 64>;
 
@@ -45,20 +47,22 @@ inline constexpr std::uint64_t CoreSegment::kLayout =
 struct ObservationSegment {
   static constexpr bool kOneWriter = true;
   static constexpr std::uint64_t kMagic = 0x6576726573626f50ULL;  // "Pobserve"
-  static constexpr std::uint64_t kVersion = 4;
+  static constexpr std::uint64_t kVersion = 5;
   static const std::uint64_t kLayout;
 
   hal::SegmentHeader header;
   ObservationSlot slot;
-  Word rounds{};    // of vision's loop, with a frame or without: while it grows, vision does not hang
-  Word not_kept{};  // bits of NotKept: files that it could not write and goes on without
+  Word rounds{};        // of vision's loop, with a frame or without: while it grows, vision does not hang
+  Word not_kept{};      // bits of NotKept: files that it could not write and goes on without
+  SurfaceSlot surface;  // before the observation of the same picture; empty: vision does not reconstruct them
 
   enum NotKept : std::uint64_t { observations = 1U << 0, frames = 1U << 1 };
 };
 inline constexpr std::uint64_t ObservationSegment::kLayout = hal::fingerprint(
     ObservationSegment::kVersion, sizeof(ObservationSegment), sizeof(Observation),
     offsetof(Observation, gap_m), offsetof(Observation, total_us), offsetof(ObservationSegment, slot),
-    offsetof(ObservationSegment, rounds), offsetof(ObservationSegment, not_kept));
+    offsetof(ObservationSegment, rounds), offsetof(ObservationSegment, not_kept), sizeof(CellSurface),
+    offsetof(ObservationSegment, surface));
 
 // One for each writer of commands: it puts, the core takes.
 struct CommandSegment {

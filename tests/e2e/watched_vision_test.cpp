@@ -51,6 +51,42 @@ TEST_F(Programs, vision_goes_on_when_none_of_its_files_can_be_kept) {
   }
 }
 
+// ---- the surfaces ----
+
+TEST_F(Programs, vision_puts_the_surfaces_of_both_membranes_into_the_station_only_if_the_scene_asks) {
+  for (const bool asked : {true, false}) {
+    Running run({"run", "icsi", "--clock", "virtual", "--seconds", "6", "--no-figure", "--report", report(),
+                 "--set", asked ? "vision.surface=true" : "vision.surface=false"},
+                words());
+    Look look("icsi", run);
+    ASSERT_TRUE(look.until_started()) << run.output();
+    const rt::ObservationSegment& seen = look.observation();
+    EXPECT_EQ(run.wait(), 1) << run.output();
+    rt::CellSurface surface;
+    rt::Observation observation;
+    std::uint64_t index = 0;
+    ASSERT_EQ(seen.slot.newest(observation, index), hal::Read::ok);
+    ASSERT_EQ(seen.surface.newest(surface, index) == hal::Read::ok, asked);
+    if (!asked) {
+      continue;
+    }
+    EXPECT_EQ(surface.frame, observation.frame);
+    EXPECT_EQ(surface.exposure_ns, observation.exposure_ns);
+    ASSERT_TRUE(surface.has(rt::CellSurface::outer_ok) && surface.has(rt::CellSurface::inner_ok));
+    // The first control point is a pole, where the needle's axis meets the membrane; the last is the other.
+    const hal::Vec3 centre(observation.centre_m), entry(observation.entry_m);
+    const auto& control = surface.outer.control_m;
+    EXPECT_NEAR(std::hypot(control[0][0] - entry.x(), control[0][1] - entry.y()), 0, 2e-6);
+    EXPECT_NEAR(std::hypot(control[31][0] - centre.x(), control[31][1] - centre.y()), observation.R_m, 2e-6);
+    double widest_m = 0;
+    for (const auto& c : control) {
+      widest_m = std::max(widest_m, c[4]);
+    }
+    EXPECT_NEAR(widest_m, observation.R_m, 2e-6);
+    EXPECT_LT(surface.inner.control_m[15][4], surface.outer.control_m[15][4]);
+  }
+}
+
 // ---- the outcome ----
 
 TEST_F(Programs, a_time_limit_before_the_injection_is_called_a_time_limit) {

@@ -187,6 +187,7 @@ class Look {
   [[nodiscard]] pid_t core() const { return static_cast<pid_t>((*core_)->status.pid.load()); }
   [[nodiscard]] std::uint64_t ticks() const { return (*core_)->status.ticks.load(); }
   [[nodiscard]] const sim::Bench& bench() const { return **bench_; }
+  [[nodiscard]] const rt::ObservationSegment& observation() const { return **observation_; }
   [[nodiscard]] pid_t vision() const { return static_cast<pid_t>((*camera_)->pid.load()); }
 
  private:
@@ -211,12 +212,17 @@ class Look {
                                                                descriptor(tools::kCameraSegment))) {
       camera_ = std::move(*c);
     }
+    if (auto o = hal::Shared<const rt::ObservationSegment>::attach(tools::kObservationSegment,
+                                                                   descriptor(tools::kObservationSegment))) {
+      observation_ = std::move(*o);
+    }
     return core_ && bench_ && camera_;
   }
   std::string name_;
   std::optional<hal::Shared<const rt::CoreSegment>> core_;
   std::optional<hal::Shared<const sim::Bench>> bench_;
   std::optional<hal::Shared<const sim::CameraAnswers>> camera_;
+  std::optional<hal::Shared<const rt::ObservationSegment>> observation_;
 };
 
 // What the core left of the simulated devices, by the bench's newest snapshot.

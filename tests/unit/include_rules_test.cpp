@@ -68,8 +68,8 @@ std::vector<Room> house() {
   const Names core = {
       "rt/station/", "rt/forces/", "rt/control/", "rt/executive/", "rt/executive/monotonic_clock",
       "rt/platform/"};
-  const Names vision_parts = {"vision/config", "vision/image/", "vision/pipettes/", "vision/membrane/",
-                              "vision/events/"};
+  const Names vision_parts = {"vision/config",    "vision/image/",  "vision/pipettes/",
+                              "vision/membrane/", "vision/events/", "vision/surface/"};
   // What a program without pictures is made of, and one with.
   const Names station = ground + sim + core + cia402_shared + Names{"tools/shared/", "tools/scene/"};
   const Names pictures =
@@ -130,7 +130,11 @@ std::vector<Room> house() {
       {"vision/pipettes/", interfaces + Names{"vision/config", "vision/image/"}, kPictures},
       {"vision/membrane/", interfaces + Names{"vision/config", "vision/image/", "vision/pipettes/"},
        kPictures},
-      {"vision/events/", interfaces + vision_parts + Names{"rt/station/"}, kPictures},
+      {"vision/events/",
+       interfaces +
+           Names{"vision/config", "vision/image/", "vision/pipettes/", "vision/membrane/", "rt/station/"},
+       kPictures},
+      {"vision/surface/", interfaces + Names{"vision/image/"}, kPictures},
       {"vision/", interfaces + vision_parts + Names{"rt/station/"}, kPictures},
       // Programs do not include one another.
       {"tools/shared/", ground + sim + core, kTools},
@@ -508,6 +512,8 @@ TEST_F(PlantedBreach, is_seen_at_every_wall) {
       {"hal/sim/operator/a.cpp", "\"hal/sim/camera/microscope.hpp\""},
       {"hal/sim/world.cpp", "\"hal/sim/camera/microscope.hpp\""},
       // Inside vision.
+      {"vision/surface/a.cpp", "\"vision/membrane/undeformed.hpp\""},
+      {"vision/events/a.cpp", "\"vision/surface/membrane_net.hpp\""},
       {"vision/a.cpp", "\"rt/control/config.hpp\""},
       {"vision/a.cpp", "\"rt/forces/membrane.hpp\""},
       {"vision/a.cpp", "\"hal/recorded/folder.hpp\""},

@@ -254,6 +254,9 @@ std::string frame_text(const Scene& s) {
                      v.inner ? " and inner membrane" : "", v.snake.nodes,
                      v.method == vision::Method::tracker ? ", refined" : "",
                      v.needle ? "contact, puncture, " : "");
+  if (v.surface) {
+    out += "  control nets of the membranes' surfaces\n";
+  }
   const int far = vision_stages(v);
   return out + (v.needle
                     ? fmt::format("  {} stages far from the cell, where no contact is looked for, {} at it\n",
@@ -276,6 +279,9 @@ std::string left_out_text(const Scene& s) {
   }
   if (s.vision && s.vision->method != vision::Method::truth && !s.vision->inner) {
     absent += fmt::format("  {:<15} {}\n", "vision.inner", "no edge is looked for inside the outer membrane");
+  }
+  if (s.vision && s.vision->method != vision::Method::truth && !s.vision->surface) {
+    absent += fmt::format("  {:<15} {}\n", "vision.surface", "no surface is reconstructed from the contours");
   }
   return absent.empty() ? ""
                         : "left out, and nothing is spent on it (`punctum-report scenes` counts)\n" + absent;

@@ -7,17 +7,21 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <numbers>
+#include <optional>
 #include <stdexcept>
 
 #include "hal/sim/plant/cell.hpp"
 #include "rt/control/local_membrane_model.hpp"
 #include "rt/forces/membrane.hpp"
+#include "rt/station/surface.hpp"
 #include "tools/report/simulated_frames.hpp"
 #include "tools/report/topic.hpp"
 #include "vision/image/polar_contour.hpp"
 #include "vision/image/polyline.hpp"
 #include "vision/image/spline.hpp"
+#include "vision/surface/surface_grid.hpp"
 #include "vision/tracker.hpp"
 
 namespace punctum::report {
@@ -114,6 +118,38 @@ Surface polygon(Contour nodes) {
 Surface spline(Contour nodes) {
   return [nodes = std::move(nodes)](Net& net) {
     revolve(vision::spline_through(nodes, 2 * (net.along - 1)), net);
+  };
+}
+
+// What vision ships: the control net of a contour, and the grid of its points, with or without their normals.
+enum class Normals : std::uint8_t { without, with };
+
+Surface nurbs(const DeformedCell& cell, const Contour& contour, int control_points, Normals normals) {
+  struct Parts {
+    vision::NetFit fit;
+    vision::MembraneNet net;
+    std::optional<vision::SurfaceGrid> grid;
+    vision::GridVectors points, directions;
+  };
+  auto parts = std::make_shared<Parts>(Parts{vision::NetFit(control_points), {}, {}, {}, {}});
+  const double reach = vision::dimple_reach(cell.wd_um, cell.c_um);
+  return [=](Net& net) {
+    if (!parts->grid || parts->grid->along() != net.along || parts->grid->around() != net.around) {
+      parts->grid.emplace(control_points, net.along, net.around);
+    }
+    parts->fit.fit(contour, {0, 0}, {-1, 0}, reach, parts->net);
+    if (!parts->net.ok) {
+      throw std::runtime_error(std::string(parts->net.reason));
+    }
+    if (normals == Normals::with) {
+      parts->grid->points_and_normals(parts->net, parts->points, parts->directions);
+    } else {
+      parts->grid->points(parts->net, parts->points);
+    }
+    const vision::GridVectors& p = parts->points;
+    for (std::size_t k = 0; k < net.points.size(); ++k) {
+      net.points[k] = {p.x[k], p.y[k], p.z[k]};
+    }
   };
 }
 
@@ -407,6 +443,7 @@ Net::Net(int along_, int around_)
 
 const std::vector<SurfaceMethod>& surface_methods() {
   static const std::vector<double> few{8, 16, 32, 64, 128, 256};
+  static const std::vector<double> nets{8, 12, 16, 24, 32, 48, 64};
   static const std::vector<SurfaceMethod> rows = {
       {"undeformed sphere", "", {0}, [](const DeformedCell& d, double) { return sphere(d.R_um); }},
       {"sphere with eq. 4 (a from w_d)",
@@ -442,6 +479,19 @@ const std::vector<SurfaceMethod>& surface_methods() {
       {"periodic spline as seen", "{} nodes", few,
        [](const DeformedCell& d, double nodes) {
          return d.seen.empty() ? Surface() : spline(equally_spaced(d.seen, static_cast<int>(nodes)));
+       }},
+      {"NURBS", "{} sections", nets,
+       [](const DeformedCell& d, double size) {
+         return nurbs(d, equally_spaced(closed_contour(d), 256), static_cast<int>(size), Normals::without);
+       }},
+      {"NURBS as seen", "{} sections", nets,
+       [](const DeformedCell& d, double size) {
+         return d.seen.empty() ? Surface() : nurbs(d, d.seen, static_cast<int>(size), Normals::without);
+       },
+       rt::MembraneSurface::kControlPoints},
+      {"NURBS as seen, with normals", "{} sections", nets,
+       [](const DeformedCell& d, double size) {
+         return d.seen.empty() ? Surface() : nurbs(d, d.seen, static_cast<int>(size), Normals::with);
        }},
   };
   return rows;

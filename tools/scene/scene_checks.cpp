@@ -78,6 +78,10 @@ Found check_needs(const Scene& s) {
   if (drawn && s.vision->inner && cell && !s.sim->cell->inner) {
     return unmet({"vision.inner", "sim.cell.inner", "there is no inner membrane to follow"});
   }
+  if (s.vision && s.vision->surface && s.vision->method == vision::Method::truth) {
+    return Problem{"vision.surface",
+                   "needs contours, and vision.method = \"truth\" looks for none, allowed: false"};
+  }
   return std::nullopt;
 }
 

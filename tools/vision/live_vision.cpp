@@ -87,6 +87,7 @@ class LiveVision {
   struct Seen {
     const vision::Result* result = nullptr;  // null: nobody looked at a picture
     rt::Observation observation;
+    std::optional<rt::CellSurface> surface;  // where the scene asks for it
     TruthError error;
     std::optional<cv::Mat> picture;  // to be annotated
     double t_s = 0;                  // of the exposure, in the run
@@ -116,7 +117,7 @@ class LiveVision {
   [[nodiscard]] double time_to_play(hal::Frame& frame);
   void tell_unusable(const hal::Frame& frame, double t_s);
   [[nodiscard]] Seen look_at(const hal::Frame& frame);
-  void publish(const hal::Frame& frame, const rt::Observation& observation);
+  void publish(const hal::Frame& frame, const Seen& seen);
   void record(const hal::Frame& frame, const Seen& seen);
   void go_on_without(rt::ObservationSegment::NotKept what, const std::string& why);
 
@@ -324,7 +325,7 @@ ExitCode LiveVision::run() {
     }
     Seen seen = look_at(frame);
     seen.t_s = t_s;
-    publish(frame, seen.observation);
+    publish(frame, seen);
     record(frame, seen);
   }
   if (live_) {
@@ -441,6 +442,9 @@ LiveVision::Seen LiveVision::look_at(const hal::Frame& frame) {
                          static_cast<double>(LiveTracker::kLongestGap_ns) * 1e-9));
   }
   seen.observation = vision::to_observation(*seen.result, *scene_->vision, width_, height_);
+  if (scene_->vision->surface) {
+    seen.surface = vision::to_surface(*seen.result, *scene_->vision, width_, height_);
+  }
   if (simulated_) {
     seen.error = comparison_->compare(*seen.result, *sim_camera_);
   }
@@ -454,12 +458,15 @@ LiveVision::Seen LiveVision::look_at(const hal::Frame& frame) {
 }
 
 // The frame goes back to its camera.
-void LiveVision::publish(const hal::Frame& frame, const rt::Observation& observation) {
+void LiveVision::publish(const hal::Frame& frame, const Seen& seen) {
   if (frame.deliver_ns > 0) {
     wait_until(frame.deliver_ns);
   }
-  const auto told =
-      liar_ ? liar_->tell(sim_camera_->snapshot(), observation) : std::optional<rt::Observation>(observation);
+  if (seen.surface) {
+    (*station_)->surface.push(*seen.surface);
+  }
+  const auto told = liar_ ? liar_->tell(sim_camera_->snapshot(), seen.observation)
+                          : std::optional<rt::Observation>(seen.observation);
   if (told) {
     (*station_)->slot.push(*told);
   }

@@ -47,6 +47,8 @@ int run(int argc, char** argv) {
       ->type_name("FILE");
   track->add_option("--contours", t.contours, "table of the contours (contours.csv)")->type_name("FILE");
   track->add_option("--overlay", t.overlay, "folder for annotated frames")->type_name("FOLDER");
+  track->add_option("--surface", t.surface, "folder for the membranes' surfaces (json, obj, stl)")
+      ->type_name("FOLDER");
   track->add_option("--fps", t.fps, "frames per second, where the file does not say")
       ->check(CLI::Range(0.001, 1e6))
       ->type_name("RATE");

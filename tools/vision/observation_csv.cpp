@@ -27,6 +27,7 @@ constexpr std::string_view kTruthColumns =
     ",outer_rms_um,outer_p95_um,outer_max_um,inner_rms_um,tip_error_um,tip_lateral_um,gap_error_um,wd_error_"
     "um,"
     "a_error_um";
+constexpr std::string_view kLaterColumns = ",surface_us";
 
 class Row {
  public:
@@ -86,7 +87,8 @@ class Row {
 
 tl::expected<ObservationCsv, std::string> ObservationCsv::open(const std::string& path, bool append,
                                                                bool with_truth) {
-  const std::string head = std::string(kColumns) + (with_truth ? std::string(kTruthColumns) : std::string());
+  const std::string head = std::string(kColumns) + (with_truth ? std::string(kTruthColumns) : std::string()) +
+                           std::string(kLaterColumns);
   bool same = false;
   if (append) {
     std::ifstream old(path, std::ios::binary);
@@ -131,6 +133,7 @@ void ObservationCsv::row(std::uint64_t frame, double t_s, double total_us, const
   row.number(total_us, 0);
   row.text(verdict);
   const auto more = std::count(kColumns.begin(), kColumns.end(), ',') + 1 - 18 +
+                    std::count(kLaterColumns.begin(), kLaterColumns.end(), ',') +
                     (with_truth_ ? std::count(kTruthColumns.begin(), kTruthColumns.end(), ',') : 0);
   row.nothing(static_cast<int>(more));
 }
@@ -202,6 +205,7 @@ void ObservationCsv::row(const vision::Result& r, const vision::VisionConfig& co
       row.number(v, 4);
     }
   }
+  row.number(when(r.us.surface > 0, r.us.surface), 0);
 }
 
 bool ObservationCsv::flush() {

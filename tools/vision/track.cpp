@@ -17,6 +17,7 @@
 #include "tools/shared/say.hpp"
 #include "tools/vision/observation_csv.hpp"
 #include "tools/vision/picture_file.hpp"
+#include "tools/vision/surface_files.hpp"
 #include "vision/events/scene_change.hpp"
 #include "vision/overlay.hpp"
 #include "vision/tracker.hpp"
@@ -44,6 +45,7 @@ Or<vision::VisionConfig> vision_of(const TrackOptions& options) {
   if (config.method == vision::Method::truth) {  // recorded pictures have none
     config.method = vision::Method::tracker;
   }
+  config.surface = !options.surface.empty();
   return config;
 }
 
@@ -144,9 +146,11 @@ struct Output {
   ObservationCsv observations;
   std::optional<ContoursCsv> contours;
   std::string overlay_folder;  // empty: no overlays
+  std::string surface_folder;  // empty: no surfaces
 
   void write_overlay(const cv::Mat& grey, const vision::Result& result, const vision::VisionConfig& config,
                      const std::string& picture_name);
+  void write_surfaces(const vision::Result& result, const Input& input, const std::string& picture_name);
 };
 
 Or<Output> open_output(const TrackOptions& options) {
@@ -154,7 +158,7 @@ Or<Output> open_output(const TrackOptions& options) {
   if (!observations) {
     return wrong(observations.error());
   }
-  Output out{std::move(*observations), std::nullopt, options.overlay};
+  Output out{std::move(*observations), std::nullopt, options.overlay, options.surface};
   if (!options.contours.empty()) {
     auto contours = ContoursCsv::open(options.contours);
     if (!contours) {
@@ -162,14 +166,19 @@ Or<Output> open_output(const TrackOptions& options) {
     }
     out.contours = std::move(*contours);
   }
-  if (!options.overlay.empty()) {
+  for (const std::string& folder : {options.overlay, options.surface}) {
     std::error_code error;
-    std::filesystem::create_directories(options.overlay, error);
-    if (error) {
-      return wrong(fmt::format("{}: {}", options.overlay, error.message()));
+    if (!folder.empty() && !std::filesystem::create_directories(folder, error) && error) {
+      return wrong(fmt::format("{}: {}", folder, error.message()));
     }
   }
   return out;
+}
+
+std::string stem_of(const std::string& folder, const vision::Result& result,
+                    const std::string& picture_name) {
+  return fmt::format("{}/{:06}_{}", folder, result.frame,
+                     std::filesystem::path(picture_name).stem().string());
 }
 
 void Output::write_overlay(const cv::Mat& grey, const vision::Result& result,
@@ -177,11 +186,25 @@ void Output::write_overlay(const cv::Mat& grey, const vision::Result& result,
   if (overlay_folder.empty()) {
     return;
   }
-  const std::string stem = std::filesystem::path(picture_name).stem().string();
-  const std::string path = fmt::format("{}/{:06}_{}.png", overlay_folder, result.frame, stem);
+  const std::string path = stem_of(overlay_folder, result, picture_name) + ".png";
   if (const auto written = write_picture(path, vision::draw_overlay(grey, result, config)); !written) {
     complain(written.error() + "; going on without overlays");
     overlay_folder.clear();
+  }
+}
+
+// In the frame of the whole picture, as every other place that is written.
+void Output::write_surfaces(const vision::Result& result, const Input& input,
+                            const std::string& picture_name) {
+  if (surface_folder.empty()) {
+    return;
+  }
+  const int width = input.camera.width() - 2 * input.roi.x, height = input.camera.height() - 2 * input.roi.y;
+  const auto written = write_surface(stem_of(surface_folder, result, picture_name),
+                                     vision::to_surface(result, input.config, width, height));
+  if (!written) {
+    complain(written.error() + "; going on without surfaces");
+    surface_folder.clear();
   }
 }
 
@@ -227,6 +250,7 @@ Counts track_all(Input& input, Output& output) {
       output.contours->rows(result, input.roi.tl());
     }
     output.write_overlay(grey, result, input.config, input.camera.name());
+    output.write_surfaces(result, input, input.camera.name());
     if (counts.frames == 1 && !result.outer.ok && !result.inner.ok) {
       complain("first frame: " + result.verdict);
     }

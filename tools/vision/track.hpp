@@ -1,4 +1,4 @@
-// punctum-vision track: recorded frames -> obs.csv, contours.csv, overlays.
+// punctum-vision track: recorded frames -> obs.csv, contours.csv, overlays, surfaces.
 #pragma once
 
 #include <array>
@@ -15,6 +15,7 @@ struct TrackOptions {
   std::string out;                     // obs.csv
   std::string contours;                // empty: not written
   std::string overlay;                 // folder; empty: not drawn
+  std::string surface;                 // folder; empty: not reconstructed
   double fps = 25;
   std::optional<std::array<int, 4>> roi;             // x, y, width, height
   std::optional<std::array<double, 3>> seed_circle;  // x, y, r in the whole picture

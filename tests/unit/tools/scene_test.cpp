@@ -297,6 +297,10 @@ const std::vector<Broken>& broken() {
        "add "
        "[sim.cell.inner] "
        "or leave [vision.inner] out"},
+      {"surfaces of contours that nobody looks for",
+       kLeast + "[sim.cell]\n[camera]\n[vision]\ninner = false\nmethod = \"truth\"\nsurface = true\n",
+       "b.toml:10:11: vision.surface: needs contours, and vision.method = \"truth\" looks for none, allowed: "
+       "false"},
       {"a mouth wider than its pipette",
        kLeast + "[sim.cell]\n[sim.holder]\nouter_radius_um = 20\ninner_radius_um = 30\n",
        "b.toml:8:19: sim.holder.inner_radius_um: is not smaller than the outer one, allowed: below "

@@ -1,9 +1,13 @@
 // punctum-vision track: its input files, its output files, and its messages about bad ones.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <numbers>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <sstream>
@@ -101,6 +105,69 @@ TEST_F(Track, writes_one_row_per_frame_in_natural_order_and_contours_of_at_least
   }
   EXPECT_GE(of_last, 128);
   EXPECT_EQ(std::distance(fs::directory_iterator(options_.overlay), fs::directory_iterator()), 5);
+}
+
+// Read back as foreign programs read them.
+TEST_F(Track, writes_the_surface_as_control_net_and_as_closed_meshes) {
+  frame(7);
+  options_.surface = (folder_ / "surface").string();
+  ASSERT_EQ(track(options_), 0);
+  const std::string stem = options_.surface + "/000000_f7";
+  const double R_um = 70.5 * 0.825;
+  const double middle_um[2] = {(150 - 159.5) * 0.825, (120 - 119.5) * 0.825};
+
+  std::ifstream json_file(stem + ".json");
+  const auto json = nlohmann::json::parse(json_file);
+  ASSERT_EQ(json["membranes"].size(), 1U);  // the scene has no inner one
+  const auto& net = json["membranes"][0];
+  EXPECT_EQ(net["name"], "outer");
+  const std::size_t along = net["size"][0], round = net["size"][1];
+  ASSERT_EQ(net["points"].size(), along * round);
+  EXPECT_EQ(net["knots"][0].size(), along + 4);
+  EXPECT_EQ(net["knots"][1].size(), round + 3);
+  for (const std::size_t pole : {std::size_t{0}, along - 1}) {
+    const auto& p = net["points"][pole * round];
+    EXPECT_NEAR(std::hypot(1e6 * p[0].get<double>() - middle_um[0], 1e6 * p[1].get<double>() - middle_um[1]),
+                R_um, 0.3);
+  }
+
+  std::ifstream obj_file(stem + ".obj");
+  std::vector<std::array<double, 3>> corner, normal;
+  std::map<std::pair<int, int>, int> edges;
+  double volume = 0;
+  for (std::string word, line; std::getline(obj_file, line);) {
+    std::istringstream in(line);
+    in >> word;
+    if (word == "v" || word == "vn") {
+      auto& v = (word == "v" ? corner : normal).emplace_back();
+      in >> v[0] >> v[1] >> v[2];
+    } else if (word == "f") {
+      std::array<int, 3> c{};
+      for (int& i : c) {
+        in >> word;
+        i = std::stoi(word) - 1;
+      }
+      for (int k = 0; k < 3; ++k) {
+        ++edges[{c[static_cast<std::size_t>(k)], c[static_cast<std::size_t>((k + 1) % 3)]}];
+      }
+      const auto &p = corner.at(static_cast<std::size_t>(c[0])),
+                 &q = corner.at(static_cast<std::size_t>(c[1])),
+                 &r = corner.at(static_cast<std::size_t>(c[2]));
+      volume += (p[0] * (q[1] * r[2] - q[2] * r[1]) + p[1] * (q[2] * r[0] - q[0] * r[2]) +
+                 p[2] * (q[0] * r[1] - q[1] * r[0])) /
+                6;
+    }
+  }
+  ASSERT_EQ(corner.size(), normal.size());
+  for (const auto& [edge, times] : edges) {  // closed, and every triangle turns the same way
+    EXPECT_EQ(times, 1);
+    EXPECT_TRUE(edges.contains({edge.second, edge.first}));
+  }
+  EXPECT_NEAR(volume / (4.0 / 3 * std::numbers::pi * R_um * R_um * R_um), 1, 0.02);  // outwards
+
+  const std::uintmax_t triangles = edges.size() / 3;
+  EXPECT_EQ(fs::file_size(stem + "-outer.stl"), 84 + 50 * triangles);
+  EXPECT_FALSE(fs::exists(stem + "-inner.stl"));
 }
 
 TEST_F(Track, gives_a_row_with_a_verdict_for_an_unreadable_frame_or_one_of_another_size) {

@@ -82,6 +82,8 @@ struct Tracker::Impl {
         reversal(c.puncture_px),
         inner_reversal(c.puncture_px) {
     cv::setNumThreads(1);
+    // Code for the newest registers gives other last bits, and is no faster here.
+    cv::setUseOptimized(false);
     if (config.surface) {
       net_fit.emplace(rt::MembraneSurface::kControlPoints);
     }

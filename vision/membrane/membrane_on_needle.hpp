@@ -32,7 +32,7 @@ struct MembraneOnNeedle {
 class TipOnMembrane {
  public:
   // With nothing within kClearAhead_px ahead of the tip.
-  static constexpr double kClearAhead_px = 7;
+  static constexpr double kClearAhead_px = 5.5;
   void learn(const GradientField& field, const NeedlePose& needle);
 
   // px from the tip of the pose to the outermost glass. Empty before anything was learnt, or where the
@@ -41,7 +41,7 @@ class TipOnMembrane {
                                             const NeedlePose& needle) const;
 
  private:
-  static constexpr double kStep_px = 0.25, kBack_px = 12, kAhead_px = 7;
+  static constexpr double kStep_px = 0.25, kBack_px = 12, kAhead_px = 4;
   static constexpr std::size_t kPlaces = static_cast<std::size_t>((kBack_px + kAhead_px) / kStep_px) + 1;
   std::array<double, kPlaces> grey_{};  // along the axis, from behind; mean over the frames
   int frames_ = 0;

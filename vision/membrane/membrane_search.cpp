@@ -17,6 +17,7 @@ constexpr double kSaturation = 0.7;  // times the usual edge: a stronger one is 
 // Beside the needle, as a share of the tip's depth: a membrane that is sunk by less has let the needle
 // through. The zona dents over a narrower arc than what is within it.
 constexpr double kHardlySunk = 0.15, kHardlySunkInner = 0.4;
+constexpr double kSunk = 0.33;        // by more, the needle holds it
 constexpr double kFreeHalf_px = 7;    // a free membrane is looked for so near to its outline at rest
 constexpr double kDeepInner_px = 12;  // counts as the depth of a tip that is deeper inside the inner membrane
 constexpr double kNearHalf = 0.5;     // rad to either side of the entry: the dimple and its rim
@@ -148,7 +149,8 @@ EdgePath MembraneSearch::path_pushed() const {
 
 // A membrane that has given way ends beside the needle, far behind the tip, before the puncture is known.
 bool MembraneSearch::reaches_the_tip(const EdgePath& pushed) const {
-  constexpr double kSteepest = 2.5;  // px per px of arc, of a dimple's wall
+  constexpr double kSteepest =
+      2.2;  // px per px of arc, of a dimple's wall: up to 1.5 in pictures of three renderers
   const std::vector<std::pair<int, double>> face = end_face();
   const auto wrapped = [this](int i) { return static_cast<std::size_t>((i % angles + angles) % angles); };
   const auto on_face = [&](int i) {
@@ -250,8 +252,10 @@ EdgeFound pushed_or_free(const MembraneSearch& s) {
   const double least = s.surroundings.punctured && s.surroundings.outermost ? 0.4 : 0.7;
   // And where the membrane beside the needle is hardly lower than at rest, the needle has gone through it.
   const double hardly = s.surroundings.outermost ? kHardlySunk : kHardlySunkInner;
-  const bool through = s.sunk_beside_needle(free) < hardly;
-  const bool is_free = through || (outside.by > outside.from_rest && outside.seen > least);
+  const double beside = s.sunk_beside_needle(free);
+  const bool through = beside < hardly;
+  const bool held = s.surroundings.outermost && beside > kSunk && beside < 1;
+  const bool is_free = through || (!held && outside.by > outside.from_rest && outside.seen > least);
   return {is_free ? std::move(free) : std::move(path), is_free};
 }
 

@@ -86,6 +86,18 @@ struct Sequence {
   double outer_um, inner_um;  // rms at most, where nothing moves the membrane
 };
 
+// rms at most, and seen in most frames.
+void expect_near_truth(const char* what, const std::vector<double>& error_px, double most_px) {
+  double squares = 0;
+  for (const double e : error_px) {
+    squares += e * e;
+  }
+  const double rms = std::sqrt(squares / static_cast<double>(std::max<std::size_t>(error_px.size(), 1)));
+  std::printf("%s: rms %.3f px in %zu frames\n", what, rms, error_px.size());
+  EXPECT_GE(error_px.size(), 5U) << what;
+  EXPECT_LT(rms, most_px) << what;
+}
+
 int python(const std::vector<std::string>& arguments) {
   return e2e::Running(arguments, "/dev/null", "python3").wait();
 }
@@ -120,6 +132,7 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
   config.pixel_m = kPixel_um * 1e-6;
   std::optional<Tracker> tracker;
   std::map<std::string, Score> outer, inner;
+  std::vector<double> tip_px, depth_px;  // seen minus true: along the axis before contact, in contact
   for (int k = 0; k < kFrames; ++k) {
     char name[32];
     std::snprintf(name, sizeof name, "frame_%04d.png", k);
@@ -141,6 +154,12 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
     const std::string part = phase == "contact" || phase == "puncture" ? phase : "at rest";
     outer[part].add(contour_of(t["outer"]), seen.outer);
     inner[part].add(contour_of(t["inner"]), seen.inner);
+    if (phase == "approach" && seen.needle.ok) {
+      const Point tip(t["tip"][0].get<double>(), t["tip"][1].get<double>());
+      tip_px.push_back((seen.needle.tip - tip).dot(seen.needle.axis));
+    } else if (phase == "contact" && seen.wd_px) {
+      depth_px.push_back(*seen.wd_px - t["wd_px"].get<double>());
+    }
   }
   int right = 0, wrong = 0;
   for (const auto& [membrane, parts] : {std::pair{"outer", outer}, std::pair{"inner", inner}}) {
@@ -157,6 +176,11 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
   EXPECT_LT(inner["at rest"].rms_um(), GetParam().inner_um);
   EXPECT_GE(right, 2 * kFrames * 8 / 10) << "of both membranes in all frames";
   EXPECT_LE(wrong, 2 * kFrames / 20) << "claimed";
+  if (GetParam().noise <= 5) {  // the needle is not found in more
+    EXPECT_GE(outer["contact"].right, outer["contact"].frames - 1);
+    expect_near_truth("tip", tip_px, 0.4);
+    expect_near_truth("depth of the dimple", depth_px, 0.3);
+  }
 }
 
 // In 7 and 107 the inner membrane was once held in its dimple; 106 and 108 were never tuned on.

@@ -20,7 +20,10 @@ constexpr int kJumpsMax = 3;         // frames in a row; then it is where it is 
 constexpr double kAside_px = 2;      // across the axis; further aside the shaft must lie there, too
 constexpr double kDoubtMax_px = 5;   // an end that is less certain is not seen
 constexpr double kSameEnd_px = 5;    // the walls end where the shape does, but for what either errs
-constexpr int kLostMax = 3;          // frames in a row; then it is looked for from the border
+// By which the walls may seem to end too early: 1.9 to 4.2 px in pictures of two renderers; later it is
+// known.
+constexpr double kStartReach_px = 7, kGlassReach_px = 4;
+constexpr int kLostMax = 3;  // frames in a row; then it is looked for from the border
 
 // The best narrow tube of both borders, or of the one that is known.
 std::optional<TubeTrace> best_tube(const GradientField& field, Side side, double width_max, double noise) {
@@ -89,7 +92,7 @@ bool InjectionPipette::start(const GradientField& field, double noise) {
   }
   glass_ahead_ = 0;
   glass_frames_ = 0;
-  learn_glass(field, noise, last_);
+  learn_glass(field, noise, last_, kStartReach_px);
   if (straight < 0.65 || last_.half_width > 2 * radius_px_ + 1) {
     reason_ = "what enters through the border is not a straight needle";
     return false;
@@ -250,14 +253,15 @@ void InjectionPipette::learn_shape_anew(const GradientField& field) {
 }
 
 // Nothing else may touch the tip: a membrane that it pushes looks like a line of glass.
-void InjectionPipette::learn_glass(const GradientField& field, double noise, NeedlePose followed) {
+void InjectionPipette::learn_glass(const GradientField& field, double noise, NeedlePose followed,
+                                   double reach) {
   constexpr int kFrames = 30;  // by then the noise of one frame has fallen to a fifth
-  constexpr double kReach_px = 4, kCertain_px = 1;
+  constexpr double kCertain_px = 1;
   if (glass_frames_ >= kFrames) {
     return;
   }
   followed.tip += glass_ahead_ * followed.axis;
-  const auto end = end_of_glass(field, noise, followed, kReach_px, kReach_px);
+  const auto end = end_of_glass(field, noise, followed, reach, reach);
   if (end && end->sd < kCertain_px) {
     glass_ahead_ += end->ahead / ++glass_frames_;
   }
@@ -269,7 +273,7 @@ void InjectionPipette::learn(const GradientField& field, const NeedlePose& needl
   }
   NeedlePose followed = needle;
   followed.tip -= glass_ahead_ * needle.axis;
-  learn_glass(field, noise, followed);
+  learn_glass(field, noise, followed, kGlassReach_px);
   NeedlePose origin = followed;
   if (walls_agree_) {
     origin.tip = followed.tip - walls_offset_ * needle.axis;

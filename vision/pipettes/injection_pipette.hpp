@@ -36,7 +36,7 @@ class InjectionPipette {
   [[nodiscard]] bool find_end(const GradientField& field, double noise, NeedlePose& needle, bool& near);
   void calibrate_walls(const GradientField& field, const NeedlePose& walls, double noise);
   void learn_shape_anew(const GradientField& field);
-  void learn_glass(const GradientField& field, double noise, NeedlePose followed);
+  void learn_glass(const GradientField& field, double noise, NeedlePose followed, double reach);
   [[nodiscard]] NeedlePose follow(const GradientField& field, double noise);
   [[nodiscard]] NeedlePose not_recognised(const GradientField& field, double noise, NeedlePose needle);
 

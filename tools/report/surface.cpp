@@ -350,7 +350,7 @@ Panel meridian_panel(const DeformedCell& cell) {
   };
   draw("true", polygon(closed_contour(cell)));
   for (const SurfaceMethod& m : surface_methods()) {
-    if (m.name != "polygon" && m.name != "periodic spline") {
+    if (m.name != "polygon" && m.name != "periodic spline" && m.name != "NURBS as seen, with normals") {
       draw(m.name, m.given(cell, m.values[m.values.size() / 2]));
     }
   }

@@ -257,7 +257,9 @@ void InjectionPipette::learn_glass(const GradientField& field, double noise, Nee
                                    double reach) {
   constexpr int kFrames = 30;  // by then the noise of one frame has fallen to a fifth
   constexpr double kCertain_px = 1;
-  if (glass_frames_ >= kFrames) {
+  // In a thinner one no lumen is left between the walls, and a line across it looks like them.
+  constexpr double kLumen_px = 4.5;
+  if (glass_frames_ >= kFrames || followed.half_width < kLumen_px) {
     return;
   }
   followed.tip += glass_ahead_ * followed.axis;

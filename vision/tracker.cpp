@@ -31,7 +31,7 @@ constexpr double kNeedleMargin_px = 2.5;  // the blur reaches so far beyond the 
 constexpr double kUntouched_px = 12;      // further outside, nothing touches the tip
 constexpr double kLeastDimple_px = 0.7;   // depth from which the width of a dimple can be measured
 constexpr double kNear_px = 8;            // nearer, the needle may touch the membrane
-constexpr double kCircle_px = 0.15;       // rms that a circle leaves; 0.03 to 0.06 in the station
+constexpr double kCircle = 0.001;         // rms over radius that a circle leaves; up to 0.0005 in the station
 constexpr double kClear_px = 3;           // further away, it does not: its blur ends before
 constexpr double kTipNoise_px = 0.1;
 // The paper keeps the large variations of the gradient only. Of the usual edge of a membrane: with 0.4 needle
@@ -372,7 +372,7 @@ void Tracker::Impl::measure() {
 // nothing, if it never was or if the cell is a circle.
 Undeformed Tracker::Impl::at_rest() const {
   Undeformed out = *undeformed.shape();
-  if (outer.rest.frames > 0 && !(out.round && out.circle.rms < kCircle_px)) {
+  if (outer.rest.frames > 0 && !(out.round && out.circle.rms < kCircle * out.circle.r)) {
     out.shape = from_polar(outer.rest.centre, outer.rest.r);
   }
   return out;

@@ -150,7 +150,7 @@ EdgePath MembraneSearch::path_pushed() const {
 // A membrane that has given way ends beside the needle, far behind the tip, before the puncture is known.
 bool MembraneSearch::reaches_the_tip(const EdgePath& pushed) const {
   constexpr double kSteepest =
-      2.2;  // px per px of arc, of a dimple's wall: up to 1.5 in pictures of three renderers
+      2.2;  // px per px of arc, of a dimple's wall: up to 1.5 in pictures of two renderers
   const std::vector<std::pair<int, double>> face = end_face();
   const auto wrapped = [this](int i) { return static_cast<std::size_t>((i % angles + angles) % angles); };
   const auto on_face = [&](int i) {

@@ -278,6 +278,20 @@ TEST(Tracker, does_not_report_a_puncture_when_the_needle_only_withdraws) {
   }
 }
 
+TEST(Tracker, makes_surfaces_only_when_it_is_asked_to) {
+  const cv::Mat picture = draw({kCentre.x + kR + 40, 0, 2, 1});
+  for (const bool asked : {false, true}) {
+    VisionConfig config;
+    config.surface = asked;
+    Tracker tracker(config, kW, kH);
+    const Result& r = tracker.process(frame_of(picture));
+    ASSERT_TRUE(r.outer.ok && r.inner.ok) << r.verdict;
+    EXPECT_EQ(r.outer_net.has_value() && r.inner_net.has_value(), asked);
+    EXPECT_EQ(r.us.surface > 0, asked);
+    EXPECT_TRUE(!asked || (r.outer_net->ok && r.inner_net->ok));
+  }
+}
+
 // A dimple of a fifth of the radius that is hardly wider than the needle: few rays show its walls.
 TEST(Tracker, follows_a_narrow_dimple_to_its_bottom) {
   constexpr double kHalf_rad = 0.12;

@@ -31,7 +31,6 @@ constexpr double kNeedleMargin_px = 2.5;  // the blur reaches so far beyond the 
 constexpr double kUntouched_px = 12;      // further outside, nothing touches the tip
 constexpr double kLeastDimple_px = 0.7;   // depth from which the width of a dimple can be measured
 constexpr double kNear_px = 8;            // nearer, the needle may touch the membrane
-constexpr double kCircle = 0.001;         // rms over radius that a circle leaves; up to 0.0005 in the station
 constexpr double kClear_px = 3;           // further away, it does not: its blur ends before
 constexpr double kTipNoise_px = 0.1;
 // The paper keeps the large variations of the gradient only. Of the usual edge of a membrane: with 0.4 needle
@@ -104,7 +103,6 @@ struct Tracker::Impl {
   void follow_membranes(Stopwatch& watch);
   [[nodiscard]] Surroundings surroundings() const;
   void measure();
-  [[nodiscard]] Undeformed at_rest() const;
   [[nodiscard]] int fit_undeformed_membrane();
   void measure_gap(int fitted_points);
   [[nodiscard]] std::optional<double> look_for_contact();
@@ -368,16 +366,6 @@ void Tracker::Impl::measure() {
   }
 }
 
-// The outer membrane as it was seen with nothing touching it; the shape that is fitted to what touches
-// nothing, if it never was or if the cell is a circle.
-Undeformed Tracker::Impl::at_rest() const {
-  Undeformed out = *undeformed.shape();
-  if (outer.rest.frames > 0 && !(out.round && out.circle.rms < kCircle * out.circle.r)) {
-    out.shape = from_polar(outer.rest.centre, outer.rest.r);
-  }
-  return out;
-}
-
 // Returns the number of contour points that tell the undeformed membrane.
 int Tracker::Impl::fit_undeformed_membrane() {
   const Contour& contour = result.outer.contour;
@@ -385,7 +373,7 @@ int Tracker::Impl::fit_undeformed_membrane() {
   std::optional<Point> entry;  // if the needle is near
   bool clear = !n.ok;
   if (n.ok) {
-    entry = entry_point(undeformed.known() ? at_rest().shape : contour, n.tip, n.axis);
+    entry = entry_point(undeformed.known() ? undeformed.at_rest().shape : contour, n.tip, n.axis);
     const double gap = entry ? (*entry - n.tip).dot(n.axis) : kNear_px;
     clear = gap >= kClear_px;
     if (gap >= kNear_px) {
@@ -409,6 +397,7 @@ int Tracker::Impl::fit_undeformed_membrane() {
   }
   if (clear && !touched_before) {
     outer.rest.learn(outer.centre, outer.r);
+    undeformed.learn_outline(contour, outer.centre);
     if (inner.known && result.inner.ok) {
       inner.rest.learn(inner.centre, inner.r);
     }
@@ -425,7 +414,7 @@ int Tracker::Impl::fit_undeformed_membrane() {
 
 void Tracker::Impl::measure_gap(int fitted_points) {
   const NeedlePose& n = result.needle;
-  result.entry = entry_point(at_rest().shape, n.tip, n.axis);
+  result.entry = entry_point(undeformed.at_rest().shape, n.tip, n.axis);
   if (!result.entry) {
     return;
   }
@@ -497,7 +486,7 @@ void Tracker::Impl::measure_depth(double membrane_px) {
   const double depth = result.punctured ? membrane_px : -*result.gap_px;
   result.wd_px = result.contact ? std::max(0.0, depth) : 0.0;
   if (*result.wd_px > kLeastDimple_px) {
-    result.a_px = dimple_half_width(result.outer.contour, at_rest(), *result.entry, *result.wd_px,
+    result.a_px = dimple_half_width(result.outer.contour, undeformed.at_rest(), *result.entry, *result.wd_px,
                                     result.needle.half_width);
   }
 }

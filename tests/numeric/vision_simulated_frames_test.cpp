@@ -233,7 +233,7 @@ TEST_P(EmbryoFrames, show_the_tip_in_the_yolk_where_it_is_or_not_at_all) {
   sim::Vec3 tip(640e-6, 15e-6, 0);
   double outer_s = -1, inner_s = -1, outer_seen_s = -1, inner_seen_s = -1, beyond_m = 0;
   int frames = 0, unseen = 0, wrong = 0;
-  double farthest_px = 0;
+  double farthest_px = 0, entry_px = 0;
   for (int tick = 0; tick < 10'000 && beyond_m < 60e-6; ++tick) {
     const double t = tick * 1e-3;
     const double gap = (cell.centre_m(state) - tip).dot(axis) - cell.R_m();
@@ -277,6 +277,14 @@ TEST_P(EmbryoFrames, show_the_tip_in_the_yolk_where_it_is_or_not_at_all) {
       ++unseen;
       continue;
     }
+    if (r.entry && gap > 0) {
+      // Where the axis of the needle meets the sphere of the outer face.
+      const sim::Vec3 centre = cell.centre_m(state);
+      const double off = tip.y() - centre.y();
+      const double entry = (centre.x() + std::sqrt(cell.R_m() * cell.R_m() - off * off)) / e.lens.pixel_m +
+                           (e.lens.width - 1) / 2.0;
+      entry_px = std::max(entry_px, std::abs(r.entry->x - entry));
+    }
     const Point true_tip(tip.x() / e.lens.pixel_m + (e.lens.width - 1) / 2.0,
                          tip.y() / e.lens.pixel_m + (e.lens.height - 1) / 2.0);
     const double error_px = cv::norm(r.needle.tip - true_tip);
@@ -284,11 +292,15 @@ TEST_P(EmbryoFrames, show_the_tip_in_the_yolk_where_it_is_or_not_at_all) {
     wrong += error_px > 9;  // the core of this scene takes 30 um for a disagreement
   }
   std::printf(
-      "embryo %d: %d frames, tip unseen in %d, at most %.1f px off; punctures seen after %+.0f, %+.0f ms\n",
-      GetParam(), frames, unseen, farthest_px, 1e3 * (outer_seen_s - outer_s),
+      "embryo %d: %d frames, entry at most %.2f px off, tip unseen in %d, at most %.1f px off; punctures "
+      "seen "
+      "after %+.0f, %+.0f ms\n",
+      GetParam(), frames, entry_px, unseen, farthest_px, 1e3 * (outer_seen_s - outer_s),
       1e3 * (inner_seen_s - inner_s));
   ASSERT_GT(inner_s, 0);
   EXPECT_EQ(wrong, 0);
+  EXPECT_GT(entry_px, 0);
+  EXPECT_LT(entry_px, 0.6);  // the two faces of its chorion are 1.2 px apart
   EXPECT_LE(unseen, frames / 10);
   EXPECT_GT(outer_seen_s, outer_s);
   EXPECT_LT(outer_seen_s, outer_s + 0.25);

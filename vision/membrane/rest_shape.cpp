@@ -88,6 +88,7 @@ Point LearntUndeformed::update(const Undeformed& now, bool touched, const std::o
   } else if (mouth_ && mouth && cv::norm(*mouth - *mouth_) > kHolderMotion_px) {
     const Point shift = *mouth - *mouth_;
     shape_->circle.centre += shift;
+    face_.centre += shift;
     for (Point& p : shape_->shape) {
       p += shift;
     }
@@ -97,8 +98,24 @@ Point LearntUndeformed::update(const Undeformed& now, bool touched, const std::o
   return {};
 }
 
+void LearntUndeformed::learn_outline(const Contour& contour, const Point& centre) {
+  const std::vector<double> r = polar_radii(contour, centre, static_cast<int>(contour.size()));
+  if (!r.empty()) {
+    face_.learn(centre, r);
+  }
+}
+
+Undeformed LearntUndeformed::at_rest() const {
+  Undeformed out = *shape_;
+  if (face_.frames > 0) {
+    out.shape = from_polar(face_.centre, face_.r);
+  }
+  return out;
+}
+
 void LearntUndeformed::forget() {
   shape_.reset();
+  face_ = {};
   frames_ = 0;
 }
 

@@ -26,20 +26,26 @@ struct RestOutline {
 [[nodiscard]] RestOutline outline_within(const RestOutline& around, const Point& centre,
                                          const std::vector<double>& r, const Point& entry);
 
-// Fitted shape of the outer membrane. It moves with the holding pipette.
+// The outer membrane with nothing touching it: the shape that is fitted to what touches nothing, and the
+// outline of its outer face as it was seen. Both move with the holding pipette.
 class LearntUndeformed {
  public:
   // now: fitted to this frame. mouth: of the holding pipette, where it is seen. Returns by how much the
   // holding pipette has moved the cell.
   [[nodiscard]] Point update(const Undeformed& now, bool touched, const std::optional<Point>& mouth);
+  // The contour of a frame in which nothing touches it, seen from `centre`.
+  void learn_outline(const Contour& contour, const Point& centre);
   void forget();
   [[nodiscard]] bool known() const noexcept { return shape_.has_value(); }
   [[nodiscard]] const std::optional<Undeformed>& shape() const noexcept { return shape_; }
+  // Its shape is the outline as it was seen, if it ever was. Not before it is known.
+  [[nodiscard]] Undeformed at_rest() const;
   // Whether a new outer contour is this cell in the same place. Where the needle may dent it, it may differ.
   [[nodiscard]] bool same_cell(const Contour& outer, const Point& centre, const NeedlePose& needle) const;
 
  private:
   std::optional<Undeformed> shape_;
+  RestOutline face_;
   int frames_ = 0;  // that it was learnt from
   std::optional<Point> mouth_;
 };

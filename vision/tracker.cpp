@@ -27,6 +27,7 @@ namespace punctum::vision {
 namespace {
 
 constexpr int kHolderEvery = 8;           // frames between two searches for a tube that was not found
+constexpr int kNeedleEvery = 8;           // likewise for the needle
 constexpr double kNeedleMargin_px = 2.5;  // the blur reaches so far beyond the needle's edges
 constexpr double kUntouched_px = 12;      // further outside, nothing touches the tip
 constexpr double kLeastDimple_px = 0.7;   // depth from which the width of a dimple can be measured
@@ -60,6 +61,7 @@ struct Tracker::Impl {
   bool template_given = false;
   int holder_tries = 0;
   InjectionPipette needle;
+  int needle_tries = 0;
   TipOnMembrane tip_on_membrane;
   TipMotion tip;
 
@@ -221,8 +223,10 @@ cv::Rect Tracker::Impl::area_to_search(bool starting) const {
 }
 
 void Tracker::Impl::locate_needle() {
-  if (!needle.started()) {
-    (void)needle.start(picture.field, picture.noise);
+  if (!needle.started() && needle_tries++ % kNeedleEvery == 0) {
+    // A membrane at the tip of a faint needle looks like its end.
+    using Walls = InjectionPipette::Walls;
+    (void)needle.start(picture.field, picture.noise, outer.known ? Walls::plain : Walls::faint);
   }
   NeedlePose& n = result.needle;
   n = needle.find(picture.field, picture.noise);
@@ -247,6 +251,9 @@ void Tracker::Impl::locate_holder() {
   }
   if (holder.has_template()) {
     result.holder = holder.find(picture.grey);
+    if (config.method == Method::tracker) {
+      holder.refine(picture.grey, result.holder);
+    }
   }
   if (holder_tube) {
     // The middle of a given template need not be the mouth.
@@ -391,7 +398,9 @@ int Tracker::Impl::fit_undeformed_membrane() {
   }
   const bool touched_before = was_contact || punctured || needle_hidden();
   const bool touched = entry || touched_before;
-  const Point shift = undeformed.update(*now, touched, mouth);
+  constexpr double kCertain_px = 0.25;  // a less certain motion of the holding pipette is none
+  const bool certain = result.holder.sd < kCertain_px;
+  const Point shift = undeformed.update(*now, touched, certain ? mouth : std::nullopt);
   for (FollowedMembrane* m : {&outer, &inner}) {
     m->rest.centre += shift;
   }

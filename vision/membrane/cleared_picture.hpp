@@ -37,6 +37,9 @@ struct ClearedPicture {
   int cover_impurities(const std::vector<Contour>& membranes, double threshold, double max_side);
 
   [[nodiscard]] double edge_floor() const noexcept { return 3 * gradient_noise; }  // less is no edge
+  [[nodiscard]] double snake_floor() const noexcept {
+    return 4 * gradient_noise;
+  }  // its spread where it is flat
   [[nodiscard]] bool hidden(const Point& p) const;  // covered, or outside the picture
 
   // For a membrane that is pressed against the holding pipette. Behind the face of the pipette the membrane

@@ -15,7 +15,6 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr double kSnakeFloor_noise = 4;  // times the gradient's noise: spread of a flat neighbourhood
 constexpr double kMotionMax_px = 2.0;    // of the whole membrane, per frame and direction
 constexpr double kMotionLeast_px = 1.2;  // the nodes are on whole pixels: less is no motion
 constexpr double kOuterModes = 12;       // periods round the cell: finer waves a stiff shell does not have
@@ -31,7 +30,7 @@ Contour snake_from(const Contour& nodes, const ClearedPicture& picture, const Sn
   for (Point& p : local) {
     p -= offset;
   }
-  local = evolve(picture.edge, std::move(local), params, kSnakeFloor_noise * picture.gradient_noise);
+  local = evolve(picture.edge, std::move(local), params, picture.snake_floor());
   for (Point& p : local) {
     p += offset;
   }
@@ -213,6 +212,9 @@ Membrane follow(FollowedMembrane& m, const ClearedPicture& picture, const Vision
     return out;
   }
   out.ok = true;
+  m.held = found.held;
+  m.dimple_px = found.dimple_px;
+  m.dimple_odds = found.dimple_odds;
   m.lost_frames = 0;
   // The centre stays while it is well inside the contour, since resampling costs accuracy.
   if (cv::norm(centre - search.band.centre) > 0.06 * search.usual_r) {

@@ -8,6 +8,7 @@
 #include "hal/math/elementary.hpp"
 #include "vision/image/median.hpp"
 #include "vision/image/polar_contour.hpp"
+#include "vision/membrane/dimple_seen.hpp"
 
 namespace punctum::vision {
 
@@ -16,8 +17,7 @@ namespace {
 constexpr double kSaturation = 0.7;  // times the usual edge: a stronger one is not better
 // Beside the needle, as a share of the tip's depth: a membrane that is sunk by less has let the needle
 // through. The zona dents over a narrower arc than what is within it.
-constexpr double kHardlySunk = 0.15, kHardlySunkInner = 0.4;
-constexpr double kSunk = 0.33;        // by more, the needle holds it
+constexpr double kHardlySunkInner = 0.4;
 constexpr double kFreeHalf_px = 7;    // a free membrane is looked for so near to its outline at rest
 constexpr double kDeepInner_px = 12;  // counts as the depth of a tip that is deeper inside the inner membrane
 constexpr double kNearHalf = 0.5;     // rad to either side of the entry: the dimple and its rim
@@ -147,35 +147,6 @@ EdgePath MembraneSearch::path_pushed() const {
   return path_in(pushed);
 }
 
-// A membrane that has given way ends beside the needle, far behind the tip, before the puncture is known.
-bool MembraneSearch::reaches_the_tip(const EdgePath& pushed) const {
-  constexpr double kSteepest =
-      2.2;  // px per px of arc, of a dimple's wall: up to 1.5 in pictures of two renderers
-  const std::vector<std::pair<int, double>> face = end_face();
-  const auto wrapped = [this](int i) { return static_cast<std::size_t>((i % angles + angles) % angles); };
-  const auto on_face = [&](int i) {
-    return std::any_of(face.begin(), face.end(),
-                       [&](const auto& a) { return wrapped(a.first) == wrapped(i); });
-  };
-  double rise = 0, run = 0;
-  for (const int side : {-1, 1}) {
-    int i = needle->tip_index;
-    double last = needle->tip_r;
-    for (; on_face(i); i += side) {
-      last = pushed.r[wrapped(i)];
-    }
-    for (int k = 1; k < angles / 8; ++k, i += side) {
-      if (pushed.seen[wrapped(i)] != 0 && !picture.hidden(on_ray(band.centre, static_cast<int>(wrapped(i)),
-                                                                 angles, pushed.raw[wrapped(i)]))) {
-        rise += pushed.raw[wrapped(i)] - last;
-        run += k * usual_r * 2 * std::numbers::pi / angles;
-        break;
-      }
-    }
-  }
-  return rise <= kSteepest * run;
-}
-
 Differing MembraneSearch::where_further_out(const EdgePath& path, const EdgePath& other) const {
   Differing out;
   int n = 0;
@@ -221,13 +192,53 @@ double MembraneSearch::sunk_beside_needle(const EdgePath& path) const {
       }
     }
   }
-  const double deep = surroundings.outermost ? depth_of_tip() : std::min(depth_of_tip(), kDeepInner_px);
+  const double deep = std::min(depth_of_tip(), kDeepInner_px);
   return n == 2 * kNearest ? sum / n / deep : 1;
 }
 
+namespace {
+
+EdgeFound outer_pushed_or_free(const MembraneSearch& s) {
+  const auto dimple = likeliest_dimple(s);
+  EdgeFound found;
+  found.dimple_odds = dimple ? dimple->odds : s.m.dimple_odds;
+  found.dimple_px = dimple ? dimple->depth : s.m.dimple_px;
+  if (!s.surroundings.punctured && (!dimple || dimple->on_tip)) {
+    if (dimple) {
+      EdgeBand band = band_along(s, *dimple);
+      band.anchors = s.end_face();
+      band.slope = 1.5;
+      band.stiffness = 0.15;
+      found.path = s.path_in(band);
+    } else {
+      found.path = s.path_pushed();
+    }
+    if (!found.path.r.empty()) {
+      return found;
+    }
+  }
+  if (!dimple) {
+    found.path = s.path_in(s.band);
+    found.held = s.m.held;
+    return found;
+  }
+  constexpr double kShallow_px = 2;  // it hardly differs from the outline at rest
+  EdgeBand band = band_along(s, *dimple);
+  if (dimple->depth > kShallow_px) {
+    const int i = s.needle->tip_index;
+    band.anchors = {{i, band.middle[static_cast<std::size_t>(i)]}};  // the needle hides it there
+  }
+  found.path = s.path_in(band);
+  found.is_free = true;
+  found.held = false;
+  return found;
+}
+
+}  // namespace
+
 EdgeFound pushed_or_free(const MembraneSearch& s) {
   if (!s.needle || s.rest.empty()) {
-    return {s.path_in(s.band)};
+    return {s.path_in(s.band), false, s.m.held, s.m.dimple_px, s.m.dimple_odds};
   }
   if (s.depth_of_tip() <= 1.0) {
     // Nothing pushes an inner membrane then: the outer one, which dents it before the tip is there, has given
@@ -235,13 +246,10 @@ EdgeFound pushed_or_free(const MembraneSearch& s) {
     const bool is_free = s.surroundings.punctured && !s.surroundings.outermost;
     return {is_free ? s.path_free() : s.path_in(s.band), is_free};
   }
-  EdgePath path;
-  if (s.surroundings.outermost && !s.surroundings.punctured) {
-    path = s.path_pushed();
+  if (s.surroundings.outermost) {
+    return outer_pushed_or_free(s);
   }
-  if (path.r.empty() || !s.reaches_the_tip(path)) {
-    path = s.path_in(s.band);
-  }
+  EdgePath path = s.path_in(s.band);
   EdgePath free = s.path_free();
   if (path.r.empty() || free.r.empty()) {
     return {std::move(path)};
@@ -249,13 +257,10 @@ EdgeFound pushed_or_free(const MembraneSearch& s) {
   // Where another edge lies further out than the dimple and is seen as well, the dimple belongs to another
   // membrane. But an edge that is nearer to the dimple than to the rest outline is the wall of the dimple.
   const Differing outside = s.where_further_out(free, path);
-  const double least = s.surroundings.punctured && s.surroundings.outermost ? 0.4 : 0.7;
+  constexpr double kLeast = 0.7;
   // And where the membrane beside the needle is hardly lower than at rest, the needle has gone through it.
-  const double hardly = s.surroundings.outermost ? kHardlySunk : kHardlySunkInner;
-  const double beside = s.sunk_beside_needle(free);
-  const bool through = beside < hardly;
-  const bool held = s.surroundings.outermost && beside > kSunk && beside < 1;
-  const bool is_free = through || (!held && outside.by > outside.from_rest && outside.seen > least);
+  const bool is_free = s.sunk_beside_needle(free) < kHardlySunkInner ||
+                       (outside.by > outside.from_rest && outside.seen > kLeast);
   return {is_free ? std::move(free) : std::move(path), is_free};
 }
 

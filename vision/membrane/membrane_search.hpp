@@ -63,7 +63,6 @@ struct MembraneSearch {
   [[nodiscard]] std::vector<std::pair<int, double>> end_face() const;
   [[nodiscard]] double depth_of_tip() const;                            // px below the rest outline
   [[nodiscard]] double sunk_beside_needle(const EdgePath& path) const;  // as a share of the tip's depth
-  [[nodiscard]] bool reaches_the_tip(const EdgePath& pushed) const;
   [[nodiscard]] Differing where_further_out(const EdgePath& path, const EdgePath& other) const;
 
  private:
@@ -74,6 +73,9 @@ struct MembraneSearch {
 struct EdgeFound {
   EdgePath path;
   bool is_free = false;  // the needle is inside, but the membrane is at its rest outline
+  bool held = true;      // see FollowedMembrane
+  double dimple_px = 0;
+  std::array<double, kDimpleShapes> dimple_odds{};
 };
 
 // The better of the two: the membrane pushed by the needle, or free of it.

@@ -19,13 +19,12 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr int kRays = 180;               // on which the first circles are measured
-constexpr double kRayStep_px = 0.5;      // half of what a node can tell
-constexpr double kClear = 0.5;           // of the usual edge: less is another edge, or none
-constexpr double kOtherCircle = 0.4;     // of the radius: further off, it is no circle round this cell
-constexpr int kHoughCircles = 6;         // that are compared
-constexpr double kHoughScore = 0.35;     // share of a circumference that must have voted
-constexpr double kSnakeFloor_noise = 4;  // times the gradient's noise: its spread in a flat neighbourhood
+constexpr int kRays = 180;            // on which the first circles are measured
+constexpr double kRayStep_px = 0.5;   // half of what a node can tell
+constexpr double kClear = 0.5;        // of the usual edge: less is another edge, or none
+constexpr double kOtherCircle = 0.4;  // of the radius: further off, it is no circle round this cell
+constexpr int kHoughCircles = 6;      // that are compared
+constexpr double kHoughScore = 0.35;  // share of a circumference that must have voted
 
 double strength_at(const ClearedPicture& picture, const Point& p) {
   return picture.hidden(p) ? 0 : cv::norm(picture.field.gradient(p));
@@ -170,7 +169,7 @@ Membrane follow_snake(FollowedMembrane& m, const ClearedPicture& picture, const 
   // Eq. 3: the external energy is the square of the gradient.
   const cv::Rect& area = picture.field.area;
   const Point offset(area.x, area.y);
-  const double floor = kSnakeFloor_noise * picture.gradient_noise;
+  const double floor = picture.snake_floor();
   out.nodes = moved(evolve(picture.edge.mul(picture.edge), moved(m.nodes, -offset), config.snake,
                            floor * floor, picture.covered(area)),
                     offset);

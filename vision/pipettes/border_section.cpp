@@ -12,8 +12,8 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr double kInset_px = 4;      // borders of recorded pictures are often black
-constexpr int kTiltMax_deg = 20;     // of a pipette against the horizontal
+constexpr double kInset_px = 4;  // borders of recorded pictures are often black
+constexpr double kColumnStep_px = 2;
 constexpr double kLeastEdge = 0.25;  // grey levels per px
 
 struct EdgeGroup {
@@ -28,17 +28,40 @@ struct TiltedProfile {
   int samples = 0;  // along each line
 };
 
-TiltedProfile profile_at(const GradientField& field, double border_x, double into_x, double slope,
-                         double strip) {
-  const cv::Rect a = field.area;
-  const int h = a.height;
+// The columns of the strip, one after the other from the border inwards.
+std::vector<std::vector<double>> columns_of(const GradientField& field, double border_x, double into_x,
+                                            double strip) {
+  std::vector<std::vector<double>> out;
+  for (double s = 0; s < strip; s += kColumnStep_px) {
+    std::vector<double>& column = out.emplace_back();
+    for (int y = 0; y < field.area.height; ++y) {
+      column.push_back(
+          field.grey(Point(border_x + s * into_x,
+                           std::min(field.area.y + y + 0.0, field.area.y + field.area.height - 1.001))));
+    }
+  }
+  return out;
+}
+
+TiltedProfile profile_at(const std::vector<std::vector<double>>& columns, double slope) {
+  const int h = static_cast<int>(columns.front().size());
   std::vector<double> sum(static_cast<std::size_t>(h));
   TiltedProfile out;
-  for (double s = 0; s < strip; s += 2) {
-    ++out.samples;
-    for (int y = 0; y < h; ++y) {
-      const double yy = std::clamp(a.y + y + s * slope, a.y + 0.0, a.y + h - 1.001);
-      sum[static_cast<std::size_t>(y)] += field.grey(Point(border_x + s * into_x, yy));
+  out.samples = static_cast<int>(columns.size());
+  for (int c = 0; c < out.samples; ++c) {
+    const double shift = c * kColumnStep_px * slope;
+    const int down = static_cast<int>(std::floor(shift));
+    const double part = shift - down;
+    const double* const column = columns[static_cast<std::size_t>(c)].data();
+    const int from = std::clamp(-down, 0, h), to = std::clamp(h - 1 - down, from, h);
+    for (int y = 0; y < from; ++y) {
+      sum[static_cast<std::size_t>(y)] += column[0];
+    }
+    for (int y = from; y < to; ++y) {
+      sum[static_cast<std::size_t>(y)] += (1 - part) * column[y + down] + part * column[y + down + 1];
+    }
+    for (int y = to; y < h; ++y) {
+      sum[static_cast<std::size_t>(y)] += column[h - 1];
     }
   }
   out.edge.assign(static_cast<std::size_t>(h), 0.0);
@@ -75,21 +98,23 @@ std::vector<EdgeGroup> groups_of(const std::vector<double>& edge, double floor, 
 }  // namespace
 
 std::optional<TubeTrace> border_section(const GradientField& field, Side side, double width_min,
-                                        double width_max, double noise, double strip, double relative) {
+                                        double width_max, double noise, double strip, double relative,
+                                        int tilt_max_deg) {
   const cv::Rect a = field.area;
   const double into_x = side == Side::right ? -1 : 1;
   const double border_x = side == Side::right ? a.x + a.width - 1 - kInset_px : a.x + kInset_px;
+  const auto columns = columns_of(field, border_x, into_x, strip);
   std::optional<TubeTrace> best;
   double best_energy = 0;
-  for (int degree = -kTiltMax_deg; degree <= kTiltMax_deg; ++degree) {
+  for (int degree = -tilt_max_deg; degree <= tilt_max_deg; ++degree) {
     const double slope = math::tan(degree * CV_PI / 180);
-    const TiltedProfile profile = profile_at(field, border_x, into_x, slope, strip);
+    const TiltedProfile profile = profile_at(columns, slope);
     // Four standard deviations of what the noise leaves.
     const double floor = std::max({4 * field.noise_of_gradient(noise) / std::sqrt(0.6 * profile.samples),
                                    kLeastEdge, relative * profile.strongest});
     double total = 0;
     for (const EdgeGroup& group : groups_of(profile.edge, floor, width_max, total)) {
-      const double width = group.hi - group.lo;
+      const double width = (group.hi - group.lo) * math::cos(degree * CV_PI / 180);
       if (width < width_min || width > width_max || group.energy <= best_energy) {
         continue;
       }

@@ -8,6 +8,12 @@
 
 namespace punctum::vision {
 
+namespace {
+
+constexpr double kCertain_px = 1;  // of a mouth that is less certain nothing is claimed
+
+}  // namespace
+
 std::optional<TubeTrace> find_holder_tube(const GradientField& field, std::span<const Side> sides,
                                           double height, double R_max, double noise) {
   constexpr double kNarrowest_px = 20;
@@ -27,6 +33,7 @@ std::optional<TubeTrace> find_holder_tube(const GradientField& field, std::span<
 
 void HoldingPipette::use_template(const cv::Mat& pattern) {
   template_ = pattern.clone();
+  registration_ = Registration(template_, 0);
   mouth_in_template_ = Point((pattern.cols - 1) / 2.0, (pattern.rows - 1) / 2.0);
   last_.reset();
 }
@@ -52,6 +59,7 @@ std::string HoldingPipette::cut_template(const cv::Mat& grey, const TubeTrace& t
     return "too little of it is in the picture";
   }
   template_ = grey(box).clone();
+  registration_ = Registration(template_, noise);
   mouth_in_template_ = mouth - Point(box.x, box.y);
   last_ = Point(box.x, box.y);
   return {};
@@ -85,8 +93,7 @@ HolderPose HoldingPipette::find(const cv::Mat& grey) {
                                   static_cast<int>(std::lround(corner.y)), template_.cols, template_.rows) &
                          all;
   if (there.size() == template_.size()) {
-    const cv::Mat c = centred_correlation_map(grey(there), template_);
-    holder.similarity = c.empty() ? 0 : static_cast<double>(c.at<float>(0, 0));
+    holder.similarity = registration_.similarity(grey, there.tl());
   }
   // Eq. 1 is near 1 on any bright patch. The centred correlation tells whether it is the pipette.
   holder.ok = holder.score >= config_.min_score && holder.similarity >= 0.4;
@@ -98,6 +105,22 @@ HolderPose HoldingPipette::find(const cv::Mat& grey) {
     ++lost_;
   }
   return holder;
+}
+
+void HoldingPipette::refine(const cv::Mat& grey, HolderPose& holder) const {
+  if (!holder.ok) {
+    return;
+  }
+  const auto place = registration_.place(grey, holder.box.tl());
+  if (!place || place->sd > kCertain_px) {
+    holder.ok = false;
+    holder.reason = "its place is not certain";
+    return;
+  }
+  holder.box.x = place->corner.x;
+  holder.box.y = place->corner.y;
+  holder.mouth = place->corner + mouth_in_template_;
+  holder.sd = place->sd;
 }
 
 }  // namespace punctum::vision

@@ -8,6 +8,7 @@
 
 #include "vision/config.hpp"
 #include "vision/image/gradient.hpp"
+#include "vision/image/registration.hpp"
 #include "vision/pipettes/tube_trace.hpp"
 
 namespace punctum::vision {
@@ -15,6 +16,7 @@ namespace punctum::vision {
 struct HolderPose {
   bool ok = false;
   Point mouth;            // centre of the mouth
+  double sd = 0;          // of the mouth, px; 0: eq. 1 does not tell it
   double score = 0;       // eq. 1
   double similarity = 0;  // the same with both means removed
   cv::Rect2d box;         // where the template lies
@@ -46,10 +48,13 @@ class HoldingPipette {
 
   // Searches the window round the last position; the whole picture when no position is known.
   [[nodiscard]] HolderPose find(const cv::Mat& grey);
+  // The place that eq. 1 told, more finely.
+  void refine(const cv::Mat& grey, HolderPose& holder) const;
 
  private:
   HolderVision config_;
   cv::Mat template_;
+  Registration registration_;
   Point mouth_in_template_;
   std::optional<Point> last_;  // top left corner of the template
   int lost_ = 0;               // frames in a row

@@ -1,6 +1,7 @@
 #include "vision/pipettes/injection_pipette.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <optional>
@@ -23,6 +24,15 @@ constexpr double kSameEnd_px = 5;    // the walls end where the shape does, but 
 // By which the walls may seem to end too early: 1.9 to 4.2 px in pictures of two renderers; later it is
 // known.
 constexpr double kStartReach_px = 7, kGlassReach_px = 4;
+constexpr double kStraight = 0.65;  // share of the stations along the shaft on straight walls
+constexpr double kShortest_px = 4, kLongest_px = 40;  // of a wall that an edge is averaged over, at the start
+constexpr double kFollowed_px = 24;                   // and later, of a faint one: it may bend
+// Standard deviation of the end of a faint needle. A tip that is less certain does more harm than one that is
+// not claimed: membranes are then taken for pushed that are free.
+constexpr double kEndKnown_px = 0.8;
+// In a needle with a smaller half-width no lumen is left between the walls, and a line across it looks like
+// them.
+constexpr double kLumen_px = 4.5;
 constexpr int kLostMax = 3;  // frames in a row; then it is looked for from the border
 
 // The best narrow tube of both borders, or of the one that is known.
@@ -39,6 +49,56 @@ std::optional<TubeTrace> best_tube(const GradientField& field, Side side, double
     }
   }
   return best;
+}
+
+// Mean change of grey across the two outer faces. Those of two equal walls have opposite senses; in relief
+// contrast they need not.
+std::array<double, 2> faces(const GradientField& field, const NeedlePose& needle) {
+  const Point across(-needle.axis.y, needle.axis.x);
+  std::array<double, 2> out{};
+  constexpr int kStations = 30;
+  for (int i = 0; i < kStations; ++i) {
+    const double s = 10 + 2 * i, w = needle.half_width_at(s);
+    out[0] += field.gradient(needle.at(s, -w)).dot(across) / kStations;
+    out[1] += field.gradient(needle.at(s, w)).dot(across) / kStations;
+  }
+  return out;
+}
+
+// As fit_walls, from a pose whose width is not certain.
+double fit_walls_at_start(const GradientField& field, double noise, double radius_px, double longest,
+                          NeedlePose& needle) {
+  const NeedlePose traced = needle;
+  double straight = 0;
+  for (const double wider : {1.0, 0.7, 0.5}) {  // noise may have hidden the walls near the end
+    needle = traced;
+    needle.half_width *= wider;
+    straight = fit_walls(field, noise, radius_px, needle, longest);
+    if (straight > 0) {
+      break;
+    }
+  }
+  // It may hold on to the inner face of one wall: then both faces have the same sense, and on one side there
+  // is another face further out, about as strong, of the opposite sense.
+  constexpr double kWider_px = 1.5, kNearlyAs = 0.1, kAsStrong = 0.6;
+  for (const double side : {-1.0, 1.0}) {
+    const auto [low, high] = faces(field, needle);
+    if (low * high <= 0) {
+      break;
+    }
+    NeedlePose wider = needle;
+    wider.tip = needle.at(0, side * kWider_px);
+    wider.half_width += kWider_px;
+    const double s = fit_walls(field, noise, radius_px, wider, longest);
+    const auto [lower, higher] = faces(field, wider);
+    if (s > std::max(kStraight, straight - kNearlyAs) &&
+        wider.half_width > needle.half_width + kWider_px / 2 && lower * higher < 0 &&
+        std::min(std::abs(lower), std::abs(higher)) > kAsStrong * std::min(std::abs(low), std::abs(high))) {
+      needle = wider;
+      straight = s;
+    }
+  }
+  return straight;
 }
 
 }  // namespace
@@ -61,7 +121,8 @@ bool InjectionPipette::cut_template(const GradientField& field) {
   return true;
 }
 
-bool InjectionPipette::start(const GradientField& field, double noise) {
+bool InjectionPipette::start(const GradientField& field, double noise, Walls visible) {
+  const double longest = visible == Walls::faint ? kLongest_px : kShortest_px;
   const auto tube = best_tube(field, side_, std::max(22.0, 8 * radius_px_), noise);
   if (!tube) {
     reason_ = "no narrow tube enters through the border";
@@ -74,7 +135,8 @@ bool InjectionPipette::start(const GradientField& field, double noise) {
   last_.tip = tube->end();
   double straight = 0;
   for (int round = 0; round < 3; ++round) {
-    straight = fit_walls(field, noise, radius_px_, last_);
+    straight = round == 0 ? fit_walls_at_start(field, noise, radius_px_, longest, last_)
+                          : fit_walls(field, noise, radius_px_, last_, longest);
     const double back = std::min(30.0, 0.5 * tube->length), ahead = round == 0 ? 25 : 10;
     if (const auto s = end_of_profile(field, last_, back, ahead, noise)) {
       last_.tip += *s * last_.axis;
@@ -93,7 +155,21 @@ bool InjectionPipette::start(const GradientField& field, double noise) {
   glass_ahead_ = 0;
   glass_frames_ = 0;
   learn_glass(field, noise, last_, kStartReach_px);
-  if (straight < 0.65 || last_.half_width > 2 * radius_px_ + 1) {
+  NeedlePose plain = last_;
+  const bool faint = fit_walls(field, noise, radius_px_, plain, kShortest_px) < kStraight;
+  longest_ = faint ? kFollowed_px : kShortest_px;
+  if (faint) {
+    const auto end = end_of_glass(field, noise, last_, kStartReach_px, kStartReach_px);
+    if (getenv("DBG")) {
+      fprintf(stderr, "start faint %d straight %.2f hw %.2f end %d sd %.3f ahead %.2f\n", faint, straight,
+              last_.half_width, !!end, end ? end->sd : 0., end ? end->ahead : 0.);
+    }
+    if (!end || end->sd > kEndKnown_px) {
+      reason_ = "the end of the needle is not clear";
+      return false;
+    }
+  }
+  if (straight < kStraight || last_.half_width > 2 * radius_px_ + 1) {
     reason_ = "what enters through the border is not a straight needle";
     return false;
   }
@@ -175,8 +251,10 @@ double InjectionPipette::aside(const GradientField& field, double noise, const N
   }
   NeedlePose here = predicted, there = predicted;
   there.tip = predicted.at(0, correlated);
-  return fit_walls(field, noise, radius_px_, there) >= fit_walls(field, noise, radius_px_, here) ? correlated
-                                                                                                 : 0;
+  return fit_walls(field, noise, radius_px_, there, longest_) >=
+                 fit_walls(field, noise, radius_px_, here, longest_)
+             ? correlated
+             : 0;
 }
 
 NeedlePose InjectionPipette::not_recognised(const GradientField& field, double noise, NeedlePose needle) {
@@ -184,7 +262,7 @@ NeedlePose InjectionPipette::not_recognised(const GradientField& field, double n
   velocity_ = {};
   if (++lost_ > kLostMax) {
     const NeedlePose before = last_;
-    if (start(field, noise)) {
+    if (start(field, noise, Walls::plain)) {
       return last_;
     }
     last_ = before;
@@ -196,7 +274,7 @@ NeedlePose InjectionPipette::not_recognised(const GradientField& field, double n
 // Where its learnt shape fits best: walls end at many a granule, a shape does not. Where the walls end there,
 // too, they tell the place more finely.
 bool InjectionPipette::find_end(const GradientField& field, double noise, NeedlePose& needle, bool& near) {
-  (void)fit_walls(field, noise, radius_px_, needle);
+  (void)fit_walls(field, noise, radius_px_, needle, longest_);
   needle.tip -= shape_offset_ * needle.axis;
   // First near where the motion predicts it: what lies further ahead cannot be mistaken for it then.
   auto end = shape_.end(field, backdrop_, needle, 18, 18, view_);
@@ -209,7 +287,7 @@ bool InjectionPipette::find_end(const GradientField& field, double noise, Needle
   }
   view_ = end->view;
   needle.tip += end->ahead * needle.axis;
-  (void)fit_walls(field, noise, radius_px_, needle);
+  (void)fit_walls(field, noise, radius_px_, needle, longest_);
   if (const auto again = shape_.end_in(view_, field, backdrop_, needle, 16, 16)) {
     needle.tip += again->ahead * needle.axis;
   }
@@ -257,8 +335,6 @@ void InjectionPipette::learn_glass(const GradientField& field, double noise, Nee
                                    double reach) {
   constexpr int kFrames = 30;  // by then the noise of one frame has fallen to a fifth
   constexpr double kCertain_px = 1;
-  // In a thinner one no lumen is left between the walls, and a line across it looks like them.
-  constexpr double kLumen_px = 4.5;
   if (glass_frames_ >= kFrames || followed.half_width < kLumen_px) {
     return;
   }

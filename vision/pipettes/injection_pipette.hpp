@@ -2,6 +2,7 @@
 // correlation of its tip; its walls are fitted anew in every frame.
 #pragma once
 
+#include <cstdint>
 #include <opencv2/core.hpp>
 #include <string>
 
@@ -18,8 +19,10 @@ class InjectionPipette {
   // side: the border through which it enters. radius_px: expected at the tip.
   InjectionPipette(Side side, double radius_px) : side_(side), radius_px_(radius_px) {}
 
-  // Looks for it from the border. True when a template of the tip was cut. noise: grey levels.
-  [[nodiscard]] bool start(const GradientField& field, double noise);
+  // Looks for it from the border. True when a template of the tip was cut. noise: grey levels. Faint walls
+  // are averaged over much of their length; then the end must be clear.
+  enum class Walls : std::uint8_t { plain, faint };
+  [[nodiscard]] bool start(const GradientField& field, double noise, Walls visible);
   [[nodiscard]] NeedlePose find(const GradientField& field, double noise);
   // Lets the template of the tip follow slow changes of focus and light. Only while nothing touches the tip.
   void learn(const GradientField& field, const NeedlePose& needle, double noise);
@@ -43,6 +46,7 @@ class InjectionPipette {
   Side side_;
   double radius_px_;
   bool started_ = false;
+  double longest_ = 0;  // of a wall that an edge is averaged over, px
   Side found_side_ = Side::right;
   std::string reason_;  // why it was not started
   cv::Mat template_;

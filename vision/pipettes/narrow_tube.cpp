@@ -220,7 +220,7 @@ std::optional<TubeTrace> trace_narrow_tube(const GradientField& field, Side side
     return std::nullopt;
   }
   const double strip = std::clamp(0.09 * field.area.width, 16.0, 70.0);
-  const auto section = border_section(field, side, width_min, width_max, noise, strip, 0.12);
+  const auto section = border_section(field, side, width_min, width_max, noise, strip, 0.12, 45);
   if (!section) {
     return std::nullopt;
   }

@@ -16,20 +16,26 @@ namespace punctum::vision {
 
 namespace {
 
-// ---- the straight lines along the walls ----
+constexpr double kPlain_px = 4;  // of a wall that stands out by itself
 
-// The outermost strong edge near the distance u0 across the axis; a wall has two faces. Averaged over 4 px of
-// length. Empty when no edge exceeds the floor.
+// The outermost strong edge near the distance u0 across the axis; a wall has two faces. Averaged over
+// `length` px of it. Empty when no edge exceeds the floor.
 std::optional<double> outer_edge(const GradientField& field, const NeedlePose& needle, double s, double u0,
-                                 double floor) {
+                                 double length, double floor) {
   constexpr double kStep_px = 0.5;
+  // A wall is thin and its inner face may be twice as strong; an average over noise makes it three times.
+  const double outer_face = length > kPlain_px ? 0.35 : 0.5;
   constexpr int kReach = 6, kSamples = 2 * kReach + 1;
+  constexpr double kAlong_px = 1.5;
+  const int samples = 2 * static_cast<int>(length / (2 * kAlong_px)) + 1;
   const Point across(-needle.axis.y, needle.axis.x);
   std::array<double, kSamples> g{};
   for (int k = 0; k < kSamples; ++k) {
     double e = 0;
-    for (const double ds : {-1.5, 0.0, 1.5}) {
-      e += field.gradient(needle.at(s + ds, u0 + (k - kReach) * kStep_px)).dot(across) / 3;
+    for (int i = 0; i < samples; ++i) {
+      const double t = s + (i - samples / 2) * kAlong_px;
+      const double u = u0 + std::copysign(needle.taper * (t - s), u0) + (k - kReach) * kStep_px;
+      e += field.gradient(needle.at(t, u)).dot(across) / samples;
     }
     g[static_cast<std::size_t>(k)] = std::abs(e);
   }
@@ -42,7 +48,7 @@ std::optional<double> outer_edge(const GradientField& field, const NeedlePose& n
   }
   for (std::size_t q = 1; q + 1 < kSamples; ++q) {
     const std::size_t k = u0 > 0 ? kSamples - 1 - q : q;  // from outside
-    if (is_peak(k) && g[k] >= 0.5 * strongest) {
+    if (is_peak(k) && g[k] >= outer_face * strongest) {
       if (strongest < floor) {
         return std::nullopt;
       }
@@ -58,7 +64,8 @@ struct ShaftStations {
   int tried = 0;
 };
 
-ShaftStations stations_along(const GradientField& field, const NeedlePose& needle, double floor) {
+ShaftStations stations_along(const GradientField& field, const NeedlePose& needle, double length,
+                             double floor) {
   const cv::Rect& a = field.area;
   ShaftStations out;
   for (double s = 8; s < 170; s += 5) {
@@ -68,8 +75,8 @@ ShaftStations stations_along(const GradientField& field, const NeedlePose& needl
     }
     ++out.tried;
     const double w = needle.half_width_at(s);
-    const auto low = outer_edge(field, needle, s, -w, floor);
-    const auto high = low ? outer_edge(field, needle, s, w, floor) : std::nullopt;
+    const auto low = outer_edge(field, needle, s, -w, length, floor);
+    const auto high = low ? outer_edge(field, needle, s, w, length, floor) : std::nullopt;
     if (high && *high - *low > 0.5 * w) {
       out.along.push_back(s);
       out.middle.push_back(0.5 * (*low + *high));
@@ -141,12 +148,17 @@ std::optional<ShaftProfile> shaft_profile(const GradientField& field, const Need
   return out;
 }
 
-}  // namespace
-
-double fit_walls(const GradientField& field, double noise, double radius, NeedlePose& needle) {
-  const ShaftStations stations = stations_along(field, needle, 4 * field.noise_of_gradient(noise));
+// As fit_walls, with edges averaged over `length` px.
+double fit_walls_averaged(const GradientField& field, double noise, double radius, double length,
+                          NeedlePose& needle) {
+  // Along a wall the smoothing joins about so much.
+  const double joined = 2 * std::sqrt(std::numbers::pi) * field.sigma;
+  const double floor =
+      4 * field.noise_of_gradient(noise) * (length > kPlain_px ? std::sqrt(joined / (joined + length)) : 1);
+  const ShaftStations stations = stations_along(field, needle, length, floor);
   const std::size_t n = stations.along.size();
-  if (n < 4) {
+  constexpr double kStations_px = 5;
+  if (static_cast<double>(n) < std::max(4.0, 2.5 * length / kStations_px)) {  // fewer are not independent
     return 0;
   }
   std::vector<double> weight(n, 1.0);
@@ -175,12 +187,39 @@ double fit_walls(const GradientField& field, double noise, double radius, Needle
     needle.half_width = half.offset;
     needle.taper = std::clamp(half.slope, 0.0, 0.2);
   }
+  // An edge of four standard deviations lies up to a quarter of its squared width off.
+  const double tolerance = length > 20 ? 1.6 : 1;
   int straight = 0;
   for (std::size_t i = 0; i < n; ++i) {
-    straight += std::abs(middle.residual(stations.along[i], stations.middle[i])) < 1 &&
-                std::abs(half.residual(stations.along[i], stations.half[i])) < 1;
+    straight += std::abs(middle.residual(stations.along[i], stations.middle[i])) < tolerance &&
+                std::abs(half.residual(stations.along[i], stations.half[i])) < tolerance;
   }
   return static_cast<double>(straight) / stations.tried;
+}
+
+}  // namespace
+
+// The shortest average that shows the walls: a long one takes bends for straight.
+double fit_walls(const GradientField& field, double noise, double radius, NeedlePose& needle,
+                 double longest) {
+  constexpr double kMostly = 0.8;
+  const NeedlePose before = needle;
+  double best = 0;
+  for (const double length : {3.0, 12.0, 24.0, 40.0}) {
+    if (length > longest) {
+      break;
+    }
+    NeedlePose fitted = before;
+    const double straight = fit_walls_averaged(field, noise, radius, length, fitted);
+    if (straight > best) {
+      best = straight;
+      needle = fitted;
+    }
+    if (best >= kMostly) {
+      break;
+    }
+  }
+  return best;
 }
 
 std::optional<double> end_of_profile(const GradientField& field, const NeedlePose& needle, double back,

@@ -20,6 +20,8 @@ namespace {
 constexpr double kStride_px = 1.5;
 constexpr std::size_t kUsualStations = 10;  // at the border they tell what the walls look like
 constexpr double kContinued = 0.5;          // of that: the tube goes on
+constexpr double kSurely = 0.8;             // and its other wall tells so
+constexpr double kAlike = 0.75;             // correlation of one look of a wall with another
 constexpr double kGiveUp = 3;               // so far below its best value the sum does not recover
 
 struct Stations {
@@ -78,21 +80,29 @@ std::optional<Stations> follow_edges(const GradientField& field, const TubeTrace
   for (double s = 0; s < longest; s += kStride_px) {
     std::array<double, 2> place = at, like{-1, -1};
     for (std::size_t k = 0; k < 2; ++k) {
+      WallProfile most{};
       for (double du = -3; du <= 3; du += kWallStep_px) {
-        const Point p = t.root + s * t.axis + (at[k] + du) * across;
-        const double as_usual = dot(wall_at(field, p, t.axis, across), usual[k]) / dot(usual[k], usual[k]);
+        const WallProfile wall = wall_at(field, t.root + s * t.axis + (at[k] + du) * across, t.axis, across);
+        const double as_usual = dot(wall, usual[k]) / dot(usual[k], usual[k]);
         if (as_usual > like[k]) {
           like[k] = as_usual;
           place[k] = at[k] + du;
+          most = wall;
         }
       }
+      // A membrane may look a little alike, and stronger.
+      const double alike =
+          dot(most, usual[k]) / std::sqrt(std::max(dot(most, most), 1e-9) * dot(usual[k], usual[k]));
+      like[k] = alike < kAlike ? std::min(like[k], 0.0) : std::min({like[k], 1.0, 2.5 - like[k]});
     }
-    const double similarity = std::clamp(std::min(like[0], like[1]), 0.0, 1.0);
+    // A speck on one wall tells nothing. Where the tube ends, both walls do.
+    const bool crossed = std::max(like[0], like[1]) > kSurely && std::min(like[0], like[1]) < kContinued;
+    const double similarity = crossed ? kContinued : std::clamp(std::min(like[0], like[1]), 0.0, 1.0);
     const std::size_t count = out.along.size();
     out.along.push_back(s);
     out.middle.push_back(0.5 * (place[0] + place[1]));
     out.half.push_back(0.5 * (place[1] - place[0]));
-    out.similarity.push_back(similarity);
+    out.similarity.push_back(crossed ? 0 : similarity);
     sum += similarity - kContinued;
     if (sum > sum_best) {
       sum_best = sum;
@@ -121,7 +131,7 @@ std::optional<TubeTrace> trace_wide_tube(const GradientField& field, Side side, 
     return std::nullopt;
   }
   const double strip = std::clamp(0.03 * field.area.width, 8.0, 24.0);
-  auto found = border_section(field, side, width_min, width_max, noise, strip, 0.3);
+  auto found = border_section(field, side, width_min, width_max, noise, strip, 0.3, 20);
   if (!found) {
     return std::nullopt;
   }

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "vision/image/correlation.hpp"
+#include "vision/image/registration.hpp"
 #include "vision/pipettes/holding_pipette.hpp"
 
 namespace {
@@ -76,6 +77,78 @@ TEST(Peak, is_sub_pixel_on_a_parabola) {
   EXPECT_NEAR(p->at.y, 3.8, 1e-4);
 }
 
+// Smooth blobs of known place under light that changes across the picture: drawn anew for every shift.
+cv::Mat blobs(const Point& shift, double gain, double slope, unsigned seed, double noise) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0, noise);
+  const Point places[] = {{40, 35}, {52, 61}, {70, 40}, {61, 52}, {44, 70}};
+  cv::Mat m(110, 120, CV_8U);
+  for (int y = 0; y < m.rows; ++y) {
+    for (int x = 0; x < m.cols; ++x) {
+      double grey = 0;
+      for (const Point& p : places) {
+        const Point d = Point(x, y) - p - shift;
+        grey += (p.x > 60 ? -35 : 30) * std::exp(-d.dot(d) / 30);
+      }
+      m.at<std::uint8_t>(y, x) =
+          cv::saturate_cast<std::uint8_t>(gain * grey + 130 + slope * (x - 60) + normal(random));
+    }
+  }
+  return m;
+}
+
+TEST(Registration, tells_hundredths_of_a_pixel_under_uneven_light) {
+  const cv::Rect box(30, 25, 52, 56);
+  const Registration pattern(blobs({}, 1, 0, 1, 0)(box), 0);
+  for (const Point& shift : {Point(0, 0), Point(0.3, -0.4), Point(-0.85, 0.5), Point(1.4, 1.1)}) {
+    for (const double gain : {0.6, 1.0, 1.3}) {
+      const cv::Mat seen = blobs(shift, gain, 0.1, 2, 0);
+      const auto place = pattern.place(seen, Point(box.x + std::round(shift.x), box.y + std::round(shift.y)));
+      ASSERT_TRUE(place) << shift << gain;
+      EXPECT_NEAR(place->corner.x, box.x + shift.x, 0.05) << shift << gain;
+      EXPECT_NEAR(place->corner.y, box.y + shift.y, 0.05) << shift << gain;
+    }
+  }
+}
+
+TEST(Registration, knows_how_well_it_knows) {
+  const cv::Rect box(30, 25, 52, 56);
+  constexpr double kNoise = 6;
+  const Registration pattern(blobs({}, 1, 0, 1, kNoise)(box), kNoise);
+  double ss = 0, sd = 0;
+  constexpr int kPictures = 60;
+  Point mean;
+  std::vector<Point> corners;
+  for (unsigned i = 0; i < kPictures; ++i) {
+    const auto place = pattern.place(blobs({}, 1, 0, 100 + i, kNoise), box.tl());
+    ASSERT_TRUE(place);
+    corners.push_back(place->corner);
+    mean += place->corner / kPictures;
+    sd += place->sd / kPictures;
+  }
+  for (const Point& c : corners) {
+    ss += (c - mean).dot(c - mean) / (2 * kPictures);
+  }
+  // The noise of the pattern itself is the same in all.
+  EXPECT_GT(sd, 0.7 * std::sqrt(ss));
+  EXPECT_LT(sd, 3 * std::sqrt(ss));
+}
+
+TEST(Registration, claims_nothing_where_there_is_nothing_or_along_an_edge) {
+  const cv::Rect box(30, 25, 52, 56);
+  EXPECT_FALSE(
+      Registration(cv::Mat(56, 52, CV_8U, cv::Scalar(90)), 0).place(blobs({}, 1, 0, 1, 0), box.tl()));
+  EXPECT_FALSE(
+      Registration(blobs({}, 1, 0, 1, 0)(box), 0).place(cv::Mat(110, 120, CV_8U, cv::Scalar(90)), box.tl()));
+  EXPECT_FALSE(Registration(blobs({}, 1, 0, 1, 0)(box), 0).place(blobs({6, 0}, 1, 0, 1, 0), box.tl()));
+  EXPECT_FALSE(Registration().place(blobs({}, 1, 0, 1, 0), box.tl()));
+  cv::Mat stripes = noise_picture(110, 120, 5) / 32;  // of one edge along x, and noise
+  stripes.rowRange(0, 60) += 120;
+  const auto place =
+      Registration(stripes(box), 2.3).place(stripes + noise_picture(110, 120, 6) / 32, box.tl());
+  EXPECT_TRUE(!place || place->sd > 0.25);
+}
+
 TEST(HoldingPipette, is_followed_in_its_window_and_its_loss_is_reported) {
   // A scene of blocks, moved by whole pixels: the answer is exact.
   cv::Mat scene(120, 160, CV_8U, cv::Scalar(140));
@@ -133,6 +206,9 @@ TEST(HoldingPipette, ends_at_the_cell_that_it_holds) {
           grey = 105;
         } else if (x < kEnd && std::abs(y - 160.0) < 48) {
           grey = 160;
+        }
+        if (seed % 2 == 0 && std::hypot((x - 60.0) / 7, (y - 106.0) / 5) < 1) {
+          grey = 95;  // a speck beside its upper wall
         }
         m.at<double>(y, x) = grey;
       }

@@ -1,0 +1,200 @@
+#include "vision/membrane/dimple_seen.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <vector>
+
+#include "hal/math/elementary.hpp"
+#include "vision/image/polar_contour.hpp"
+#include "vision/membrane/undeformed.hpp"
+
+namespace punctum::vision {
+
+namespace {
+
+constexpr double kDimpleReach = 6;   // half-widths of the needle to either side
+constexpr double kAbove_px = 4;      // above the outline at rest
+constexpr double kPast_px = 1;       // past the tip
+constexpr double kDepthStep_px = 1;  // the blur is wider
+constexpr int kLeastRays = 6;        // fewer tell nothing
+constexpr double kModel =
+    0.08;  // variance of an edge that looks otherwise than usual, in squared usual edges
+constexpr double kJoined_px = 3.5;  // along the membrane, by the smoothing
+// A membrane that has let go of the tip is further from it: px, and share of its depth.
+constexpr double kOnTip_px = 3, kOnTip = 0.25;
+constexpr double kTip_px = 1.6;     // to which the place of the tip is known
+constexpr double kSinks_px = 3;     // by which a free membrane may seem to, per frame
+constexpr double kSinking = 4;      // log odds against each px of it
+constexpr double kThrough = 12;     // log odds that a membrane is not on the tip that went through it
+constexpr double kStays = 3;        // log odds that it stays on the tip, or off it, for a frame
+constexpr double kSteepest = 1.8;   // slope of a wall that ends at its width; the needle hides a steeper one
+constexpr double kFreeHalf_px = 7;  // half-width of the band
+
+// A flat bottom with a logarithmic wall is what a stretched membrane has; the others end at their width.
+struct Shape {
+  double width;  // half-widths of the needle
+  bool logarithmic;
+};
+constexpr std::array<Shape, kDimpleShapes> kShapes{{{2, false},
+                                                    {2.3, false},
+                                                    {2.65, false},
+                                                    {3.05, false},
+                                                    {3.5, false},
+                                                    {4, false},
+                                                    {4.6, false},
+                                                    {5.3, false},
+                                                    {18, true},
+                                                    {100, true}}};
+
+// Steepest slope of its wall, for a depth of one half-width; 0 where it has none that is too steep.
+double steepness(const Shape& shape) { return shape.logarithmic ? 0 : 1.54 / shape.width; }
+
+// Share of the depth, u half-widths away from the entry.
+double share_of_depth(const Shape& shape, double u) {
+  if (u >= shape.width) {
+    return 0;
+  }
+  if (shape.logarithmic) {
+    return u <= 1 ? 1 : 1 - math::log(u) / math::log(shape.width);
+  }
+  const double f = 1 - u * u / (shape.width * shape.width);
+  return f * f;
+}
+
+// Dimples of one membrane in one picture: its points at rest, pushed along the needle.
+class Dimples {
+ public:
+  explicit Dimples(const MembraneSearch& search)
+      : s_(search),
+        outline_(from_polar(s_.band.centre, s_.rest)),
+        spacing_(s_.usual_r * 2 * std::numbers::pi / s_.angles) {
+    const NeedlePose& n = s_.surroundings.needle;
+    if (const auto entry = entry_point(outline_, n.tip, n.axis)) {
+      deepest_ = (n.tip - *entry).dot(n.axis);
+      entry_ = polar_index(*entry - s_.band.centre, s_.angles);
+      reach_ = std::min(static_cast<int>(kDimpleReach * n.half_width / spacing_), s_.angles / 8);
+    }
+  }
+
+  [[nodiscard]] bool meets_the_cell() const { return entry_.has_value(); }
+  [[nodiscard]] double deepest() const { return deepest_; }
+  [[nodiscard]] std::optional<double> evidence(const Shape& shape, double depth) const;
+  [[nodiscard]] Contour contour(const Shape& shape, double depth) const {
+    Contour out;
+    for (int i = 0; i < s_.angles; ++i) {
+      out.push_back(point(share_of_depth(shape, from_entry(i)), depth, i));
+    }
+    return out;
+  }
+
+ private:
+  [[nodiscard]] double from_entry(int i) const {  // half-widths of the needle
+    return std::abs(std::remainder(i - *entry_, s_.angles)) * spacing_ / s_.surroundings.needle.half_width;
+  }
+  [[nodiscard]] Point point(double share, double depth, int i) const {
+    const int n = s_.angles;
+    return outline_[static_cast<std::size_t>((i % n + n) % n)] + depth * share * s_.surroundings.needle.axis;
+  }
+
+  const MembraneSearch& s_;
+  Contour outline_;
+  double spacing_;  // px between two points
+  double deepest_ = 0;
+  std::optional<int> entry_;
+  int reach_ = 0;
+};
+
+std::optional<double> Dimples::evidence(const Shape& shape, double depth) const {
+  const double sign = s_.m.polarity == Polarity::darker_out ? -1 : 1;
+  double sum = 0;
+  int rays = 0;
+  Point last = point(share_of_depth(shape, from_entry(*entry_ - reach_ - 1)), depth, *entry_ - reach_ - 1),
+        here = point(share_of_depth(shape, from_entry(*entry_ - reach_)), depth, *entry_ - reach_);
+  for (int i = *entry_ - reach_; i <= *entry_ + reach_; ++i) {
+    const Point next = point(share_of_depth(shape, from_entry(i + 1)), depth, i + 1);
+    if (!s_.picture.hidden(here)) {
+      // The outside is on the left of a contour of rising angle, with y down.
+      const Point along = next - last;
+      const double edge =
+          s_.picture.field.gradient(here).dot(Point(along.y, -along.x)) / (cv::norm(along) * s_.m.level);
+      sum += std::clamp(s_.m.polarity == Polarity::any ? std::abs(edge) : sign * edge, -1.0, 1.2) - 0.5;
+      ++rays;
+    }
+    last = here;
+    here = next;
+  }
+  if (rays < kLeastRays) {
+    return std::nullopt;
+  }
+  const double noise = s_.picture.gradient_noise / s_.m.level;
+  return sum * std::min(1.0, spacing_ / kJoined_px) / (kModel + noise * noise);
+}
+
+}  // namespace
+
+std::optional<SeenDimple> likeliest_dimple(const MembraneSearch& search) {
+  const Dimples dimples(search);
+  if (!dimples.meets_the_cell()) {
+    return std::nullopt;
+  }
+  const double on_tip_from = dimples.deepest() - std::max(kOnTip_px, kOnTip * dimples.deepest());
+  std::optional<SeenDimple> pushed, free;
+  std::array<double, kDimpleShapes> best;
+  best.fill(-1e9);
+  for (std::size_t k = 0; k < kDimpleShapes; ++k) {
+    for (double depth = -kAbove_px; depth <= dimples.deepest() + kPast_px; depth += kDepthStep_px) {
+      // What the needle does not push does not sink.
+      const double sunk = search.m.held ? 0 : std::max(0.0, depth - search.m.dimple_px);
+      if (sunk > kSinks_px && (search.surroundings.punctured || depth <= on_tip_from)) {
+        continue;
+      }
+      if (steepness(kShapes[k]) * depth > kSteepest * search.surroundings.needle.half_width) {
+        break;
+      }
+      const auto evidence = dimples.evidence(kShapes[k], depth);
+      if (!evidence) {
+        continue;
+      }
+      const bool on_tip = depth > on_tip_from;
+      if (depth > dimples.deepest() - kTip_px) {
+        best[k] = std::max(best[k], *evidence);
+      }
+      std::optional<SeenDimple>& kept = on_tip ? pushed : free;
+      const double with_odds = *evidence + search.m.dimple_odds[k] - (on_tip ? 0 : kSinking * sunk);
+      if (!kept || with_odds > kept->evidence) {
+        kept = SeenDimple{depth, with_odds, k, on_tip, search.m.dimple_odds};
+      }
+    }
+  }
+  if (!pushed || !free) {
+    return pushed ? pushed : free;
+  }
+  const double on_tip = search.surroundings.punctured ? -kThrough : search.m.held ? kStays : -kStays;
+  if (pushed->evidence + on_tip < free->evidence) {
+    return free;
+  }
+  // A dimple keeps its shape while it grows, and while it goes back.
+  constexpr double kKept = 0.7, kLearnt = 0.5, kLeast = -5;
+  const double top = *std::max_element(best.begin(), best.end());
+  for (std::size_t k = 0; k < kDimpleShapes; ++k) {
+    pushed->odds[k] = std::max(kLeast, kKept * pushed->odds[k] + kLearnt * (best[k] - top));
+  }
+  return pushed;
+}
+
+EdgeBand band_along(const MembraneSearch& search, const SeenDimple& dimple) {
+  EdgeBand out = search.band;
+  const std::vector<double> r =
+      polar_radii(Dimples(search).contour(kShapes[dimple.shape], dimple.depth), out.centre, search.angles);
+  for (int i = 0; i < search.angles && !r.empty(); ++i) {
+    const std::size_t k = static_cast<std::size_t>(i);
+    const double weight = std::clamp((1.1 - search.from_needle(i)) / 0.3, 0.0, 1.0);
+    out.middle[k] += weight * (r[k] - out.middle[k]);
+  }
+  out.half_width = std::min(out.half_width, kFreeHalf_px);
+  return out;
+}
+
+}  // namespace punctum::vision

@@ -160,10 +160,6 @@ bool InjectionPipette::start(const GradientField& field, double noise, Walls vis
   longest_ = faint ? kFollowed_px : kShortest_px;
   if (faint) {
     const auto end = end_of_glass(field, noise, last_, kStartReach_px, kStartReach_px);
-    if (getenv("DBG")) {
-      fprintf(stderr, "start faint %d straight %.2f hw %.2f end %d sd %.3f ahead %.2f\n", faint, straight,
-              last_.half_width, !!end, end ? end->sd : 0., end ? end->ahead : 0.);
-    }
     if (!end || end->sd > kEndKnown_px) {
       reason_ = "the end of the needle is not clear";
       return false;

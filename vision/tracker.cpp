@@ -225,8 +225,9 @@ cv::Rect Tracker::Impl::area_to_search(bool starting) const {
 void Tracker::Impl::locate_needle() {
   if (!needle.started() && needle_tries++ % kNeedleEvery == 0) {
     // A membrane at the tip of a faint needle looks like its end.
-    using Walls = InjectionPipette::Walls;
-    (void)needle.start(picture.field, picture.noise, outer.known ? Walls::plain : Walls::faint);
+    (void)needle.start(picture.field, picture.noise, [this](const Point& end) {
+      return !outer.known || cv::norm(end - outer.centre) > median_of(outer.r) + kUntouched_px;
+    });
   }
   NeedlePose& n = result.needle;
   n = needle.find(picture.field, picture.noise);

@@ -73,12 +73,13 @@ class Dimples {
     const NeedlePose& n = s_.surroundings.needle;
     if (const auto entry = entry_point(outline_, n.tip, n.axis)) {
       deepest_ = (n.tip - *entry).dot(n.axis);
+      meets_the_cell_ = true;
       entry_ = polar_index(*entry - s_.band.centre, s_.angles);
       reach_ = std::min(static_cast<int>(kDimpleReach * n.half_width / spacing_), s_.angles / 8);
     }
   }
 
-  [[nodiscard]] bool meets_the_cell() const { return entry_.has_value(); }
+  [[nodiscard]] bool meets_the_cell() const { return meets_the_cell_; }
   [[nodiscard]] double deepest() const { return deepest_; }
   [[nodiscard]] std::optional<double> evidence(const Shape& shape, double depth) const;
   [[nodiscard]] Contour contour(const Shape& shape, double depth) const {
@@ -91,7 +92,7 @@ class Dimples {
 
  private:
   [[nodiscard]] double from_entry(int i) const {  // half-widths of the needle
-    return std::abs(std::remainder(i - *entry_, s_.angles)) * spacing_ / s_.surroundings.needle.half_width;
+    return std::abs(std::remainder(i - entry_, s_.angles)) * spacing_ / s_.surroundings.needle.half_width;
   }
   [[nodiscard]] Point point(double share, double depth, int i) const {
     const int n = s_.angles;
@@ -102,7 +103,8 @@ class Dimples {
   Contour outline_;
   double spacing_;  // px between two points
   double deepest_ = 0;
-  std::optional<int> entry_;
+  bool meets_the_cell_ = false;
+  int entry_ = 0;  // index of the angle
   int reach_ = 0;
 };
 
@@ -110,9 +112,9 @@ std::optional<double> Dimples::evidence(const Shape& shape, double depth) const 
   const double sign = s_.m.polarity == Polarity::darker_out ? -1 : 1;
   double sum = 0;
   int rays = 0;
-  Point last = point(share_of_depth(shape, from_entry(*entry_ - reach_ - 1)), depth, *entry_ - reach_ - 1),
-        here = point(share_of_depth(shape, from_entry(*entry_ - reach_)), depth, *entry_ - reach_);
-  for (int i = *entry_ - reach_; i <= *entry_ + reach_; ++i) {
+  Point last = point(share_of_depth(shape, from_entry(entry_ - reach_ - 1)), depth, entry_ - reach_ - 1),
+        here = point(share_of_depth(shape, from_entry(entry_ - reach_)), depth, entry_ - reach_);
+  for (int i = entry_ - reach_; i <= entry_ + reach_; ++i) {
     const Point next = point(share_of_depth(shape, from_entry(i + 1)), depth, i + 1);
     if (!s_.picture.hidden(here)) {
       // The outside is on the left of a contour of rising angle, with y down.

@@ -29,7 +29,7 @@ constexpr double kShortest_px = 4, kLongest_px = 40;  // of a wall that an edge 
 constexpr double kFollowed_px = 24;                   // and later, of a faint one: it may bend
 // Standard deviation of the end of a faint needle. A tip that is less certain does more harm than one that is
 // not claimed: membranes are then taken for pushed that are free.
-constexpr double kEndKnown_px = 0.8;
+constexpr double kEndKnown_px = 0.45;
 // In a needle with a smaller half-width no lumen is left between the walls, and a line across it looks like
 // them.
 constexpr double kLumen_px = 4.5;
@@ -66,14 +66,13 @@ std::array<double, 2> faces(const GradientField& field, const NeedlePose& needle
 }
 
 // As fit_walls, from a pose whose width is not certain.
-double fit_walls_at_start(const GradientField& field, double noise, double radius_px, double longest,
-                          NeedlePose& needle) {
+double fit_walls_at_start(const GradientField& field, double noise, double radius_px, NeedlePose& needle) {
   const NeedlePose traced = needle;
   double straight = 0;
   for (const double wider : {1.0, 0.7, 0.5}) {  // noise may have hidden the walls near the end
     needle = traced;
     needle.half_width *= wider;
-    straight = fit_walls(field, noise, radius_px, needle, longest);
+    straight = fit_walls(field, noise, radius_px, needle, kLongest_px);
     if (straight > 0) {
       break;
     }
@@ -89,7 +88,7 @@ double fit_walls_at_start(const GradientField& field, double noise, double radiu
     NeedlePose wider = needle;
     wider.tip = needle.at(0, side * kWider_px);
     wider.half_width += kWider_px;
-    const double s = fit_walls(field, noise, radius_px, wider, longest);
+    const double s = fit_walls(field, noise, radius_px, wider, kLongest_px);
     const auto [lower, higher] = faces(field, wider);
     if (s > std::max(kStraight, straight - kNearlyAs) &&
         wider.half_width > needle.half_width + kWider_px / 2 && lower * higher < 0 &&
@@ -121,8 +120,7 @@ bool InjectionPipette::cut_template(const GradientField& field) {
   return true;
 }
 
-bool InjectionPipette::start(const GradientField& field, double noise, Walls visible) {
-  const double longest = visible == Walls::faint ? kLongest_px : kShortest_px;
+bool InjectionPipette::start(const GradientField& field, double noise, const Clear& clear_at) {
   const auto tube = best_tube(field, side_, std::max(22.0, 8 * radius_px_), noise);
   if (!tube) {
     reason_ = "no narrow tube enters through the border";
@@ -135,8 +133,8 @@ bool InjectionPipette::start(const GradientField& field, double noise, Walls vis
   last_.tip = tube->end();
   double straight = 0;
   for (int round = 0; round < 3; ++round) {
-    straight = round == 0 ? fit_walls_at_start(field, noise, radius_px_, longest, last_)
-                          : fit_walls(field, noise, radius_px_, last_, longest);
+    straight = round == 0 ? fit_walls_at_start(field, noise, radius_px_, last_)
+                          : fit_walls(field, noise, radius_px_, last_, kLongest_px);
     const double back = std::min(30.0, 0.5 * tube->length), ahead = round == 0 ? 25 : 10;
     if (const auto s = end_of_profile(field, last_, back, ahead, noise)) {
       last_.tip += *s * last_.axis;
@@ -160,7 +158,7 @@ bool InjectionPipette::start(const GradientField& field, double noise, Walls vis
   longest_ = faint ? kFollowed_px : kShortest_px;
   if (faint) {
     const auto end = end_of_glass(field, noise, last_, kStartReach_px, kStartReach_px);
-    if (!end || end->sd > kEndKnown_px) {
+    if (!end || end->sd > kEndKnown_px || !clear_at(last_.tip)) {
       reason_ = "the end of the needle is not clear";
       return false;
     }
@@ -258,7 +256,7 @@ NeedlePose InjectionPipette::not_recognised(const GradientField& field, double n
   velocity_ = {};
   if (++lost_ > kLostMax) {
     const NeedlePose before = last_;
-    if (start(field, noise, Walls::plain)) {
+    if (start(field, noise, [](const Point&) { return false; })) {
       return last_;
     }
     last_ = before;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <opencv2/core.hpp>
 #include <string>
 
@@ -20,9 +21,10 @@ class InjectionPipette {
   InjectionPipette(Side side, double radius_px) : side_(side), radius_px_(radius_px) {}
 
   // Looks for it from the border. True when a template of the tip was cut. noise: grey levels. Faint walls
-  // are averaged over much of their length; then the end must be clear.
-  enum class Walls : std::uint8_t { plain, faint };
-  [[nodiscard]] bool start(const GradientField& field, double noise, Walls visible);
+  // are averaged over much of their length; then the end must be certain, and clear_at(tip) tell that nothing
+  // else lies near.
+  using Clear = std::function<bool(const Point& tip)>;
+  [[nodiscard]] bool start(const GradientField& field, double noise, const Clear& clear_at);
   [[nodiscard]] NeedlePose find(const GradientField& field, double noise);
   // Lets the template of the tip follow slow changes of focus and light. Only while nothing touches the tip.
   void learn(const GradientField& field, const NeedlePose& needle, double noise);

@@ -89,7 +89,7 @@ GradientField draw(const Drawing& d) {
 class Needle : public testing::Test {
  protected:
   void approach(Drawing& d) {
-    ASSERT_TRUE(needle_.start(draw(d), kNoise, InjectionPipette::Walls::faint));
+    ASSERT_TRUE(needle_.start(draw(d), kNoise, [](const Point&) { return true; }));
     for (; d.tip > kYolk_x + 6; d.tip -= 2.5) {
       const NeedlePose seen = look(d);
       ASSERT_TRUE(seen.ok) << d.tip << seen.reason;

@@ -399,8 +399,8 @@ int Tracker::Impl::fit_undeformed_membrane() {
   }
   const bool touched_before = was_contact || punctured || needle_hidden();
   const bool touched = entry || touched_before;
-  constexpr double kCertain_px = 0.25;  // a less certain motion of the holding pipette is none
-  const bool certain = result.holder.sd < kCertain_px;
+  constexpr double kCertainMotion_px = 0.25;  // a less certain motion of the holding pipette is none
+  const bool certain = result.holder.sd < kCertainMotion_px;
   const Point shift = undeformed.update(*now, touched, certain ? mouth : std::nullopt);
   for (FollowedMembrane* m : {&outer, &inner}) {
     m->rest.centre += shift;

@@ -10,7 +10,7 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr double kCertain_px = 1;  // of a mouth that is less certain nothing is claimed
+constexpr double kCertainMouth_px = 1;  // of a mouth that is less certain nothing is claimed
 
 }  // namespace
 
@@ -112,7 +112,7 @@ void HoldingPipette::refine(const cv::Mat& grey, HolderPose& holder) const {
     return;
   }
   const auto place = registration_.place(grey, holder.box.tl());
-  if (!place || place->sd > kCertain_px) {
+  if (!place || place->sd > kCertainMouth_px) {
     holder.ok = false;
     holder.reason = "its place is not certain";
     return;

@@ -19,17 +19,16 @@ constexpr double kAbove_px = 4;      // above the outline at rest
 constexpr double kPast_px = 1;       // past the tip
 constexpr double kDepthStep_px = 1;  // the blur is wider
 constexpr int kLeastRays = 6;        // fewer tell nothing
-constexpr double kModel =
-    0.08;  // variance of an edge that looks otherwise than usual, in squared usual edges
-constexpr double kJoined_px = 3.5;  // along the membrane, by the smoothing
+constexpr double kModel = 0.08;      // variance of an edge that looks unusual, in squared usual edges
+constexpr double kJoined_px = 3.5;   // along the membrane, by the smoothing
 // A membrane that has let go of the tip is further from it: px, and share of its depth.
 constexpr double kOnTip_px = 3, kOnTip = 0.25;
-constexpr double kTip_px = 1.6;     // to which the place of the tip is known
-constexpr double kSinks_px = 3;     // by which a free membrane may seem to, per frame
-constexpr double kSinking = 4;      // log odds against each px of it
-constexpr double kThrough = 12;     // log odds that a membrane is not on the tip that went through it
-constexpr double kStays = 3;        // log odds that it stays on the tip, or off it, for a frame
-constexpr double kSteepest = 1.8;   // slope of a wall that ends at its width; the needle hides a steeper one
+constexpr double kTip_px = 1.6;    // to which the tip is known: shapes are learnt from dimples that end there
+constexpr double kSinks_px = 3;    // by which a free membrane may seem to sink in a frame
+constexpr double kSinking = 4;     // log odds against each px of it
+constexpr double kThrough = 12;    // log odds that a membrane is not on the tip that went through it
+constexpr double kStays = 3;       // log odds that it stays on the tip, or off it, for a frame
+constexpr double kSteepest = 1.8;  // slope of a wall that ends at its width; the needle hides a steeper one
 constexpr double kFreeHalf_px = 7;  // half-width of the band
 
 // A flat bottom with a logarithmic wall is what a stretched membrane has; the others end at their width.
@@ -48,7 +47,7 @@ constexpr std::array<Shape, kDimpleShapes> kShapes{{{2, false},
                                                     {18, true},
                                                     {100, true}}};
 
-// Steepest slope of its wall, for a depth of one half-width; 0 where it has none that is too steep.
+// Slope of its wall where it is steepest, for a depth of one half-width; a logarithmic wall may have any: 0.
 double steepness(const Shape& shape) { return shape.logarithmic ? 0 : 1.54 / shape.width; }
 
 // Share of the depth, u half-widths away from the entry.

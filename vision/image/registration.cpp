@@ -13,8 +13,8 @@ namespace punctum::vision {
 namespace {
 
 constexpr double kSigma_px = 1.2;
-constexpr int kMargin = 2;  // px of the pattern that its border falsifies
-constexpr double kFurthest_px = 2.5;
+constexpr int kMargin = 2;            // px of the pattern that its border falsifies
+constexpr double kFurthest_px = 2.5;  // the vertex of eq. 1 errs by less
 
 }  // namespace
 
@@ -59,7 +59,7 @@ std::optional<Registration::Place> Registration::place(const cv::Mat& grey, cons
                       static_cast<int>(std::floor(corner.y)) - around, w + 2 * around + 1,
                       h + 2 * around + 1);
   const cv::Rect seen = part & cv::Rect(0, 0, grey.cols, grey.rows);
-  if (!(power_ > 0) || !(determinant > 1e-6 * xx_ * yy_)) {
+  if (seen.empty() || !(power_ > 0) || !(determinant > 1e-6 * xx_ * yy_)) {
     return std::nullopt;
   }
   cv::Mat smooth;

@@ -141,6 +141,7 @@ TEST(Registration, claims_nothing_where_there_is_nothing_or_along_an_edge) {
   EXPECT_FALSE(
       Registration(blobs({}, 1, 0, 1, 0)(box), 0).place(cv::Mat(110, 120, CV_8U, cv::Scalar(90)), box.tl()));
   EXPECT_FALSE(Registration(blobs({}, 1, 0, 1, 0)(box), 0).place(blobs({6, 0}, 1, 0, 1, 0), box.tl()));
+  EXPECT_FALSE(Registration(blobs({}, 1, 0, 1, 0)(box), 0).place(blobs({}, 1, 0, 1, 0), {900, -300}));
   EXPECT_FALSE(Registration().place(blobs({}, 1, 0, 1, 0), box.tl()));
   cv::Mat stripes = noise_picture(110, 120, 5) / 32;  // of one edge along x, and noise
   stripes.rowRange(0, 60) += 120;

@@ -46,6 +46,10 @@ int run(int argc, char** argv) {
       ->required()
       ->type_name("FILE");
   track->add_option("--contours", t.contours, "table of the contours (contours.csv)")->type_name("FILE");
+  track
+      ->add_option("--deviations", t.deviations,
+                   "table of the standard deviation of every node of the contours")
+      ->type_name("FILE");
   track->add_option("--overlay", t.overlay, "folder for annotated frames")->type_name("FOLDER");
   track->add_option("--surface", t.surface, "folder for the membranes' surfaces (json, obj, stl)")
       ->type_name("FOLDER");

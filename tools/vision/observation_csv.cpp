@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <string_view>
 #include <utility>
@@ -27,7 +28,7 @@ constexpr std::string_view kTruthColumns =
     ",outer_rms_um,outer_p95_um,outer_max_um,inner_rms_um,tip_error_um,tip_lateral_um,gap_error_um,wd_error_"
     "um,"
     "a_error_um";
-constexpr std::string_view kLaterColumns = ",surface_us";
+constexpr std::string_view kLaterColumns = ",surface_us,outer_sd_um,inner_sd_um";
 
 class Row {
  public:
@@ -206,6 +207,13 @@ void ObservationCsv::row(const vision::Result& r, const vision::VisionConfig& co
     }
   }
   row.number(when(r.us.surface > 0, r.us.surface), 0);
+  for (const vision::Membrane* m : {&r.outer, &r.inner}) {
+    double square = 0;
+    for (const double sd : m->sd_px) {
+      square += sd * sd / static_cast<double>(m->sd_px.size());
+    }
+    row.number(when(square > 0, std::sqrt(square) * um), 4);
+  }
 }
 
 bool ObservationCsv::flush() {
@@ -213,14 +221,15 @@ bool ObservationCsv::flush() {
   return rows_.failure().empty();
 }
 
-tl::expected<ContoursCsv, std::string> ContoursCsv::open(const std::string& path) {
+tl::expected<ContoursCsv, std::string> ContoursCsv::open(const std::string& path, Of of) {
   auto rows = RowFile::open(path, RowFile::Begin::empty);
   if (!rows) {
     return tl::unexpected(rows.error());
   }
   ContoursCsv csv;
+  csv.of_ = of;
   csv.rows_ = std::move(*rows);
-  csv.rows_.append("frame,membrane,node,x_px,y_px\n");
+  csv.rows_.append(of == Of::place ? "frame,membrane,node,x_px,y_px\n" : "frame,membrane,node,sd_px\n");
   return csv;
 }
 
@@ -229,9 +238,12 @@ void ContoursCsv::rows(const vision::Result& r, cv::Point offset) {
     if (!m->ok) {
       continue;
     }
-    for (std::size_t i = 0; i < m->contour.size(); ++i) {
+    for (std::size_t i = 0; i < m->contour.size() && of_ == Of::place; ++i) {
       rows_.append(fmt::format("{},{},{},{:.3f},{:.3f}\n", r.frame, name, i, m->contour[i].x + offset.x,
                                m->contour[i].y + offset.y));
+    }
+    for (std::size_t i = 0; i < m->sd_px.size() && of_ == Of::deviation; ++i) {
+      rows_.append(fmt::format("{},{},{},{:.3f}\n", r.frame, name, i, m->sd_px[i]));
     }
   }
 }

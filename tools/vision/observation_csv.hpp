@@ -1,4 +1,5 @@
-// obs.csv: the result of vision, one row per frame; contours.csv: its contours, one row per node.
+// obs.csv: the result of vision, one row per frame; contours.csv: its contours, one row per node; and how
+// certain each node is.
 #pragma once
 
 #include <optional>
@@ -43,15 +44,18 @@ class ObservationCsv {
   bool with_truth_ = false;
 };
 
+// One row per node of the contours: where it is, or the standard deviation of its place across the contour.
 class ContoursCsv {
  public:
-  [[nodiscard]] static tl::expected<ContoursCsv, std::string> open(const std::string& path);
+  enum class Of : std::uint8_t { place, deviation };
+  [[nodiscard]] static tl::expected<ContoursCsv, std::string> open(const std::string& path, Of of);
   void rows(const vision::Result& result, cv::Point offset);
   [[nodiscard]] bool flush();
   [[nodiscard]] const std::string& failure() const noexcept { return rows_.failure(); }
 
  private:
   RowFile rows_;
+  Of of_ = Of::place;
 };
 
 }  // namespace punctum::tools

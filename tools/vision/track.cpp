@@ -144,7 +144,7 @@ Or<Input> open_input(const TrackOptions& options) {
 
 struct Output {
   ObservationCsv observations;
-  std::optional<ContoursCsv> contours;
+  std::optional<ContoursCsv> contours, deviations;
   std::string overlay_folder;  // empty: no overlays
   std::string surface_folder;  // empty: no surfaces
 
@@ -158,13 +158,20 @@ Or<Output> open_output(const TrackOptions& options) {
   if (!observations) {
     return wrong(observations.error());
   }
-  Output out{std::move(*observations), std::nullopt, options.overlay, options.surface};
+  Output out{std::move(*observations), std::nullopt, std::nullopt, options.overlay, options.surface};
   if (!options.contours.empty()) {
-    auto contours = ContoursCsv::open(options.contours);
+    auto contours = ContoursCsv::open(options.contours, ContoursCsv::Of::place);
     if (!contours) {
       return wrong(contours.error());
     }
     out.contours = std::move(*contours);
+  }
+  if (!options.deviations.empty()) {
+    auto deviations = ContoursCsv::open(options.deviations, ContoursCsv::Of::deviation);
+    if (!deviations) {
+      return wrong(deviations.error());
+    }
+    out.deviations = std::move(*deviations);
   }
   for (const std::string& folder : {options.overlay, options.surface}) {
     std::error_code error;
@@ -246,8 +253,10 @@ Counts track_all(Input& input, Output& output) {
     counts.outer += result.outer.ok;
     counts.inner += result.inner.ok;
     counts.unusable += !result.usable;
-    if (output.contours) {
-      output.contours->rows(result, input.roi.tl());
+    for (auto* nodes : {&output.contours, &output.deviations}) {
+      if (*nodes) {
+        (*nodes)->rows(result, input.roi.tl());
+      }
     }
     output.write_overlay(grey, result, input.config, input.camera.name());
     output.write_surfaces(result, input, input.camera.name());
@@ -282,6 +291,9 @@ int track(const TrackOptions& options) {
   check_complete(output->observations.flush(), options.out, output->observations.failure());
   if (output->contours) {
     check_complete(output->contours->flush(), options.contours, output->contours->failure());
+  }
+  if (output->deviations) {
+    check_complete(output->deviations->flush(), options.deviations, output->deviations->failure());
   }
   say(fmt::format("{} frames, outer membrane in {}, inner in {}, unusable {}\n", counts.frames, counts.outer,
                   input->config.inner ? fmt::format("{}", counts.inner) : "-", counts.unusable));

@@ -13,7 +13,7 @@ struct TrackOptions {
   std::string scene;                   // built-in name or path
   std::vector<std::string> overrides;  // table.key=value
   std::string out;                     // obs.csv
-  std::string contours;                // empty: not written
+  std::string contours, deviations;    // empty: not written
   std::string overlay;                 // folder; empty: not drawn
   std::string surface;                 // folder; empty: not reconstructed
   double fps = 25;

@@ -10,5 +10,9 @@ namespace punctum::vision {
 [[nodiscard]] std::vector<double> smooth_periodic(const std::vector<double>& r,
                                                   const std::vector<double>& weight,
                                                   const std::vector<double>& stiffness);
+// Variance of each of them, where the r_i have the variances 1 / w_i: the diagonal of the inverse of the
+// normal matrix. weight and stiffness as above, at least 8 of them, not all weights 0.
+[[nodiscard]] std::vector<double> variance_of_smoothing(const std::vector<double>& weight,
+                                                        const std::vector<double>& stiffness);
 
 }  // namespace punctum::vision

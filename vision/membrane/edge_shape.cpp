@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <numbers>
 #include <opencv2/core.hpp>
+#include <utility>
 
 #include "hal/math/elementary.hpp"
 #include "vision/image/blurred_step.hpp"
@@ -26,6 +27,12 @@ constexpr double kTukey = 4.7;          // times the scale: 95 % efficiency for 
 constexpr double kLeastScale_px = 0.05;
 constexpr double kSoft = 0.02;       // of the stiffness, where the membrane may have any shape
 constexpr double kGainReach = 0.04;  // of the circumference to either side, over which contrast is averaged
+constexpr double kLeastLeft = 0.2, kMostTrust = 3;
+constexpr double kGrain = 0.6;  // per point, for granules of about 2 px
+constexpr double kSampledNoise =
+    0.5;                         // of its variance, once samples between pixels and weights have taken theirs
+constexpr double kBeside = 0.1;  // weight of a place beside a line that is not its own
+constexpr double kCommon_px = 0.03;  // sd of what is wrong alike all round: the steps are no perfect model
 constexpr double kShapeNoise = 0.5;  // grey levels: what the common shape itself is worth
 constexpr double kBlurFirst_px = 1.8, kBlurLeast_px = 0.6, kBlurMost_px = 5;
 
@@ -94,10 +101,12 @@ struct Profiles {
 // The common shape of all profiles, and each profile's place: grey = level + gain shape(s - place).
 class CommonShape {
  public:
-  CommonShape(const Profiles& profiles, const std::vector<double>& soft, double modes)
+  CommonShape(const Profiles& profiles, const std::vector<double>& soft, const EdgeShape& edge)
       : profiles_(profiles),
         soft_(soft),
-        modes_(modes),
+        beside_(edge.beside),
+        modes_(edge.modes),
+        least_lasting_(edge.lasting),
         shape_(profiles.samples),
         trust_(profiles.samples, 1.0),
         place_(profiles.points),
@@ -105,6 +114,7 @@ class CommonShape {
         weight_(profiles.points),
         gain_(profiles.points, 1.0),
         gain_raw_(profiles.points, 1.0),
+        noise_(profiles.points),
         misfit_(profiles.points),
         likeness_(profiles.points),
         moved_shape_(profiles.samples),
@@ -130,6 +140,11 @@ class CommonShape {
   }
   [[nodiscard]] const std::vector<double>& shape() const { return shape_; }   // grey levels, per sample
   [[nodiscard]] const std::vector<double>& places() const { return place_; }  // px, per point
+  // Of the places, px^2. noise: of the picture, grey levels.
+  struct Variance {
+    std::vector<double> all, lasting;
+  };
+  [[nodiscard]] Variance variance(double noise, EdgeScatter& mean) const;
 
  private:
   void average();
@@ -142,12 +157,15 @@ class CommonShape {
 
   const Profiles& profiles_;
   const std::vector<double>& soft_;
-  double modes_;
+  const std::vector<std::uint8_t>& beside_;
+  double modes_, least_lasting_;
   std::vector<double> shape_;
   std::vector<double> trust_;  // per sample: the less other things differ there, the more
   std::vector<double> place_, raw_, weight_, gain_, gain_raw_;
-  std::vector<double> misfit_;    // grey levels, rms
-  std::vector<double> likeness_;  // share of the variance that is explained
+  std::vector<double> robust_, stiffness_;  // of the smoothing that gave the places
+  std::vector<double> noise_;               // variance of a raw place for noise of one grey level, px^2
+  std::vector<double> misfit_;              // grey levels, rms
+  std::vector<double> likeness_;            // share of the variance that is explained
   std::vector<double> moved_shape_, moved_slope_, values_;
 };
 
@@ -230,7 +248,7 @@ bool CommonShape::place_all() {
     usual += square[j] / static_cast<double>(square.size());
   }
   for (std::size_t j = 0; j < square.size(); ++j) {
-    trust_[j] = usual / std::max(square[j], 0.05 * usual + 1e-9);
+    trust_[j] = usual / std::max(square[j], usual / kMostTrust + 1e-9);
   }
   return static_cast<double>(used) >= kLeastShare * static_cast<double>(profiles_.points);
 }
@@ -286,12 +304,19 @@ bool CommonShape::place(std::size_t i, double shape_energy, std::vector<double>&
   const double level = (b0 * a(2, 2) - b2 * a(0, 2)) / det, step = (a(0, 0) * b2 - a(0, 2) * b0) / det;
   raw_[i] = std::clamp(place_[i] + step, -kMost_px, kMost_px);
   weight_[i] = 1;
+  const double mean_slope = a(0, 2) / a(0, 0), told = det / a(0, 0);
+  double doubted = 0;
   for (std::size_t j = 0; j < profiles_.samples; ++j) {
     if (seen[j] != 0) {
-      square[j] += std::pow(grey[j] - level - g * (moved_shape_[j] - step * moved_slope_[j]), 2);
+      const double slope = g * moved_slope_[j] + mean_slope, pull = trust_[j] * slope * slope / told;
+      doubted += std::pow(trust_[j] * slope, 2);
+      // The place follows the samples that tell it, so that little is left of what they err by.
+      square[j] += std::pow(grey[j] - level - g * (moved_shape_[j] - step * moved_slope_[j]), 2) /
+                   std::max(1 - pull, kLeastLeft);
       ++count[j];
     }
   }
+  noise_[i] = kSampledNoise * doubted / (kSample_px * told * told);
   return true;
 }
 
@@ -321,16 +346,19 @@ void CommonShape::smooth_places() {
     }
   }
   const double usual = std::max(median_of(values_), 1e-3);
-  std::vector<double> stiffness(n), robust(n);
+  stiffness_.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
     // An impurity on the edge makes the profile fit badly, and pulls.
     const double bad = 2 * std::max(0.0, misfit_[i] / usual - 1);
     weight_[i] *= std::min(1.0, gain_[i] * gain_[i]) / (1 + bad * bad);
-    stiffness[i] = stiffness_of(modes_, soft_[i], n);
+    if (!beside_.empty() && beside_[i] != 0) {
+      weight_[i] *= kBeside;
+    }
+    stiffness_[i] = stiffness_of(modes_, soft_[i], n);
   }
-  robust = weight_;
+  robust_ = weight_;
   for (int round = 0; round < 2; ++round) {
-    place_ = smooth_periodic(raw_, robust, stiffness);
+    place_ = smooth_periodic(raw_, robust_, stiffness_);
     values_.clear();
     for (std::size_t i = 0; i < n; ++i) {
       if (weight_[i] > 0) {
@@ -340,13 +368,56 @@ void CommonShape::smooth_places() {
     const double limit = kTukey * std::max(kSdOfMedian * median_of(values_), kLeastScale_px);
     for (std::size_t i = 0; i < n; ++i) {
       const double t = (raw_[i] - place_[i]) / limit;
-      robust[i] = std::abs(t) < 1 ? weight_[i] * std::pow(1 - t * t, 2) : 0;
+      robust_[i] = std::abs(t) < 1 ? weight_[i] * std::pow(1 - t * t, 2) : 0;
     }
   }
-  place_ = smooth_periodic(raw_, robust, stiffness);
+  place_ = smooth_periodic(raw_, robust_, stiffness_);
   for (double& p : place_) {
     p = std::clamp(p, -kMost_px, kMost_px);
   }
+}
+
+// The raw places scatter by the picture's noise, which differs from point to point and from frame to frame,
+// and by what is beside the edge, of which neighbours see the same and the next frames, too.
+CommonShape::Variance CommonShape::variance(double noise, EdgeScatter& mean) const {
+  const std::size_t n = profiles_.points;
+  double points = 0, weight = 0, square = 0, weights = 0, difference = 0, by_noise = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::size_t next = (i + 1) % n;
+    const double w = robust_[i], off = raw_[i] - place_[i];
+    if (w > 0) {
+      points += 1;
+      weight += w;
+      square += w * off * off;
+      by_noise += w * noise * noise * noise_[i];
+      const double both = std::sqrt(w * robust_[next]);
+      weights += both;
+      difference += 0.5 * both * std::pow(off - raw_[next] + place_[next], 2);
+    }
+  }
+  constexpr int kMemory = 40;  // frames
+  const double part = 1.0 / (mean.frames = std::min(mean.frames + 1, kMemory));
+  mean.square += part * (square / weight - mean.square);  // some are seen, or there would be no shape
+  mean.difference += part * (difference / std::max(weights, 1e-9) - mean.difference);
+  by_noise /= weight;
+  // What neighbours have in common falls off by kGrain from point to point. Of waves that are long against
+  // its kernel K the smoothing takes all: of the scatter 2 K(0) - K * K(0), times what is in common.
+  const double wave = static_cast<double>(n) / (2 * std::numbers::pi * modes_);
+  double scatter = mean.square, together = 1;
+  for (int round = 0; round < 4; ++round) {
+    scatter = mean.square / (1 - std::min(0.6, 0.44 * together / wave));
+    together = 1 + 2 / (1 - kGrain) * std::max(0.0, 1 - mean.difference / std::max(scatter, 1e-9));
+  }
+  scatter *= together;
+  by_noise = std::min(scatter, by_noise);
+  const double lasting = std::max(scatter - by_noise, least_lasting_ * scatter);
+  Variance out{variance_of_smoothing(robust_, stiffness_), std::vector<double>(n)};
+  for (std::size_t i = 0; i < n; ++i) {
+    out.all[i] += 1 / points;  // of the steps in the mean profile
+    out.lasting[i] = lasting * out.all[i] + kCommon_px * kCommon_px;
+    out.all[i] = by_noise * out.all[i] + out.lasting[i];
+  }
+  return out;
 }
 
 // The common shape as one or two blurred steps. Unknown are the place of the own step, the blur, and the
@@ -450,14 +521,15 @@ class BlurredSteps {
 
 }  // namespace
 
-std::optional<Contour> shaped_edge(const ClearedPicture& picture, const Contour& contour,
-                                   const std::vector<double>& soft, const EdgeShape& edge) {
+std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Contour& contour,
+                                       const std::vector<double>& soft, const EdgeShape& edge,
+                                       EdgeScatter& scatter) {
   if (contour.size() < 64 || soft.size() != contour.size()) {
     return std::nullopt;
   }
   const Contour base = smoothed(contour, soft, edge.modes);
   const Profiles profiles(picture, base, edge);
-  CommonShape common(profiles, soft, edge.modes);
+  CommonShape common(profiles, soft, edge);
   if (!common.find()) {
     return std::nullopt;
   }
@@ -465,9 +537,10 @@ std::optional<Contour> shaped_edge(const ClearedPicture& picture, const Contour&
   if (!own) {
     return std::nullopt;
   }
-  Contour out(base.size());
+  CommonShape::Variance variance = common.variance(picture.noise, scatter);
+  SeenOutline out{Contour(base.size()), std::move(variance.all), std::move(variance.lasting)};
   for (std::size_t i = 0; i < base.size(); ++i) {
-    out[i] = base[i] + (common.places()[i] + *own) * profiles.normal[i];
+    out.contour[i] = base[i] + (common.places()[i] + *own) * profiles.normal[i];
   }
   return out;
 }

@@ -3,10 +3,12 @@
 // nearby shifts it.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <vector>
 
 #include "vision/membrane/cleared_picture.hpp"
+#include "vision/membrane/seen_outline.hpp"
 
 namespace punctum::vision {
 
@@ -19,12 +21,23 @@ struct NearbyEdge {
 struct EdgeShape {
   double inside = 8, outside = 6;  // px of the picture that are looked at on either side of the contour
   double modes = 12;               // finer waves round the contour are noise
+  double lasting = 0;  // of the places' scatter at least this share is the same in the next frames
   std::optional<NearbyEdge> nearby;
+  std::vector<std::uint8_t> beside;  // per point, 1: beside a line that is not its own; or empty
+};
+
+// By how much the places of single points scatter about the contour, over the last frames: the mean square of
+// what they are off, and of half of what neighbours differ by, px^2.
+struct EdgeScatter {
+  double square = 0, difference = 0;
+  int frames = 0;
 };
 
 // soft: per point of the contour, 1 where the membrane may have any shape (beside the needle), 0 elsewhere.
-// Empty where too little is seen, or where the edge does not look alike all round.
-[[nodiscard]] std::optional<Contour> shaped_edge(const ClearedPicture& picture, const Contour& contour,
-                                                 const std::vector<double>& soft, const EdgeShape& edge);
+// Empty where too little is seen, or where the edge does not look alike all round. scatter: takes this frame
+// in.
+[[nodiscard]] std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Contour& contour,
+                                                     const std::vector<double>& soft, const EdgeShape& edge,
+                                                     EdgeScatter& scatter);
 
 }  // namespace punctum::vision

@@ -7,6 +7,8 @@
 
 #include "vision/image/closed_path.hpp"
 #include "vision/image/polar_contour.hpp"
+#include "vision/membrane/carried_outline.hpp"
+#include "vision/membrane/edge_shape.hpp"
 #include "vision/membrane/rest_shape.hpp"
 
 namespace punctum::vision {
@@ -21,6 +23,8 @@ struct FollowedMembrane {
   double level = 0;  // usual edge along it, grey levels per px
   Contour nodes;     // of the snake
   RestOutline rest;
+  CarriedOutline carried;
+  EdgeScatter scatter;
   bool held = true;                                 // the needle pushes it, or would where it touched it
   double dimple_px = 0;                             // depth of its dimple
   std::array<double, kDimpleShapes> dimple_odds{};  // log odds of the shape of its dimple

@@ -19,6 +19,7 @@ constexpr double kMotionMax_px = 2.0;    // of the whole membrane, per frame and
 constexpr double kMotionLeast_px = 1.2;  // the nodes are on whole pixels: less is no motion
 constexpr double kOuterModes = 12;       // periods round the cell: finer waves a stiff shell does not have
 constexpr double kInnerModes = 9;        // granules beside the inner membrane look like waves of it
+constexpr double kGranules = 0.75;  // of the variance of its places, at least: they are inside every cell
 constexpr double kWallTolerance = 0.15;  // of the wall's thickness: cells differ from the scene's
 constexpr double kSoftHalf = 1.2;        // rad to either side of the entry: where a dimple bends the membrane
 constexpr double kNeedleHalf = 1.2;      // rad to either side of the entry: what a needle may dent
@@ -88,9 +89,23 @@ double thin_wall_bias(const MembraneSearch& search, const EdgePath& path, double
   return seen < 2.6 * sigma ? std::max(0.0, 0.5 * (seen - thickness)) : 0;
 }
 
+// Of a path whose edges do not look alike all round. Half of what it errs by is what lies beside the edge.
+SeenOutline seen_by_path(const MembraneSearch& search, const EdgePath& path, Contour contour) {
+  constexpr double kShare = 0.3;  // of the variance of a single edge, after the smoothing
+  constexpr double kUnseen = 9;   // times as much where no edge is seen
+  const double least = std::max(path.residual, 0.1);
+  SeenOutline out{std::move(contour), std::vector<double>(path.r.size()), {}};
+  for (int i = 0; i < search.angles; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    out.variance[k] = kShare * least * least * (path.seen[k] != 0 ? 1 : kUnseen);
+    out.lasting.push_back(0.5 * out.variance[k]);
+  }
+  return out;
+}
+
 // The path moved to where the edge looks as it does all round.
-Contour refined(const MembraneSearch& search, const EdgePath& path, const VisionConfig& config,
-                const Surroundings& surroundings) {
+SeenOutline refined(const MembraneSearch& search, const EdgePath& path, const VisionConfig& config,
+                    const Surroundings& surroundings, EdgeScatter& scatter) {
   Contour contour = from_polar(search.band.centre, path.r);
   if (search.m.polarity != Polarity::any) {
     std::vector<double> soft(contour.size(), 0.0);
@@ -99,6 +114,7 @@ Contour refined(const MembraneSearch& search, const EdgePath& path, const Vision
     }
     const double wall = config.px(config.h_m);
     EdgeShape edge;
+    edge.beside = search.band.hidden;
     if (surroundings.outermost) {
       edge.modes = kOuterModes;
       edge.nearby = {-wall, kWallTolerance * wall};
@@ -106,6 +122,7 @@ Contour refined(const MembraneSearch& search, const EdgePath& path, const Vision
       edge.inside = 6;
       edge.outside = 5;
       edge.modes = kInnerModes;
+      edge.lasting = kGranules;
       if (surroundings.around) {
         const double gap = mean_radius(surroundings.around->contour()) - mean_radius(contour) - wall;
         if (gap > 1) {
@@ -113,7 +130,7 @@ Contour refined(const MembraneSearch& search, const EdgePath& path, const Vision
         }
       }
     }
-    if (auto shaped = shaped_edge(search.picture, contour, soft, edge)) {
+    if (auto shaped = shaped_edge(search.picture, contour, soft, edge, scatter)) {
       return *std::move(shaped);
     }
   }
@@ -125,7 +142,21 @@ Contour refined(const MembraneSearch& search, const EdgePath& path, const Vision
     }
     contour = from_polar(search.band.centre, face);
   }
-  return contour;
+  return seen_by_path(search, path, std::move(contour));
+}
+
+// By how much a needle that touches it may change its shape in a frame, px per angle.
+std::vector<double> pushed_per_frame(const MembraneSearch& search) {
+  constexpr double kNearNeedle_px = 2;
+  constexpr double kDentHalf = 0.8, kBlend = 0.4;  // rad to either side of the entry
+  constexpr double kNear_px = 3;                   // of the tip above the outline at rest
+  const bool near = search.needle && (search.rest.empty() || search.depth_of_tip() > -kNear_px);
+  std::vector<double> out(static_cast<std::size_t>(search.angles), 0.0);
+  for (int i = 0; i < search.angles && near; ++i) {
+    out[static_cast<std::size_t>(i)] =
+        kNearNeedle_px * std::clamp((kDentHalf - search.from_needle(i)) / kBlend, 0.0, 1.0);
+  }
+  return out;
 }
 
 // Away from the needle a membrane keeps its outline. An arc that has left the outline follows something else.
@@ -194,7 +225,8 @@ Membrane follow(FollowedMembrane& m, const ClearedPicture& picture, const Vision
     ++m.lost_frames;
     return out;
   }
-  out.contour = refined(search, path, config, surroundings);
+  const SeenOutline seen = refined(search, path, config, surroundings, m.scatter);
+  out.contour = seen.contour;
   out.support = path.support;
   out.visible = path.visible;
   out.residual_px = path.residual;
@@ -204,13 +236,16 @@ Membrane follow(FollowedMembrane& m, const ClearedPicture& picture, const Vision
     return out;
   }
   m.level += 0.1 * (path.level - m.level);
-  const Point centre = centroid(out.contour);
-  const std::vector<double> r = polar_radii(out.contour, centre, search.angles);
+  const Point centre = centroid(seen.contour);
+  const std::vector<double> r = polar_radii(seen.contour, centre, search.angles);
   if (r.empty()) {
     out.reason = "contour crosses itself";
     ++m.lost_frames;
     return out;
   }
+  m.carried.update(seen, pushed_per_frame(search));
+  out.contour = m.carried.contour();
+  out.sd_px = m.carried.sd();
   out.ok = true;
   m.held = found.held;
   m.dimple_px = found.dimple_px;

@@ -185,6 +185,12 @@ TEST(PeriodicSmoothing, equals_the_dense_solution_of_its_normal_equations) {
   for (int i = 0; i < n; ++i) {
     EXPECT_NEAR(y[static_cast<std::size_t>(i)], x.at<double>(i), 1e-5);
   }
+  const cv::Mat inverse = a.inv(cv::DECOMP_SVD);
+  const auto variance = variance_of_smoothing(w, s);
+  ASSERT_EQ(variance.size(), r.size());
+  for (int i = 0; i < n; ++i) {
+    EXPECT_NEAR(variance[static_cast<std::size_t>(i)] / inverse.at<double>(i, i), 1, 1e-5) << i;
+  }
 }
 
 }  // namespace

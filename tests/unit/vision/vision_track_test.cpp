@@ -71,6 +71,7 @@ TEST_F(Track, writes_one_row_per_frame_in_natural_order_and_contours_of_at_least
     frame(k, 150 + 0.3 * k);
   }
   options_.contours = (folder_ / "contours.csv").string();
+  options_.deviations = (folder_ / "deviations.csv").string();
   options_.overlay = (folder_ / "overlay").string();
   options_.fps = 10;
   ASSERT_EQ(track(options_), 0);
@@ -104,6 +105,16 @@ TEST_F(Track, writes_one_row_per_frame_in_natural_order_and_contours_of_at_least
     }
   }
   EXPECT_GE(of_last, 128);
+  const auto deviations = table(options_.deviations);
+  EXPECT_EQ(deviations[0], (std::vector<std::string>{"frame", "membrane", "node", "sd_px"}));
+  ASSERT_EQ(deviations.size(), nodes.size());
+  for (std::size_t i = 1; i < nodes.size(); ++i) {
+    for (const std::size_t column : {0, 1, 2}) {
+      EXPECT_EQ(deviations[i][column], nodes[i][column]);
+    }
+    EXPECT_GT(std::stod(deviations[i][3]), 0);
+    EXPECT_LT(std::stod(deviations[i][3]), 1);
+  }
   EXPECT_EQ(std::distance(fs::directory_iterator(options_.overlay), fs::directory_iterator()), 5);
 }
 

@@ -1,0 +1,177 @@
+// An outline carried over frames, against a curve that is known: drawn here, seen with errors drawn here.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "vision/image/polar_contour.hpp"
+#include "vision/membrane/carried_outline.hpp"
+
+namespace {
+
+using namespace punctum::vision;
+
+constexpr int kRays = 256;
+
+// An oval with a dent at `dent_at`.
+struct Cell {
+  Point centre{120, 118};
+  double turn = 0;  // rad
+  double dent = 0;  // px
+  [[nodiscard]] double r(double t) const {
+    const double u = std::remainder(t - 0.4, 2 * std::numbers::pi) / 0.15;
+    return 74 + 3 * std::cos(2 * (t - turn)) + 1.2 * std::cos(3 * (t - turn) + 1) -
+           dent * std::exp(-u * u / 2);
+  }
+};
+
+// Smooth errors of that sd, as a contour with 12 periods has.
+std::vector<double> errors(double sd, std::mt19937& random) {
+  constexpr int kModes = 12;
+  std::normal_distribution<double> normal(0, sd / std::sqrt(kModes + 0.5));
+  std::vector<double> out(kRays, normal(random));
+  for (int k = 1; k <= kModes; ++k) {
+    const double a = normal(random), b = normal(random);
+    for (int i = 0; i < kRays; ++i) {
+      const double t = polar_angle(i, kRays) * k;
+      out[static_cast<std::size_t>(i)] += a * std::cos(t) + b * std::sin(t);
+    }
+  }
+  return out;
+}
+
+SeenOutline seen(const Cell& cell, const std::vector<double>& off, double variance, double lasting) {
+  SeenOutline out{{}, std::vector<double>(kRays, variance), std::vector<double>(kRays, lasting)};
+  for (int i = 0; i < kRays; ++i) {
+    out.contour.push_back(
+        on_ray(cell.centre, i, kRays, cell.r(polar_angle(i, kRays)) + off[static_cast<std::size_t>(i)]));
+  }
+  return out;
+}
+
+struct Judged {
+  double square = 0;
+  int points = 0, within_one = 0, within_two = 0, wrong = 0;
+  void take(const CarriedOutline& outline, const Cell& cell) {
+    const Contour c = outline.contour();
+    const std::vector<double> sd = outline.sd();
+    ASSERT_EQ(c.size(), sd.size());
+    for (std::size_t i = 0; i < c.size(); ++i) {
+      const Point d = c[i] - cell.centre;
+      const double off = std::abs(cv::norm(d) - cell.r(std::atan2(d.y, d.x)));
+      square += off * off;
+      ++points;
+      within_one += off < sd[i];
+      within_two += off < 1.96 * sd[i];
+      wrong += off > 2;
+    }
+  }
+  [[nodiscard]] double rms() const { return std::sqrt(square / points); }
+  [[nodiscard]] double share(int n) const { return static_cast<double>(n) / points; }
+};
+
+const std::vector<double> kStill(kRays, 0.0);
+
+TEST(CarriedOutline, is_better_than_its_frames_while_the_cell_drifts_and_turns) {
+  for (const double sd : {0.06, 0.1, 0.2, 0.4}) {
+    Judged judged;
+    for (unsigned seed = 1; seed <= 12; ++seed) {
+      std::mt19937 random(seed);
+      CarriedOutline outline;
+      Cell cell;
+      for (int frame = 0; frame < 40; ++frame) {
+        cell.centre += Point(0.2, -0.2);
+        cell.turn += 0.3 / 74;
+        outline.update(seen(cell, errors(sd, random), sd * sd, 0), kStill);
+        if (frame >= 12) {
+          judged.take(outline, cell);
+        }
+      }
+    }
+    EXPECT_LT(judged.rms(), 0.7 * sd) << sd;
+    EXPECT_NEAR(judged.share(judged.within_one), 0.68, 0.12) << sd;
+    EXPECT_GT(judged.share(judged.within_two), 0.88) << sd;
+  }
+}
+
+// Granules beside the membrane move with it, and shift every frame alike: they do not average out.
+TEST(CarriedOutline, does_not_take_what_every_frame_repeats_for_new) {
+  Judged judged;
+  constexpr double kNoise = 0.1, kGrains = 0.2;
+  for (unsigned seed = 1; seed <= 30; ++seed) {
+    std::mt19937 random(seed);
+    CarriedOutline outline;
+    const std::vector<double> grains = errors(kGrains, random);
+    for (int frame = 0; frame < 20; ++frame) {
+      std::vector<double> off = errors(kNoise, random);
+      for (std::size_t i = 0; i < off.size(); ++i) {
+        off[i] += grains[i];
+      }
+      outline.update(seen({}, off, kNoise * kNoise + kGrains * kGrains, kGrains * kGrains), kStill);
+    }
+    judged.take(outline, {});
+  }
+  EXPECT_NEAR(judged.share(judged.within_one), 0.68, 0.1);
+  EXPECT_GT(judged.share(judged.within_two), 0.9);
+}
+
+TEST(CarriedOutline, follows_at_once_what_changes_its_shape) {
+  constexpr double kSd = 0.1;
+  std::mt19937 random(3);
+  for (const bool expected : {true, false}) {
+    std::vector<double> pushed = kStill;
+    for (int i = 0; i < kRays && expected; ++i) {
+      if (angle_between(polar_angle(i, kRays), 0.4) < 0.6) {
+        pushed[static_cast<std::size_t>(i)] = 2;
+      }
+    }
+    CarriedOutline outline;
+    Cell cell;
+    for (int frame = 0; frame < 30; ++frame) {
+      cell.dent = std::max(0, frame - 15);
+      outline.update(seen(cell, errors(kSd, random), kSd * kSd, 0), pushed);
+      Judged judged;
+      judged.take(outline, cell);
+      EXPECT_LT(judged.rms(), expected ? 0.12 : 0.25) << frame;
+      EXPECT_EQ(judged.wrong, 0) << frame;
+    }
+  }
+}
+
+// A cell that was let go of, or a stage that was moved.
+TEST(CarriedOutline, follows_a_jump_of_the_whole_cell) {
+  constexpr double kSd = 0.1;
+  std::mt19937 random(4);
+  CarriedOutline outline;
+  Cell cell;
+  for (int frame = 0; frame < 20; ++frame) {
+    if (frame == 10) {
+      cell.centre += Point(4, 3);
+    }
+    outline.update(seen(cell, errors(kSd, random), kSd * kSd, 0), kStill);
+    Judged judged;
+    judged.take(outline, cell);
+    EXPECT_LT(judged.rms(), 0.3) << frame;
+  }
+}
+
+TEST(CarriedOutline, of_another_number_of_points_begins_anew) {
+  CarriedOutline outline;
+  std::mt19937 random(5);
+  outline.update(seen({}, errors(0.1, random), 0.01, 0), kStill);
+  SeenOutline coarse;
+  for (int i = 0; i < 128; ++i) {
+    coarse.contour.push_back(on_ray({50, 60}, i, 128, 30));
+  }
+  coarse.variance.assign(128, 0.04);
+  coarse.lasting.assign(128, 0.01);
+  outline.update(coarse, std::vector<double>(128, 0.0));
+  ASSERT_EQ(outline.contour().size(), 128U);
+  EXPECT_NEAR(cv::norm(outline.contour().front() - Point(80, 60)), 0, 0.05);
+  EXPECT_NEAR(outline.sd().front(), 0.2, 1e-12);
+}
+
+}  // namespace

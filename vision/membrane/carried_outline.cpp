@@ -1,0 +1,131 @@
+#include "vision/membrane/carried_outline.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <opencv2/core.hpp>
+#include <utility>
+
+#include "vision/image/polar_contour.hpp"
+
+namespace punctum::vision {
+
+namespace {
+
+// Of the whole cell, per frame: sd of the drift in either direction, and of the turn at its circumference.
+constexpr double kDrift_px = 0.15;
+constexpr double kJoined = 10;      // angles that tell the same: the contour of a frame is smooth
+constexpr double kBroken = 3;       // mean squared surprise, over its variance, that is none of noise
+constexpr double kFar = 9;          // a larger surprise is no noise
+constexpr double kPushed_px = 0.1;  // an angle that a needle may change by more tells nothing of the cell
+// By which the shape of a cell changes in a frame, sd: at first, and within which it is learnt, and how fast.
+constexpr double kChange_px = 0.05, kLeastChange_px = 0.01, kMostChange_px = 0.3, kLearnt = 0.1;
+
+}  // namespace
+
+void CarriedOutline::update(const SeenOutline& seen, const std::vector<double>& pushed) {
+  const std::size_t n = seen.contour.size();
+  const std::vector<double> now =
+      r_.size() == n ? polar_radii(seen.contour, centre_, static_cast<int>(n)) : std::vector<double>();
+  lasting_ = seen.lasting;
+  if (now.empty()) {
+    centre_ = centroid(seen.contour);
+    r_ = polar_radii(seen.contour, centre_, static_cast<int>(n));
+    variance_.resize(n);
+    change_ = kChange_px * kChange_px;
+    for (std::size_t i = 0; i < n; ++i) {
+      variance_[i] = seen.variance[i] - seen.lasting[i];
+    }
+    return;
+  }
+  move_with_cell(now, seen, pushed);
+  const std::vector<double> moved = polar_radii(seen.contour, centre_, static_cast<int>(n));
+  if (moved.empty()) {
+    return;
+  }
+  // What differs by more than both may err has changed its shape.
+  std::vector<double> surprise(n), told(n);
+  double more_than_expected = 0, still = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    told[i] = seen.variance[i] - seen.lasting[i];
+    variance_[i] += change_ + pushed[i] * pushed[i];
+    surprise[i] = std::pow(moved[i] - r_[i], 2) / (variance_[i] + told[i]);
+    if (pushed[i] < kPushed_px) {
+      more_than_expected += (std::min(surprise[i], kFar) - 1) * (variance_[i] + told[i]);
+      still += 1;
+    }
+  }
+  change_ = std::clamp(change_ + kLearnt * more_than_expected / std::max(still, 1.0),
+                       kLeastChange_px * kLeastChange_px, kMostChange_px * kMostChange_px);
+  constexpr std::size_t kReach = 7;  // angles
+  double sum = 0;
+  for (std::size_t k = n - kReach; k <= n + kReach; ++k) {
+    sum += surprise[k % n];
+  }
+  std::vector<double> more(n, 0.0);
+  for (std::size_t i = 0; i < n; ++i) {
+    const double mean = sum / (2 * kReach + 1);
+    if (mean > kBroken) {
+      more[i] = (mean - 1) * (variance_[i] + told[i]);
+    }
+    sum += surprise[(i + kReach + 1) % n] - surprise[(i + n - kReach) % n];
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    const double before = variance_[i] + more[i], gain = before / (before + told[i]);
+    r_[i] += gain * (moved[i] - r_[i]);
+    variance_[i] = (1 - gain) * before;
+  }
+}
+
+// Weighted least squares for drift and turn, from what the needle does not change.
+void CarriedOutline::move_with_cell(const std::vector<double>& now, const SeenOutline& seen,
+                                    const std::vector<double>& pushed) {
+  const std::size_t n = now.size();
+  cv::Vec3d motion = cv::Vec3d::all(0);
+  cv::Matx33d a;
+  // Of a px of drift to the right, of drift down, and of turn.
+  const auto effect = [&](std::size_t i) {
+    const Point d = on_ray(Point(0, 0), static_cast<int>(i), static_cast<int>(n), 1);
+    const double slope = (r_[(i + 1) % n] - r_[(i + n - 1) % n]) * static_cast<double>(n) /
+                         (4 * std::numbers::pi * std::max(r_[i], 1.0));
+    return cv::Vec3d(d.x + slope * d.y, d.y - slope * d.x, -slope);
+  };
+  for (int round = 0; round < 3; ++round) {
+    a = cv::Matx33d::eye() * (1 / (kDrift_px * kDrift_px));
+    cv::Vec3d b = cv::Vec3d::all(0);
+    for (std::size_t i = 0; i < n; ++i) {
+      if (pushed[i] > kPushed_px) {
+        continue;
+      }
+      const cv::Vec3d f = effect(i);
+      const double e = now[i] - r_[i], variance = variance_[i] + seen.variance[i] - seen.lasting[i];
+      const double off = std::abs(e - f.dot(motion)) / (2 * std::sqrt(variance));
+      const double w = 1 / (kJoined * variance * std::max(1.0, off));
+      a += w * f * f.t();
+      b += w * e * f;
+    }
+    motion = a.solve(b, cv::DECOMP_CHOLESKY);
+  }
+  const cv::Matx33d covariance = a.inv(cv::DECOMP_CHOLESKY);
+  std::vector<double> turned(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const cv::Vec3d f = effect(i);
+    turned[i] = r_[i] + motion[2] * f[2];
+    variance_[i] += f.dot(covariance * f);
+  }
+  centre_ += Point(motion[0], motion[1]);
+  r_ = std::move(turned);
+}
+
+Contour CarriedOutline::contour() const { return from_polar(centre_, r_); }
+
+std::vector<double> CarriedOutline::sd() const {
+  std::vector<double> out(r_.size());
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    out[i] = std::sqrt(variance_[i] + lasting_[i]);
+  }
+  return out;
+}
+
+}  // namespace punctum::vision

@@ -89,6 +89,25 @@ struct Profiles {
     }
   }
 
+  // Where the nearby edge is nearer or further than elsewhere, it is moved to its usual distance, as it was
+  // learnt. contour: of the profiles.
+  void move_nearby(const Contour& contour, const EdgeShape& edge, const EdgeLearnt& learnt) {
+    constexpr double kMoved_px = 0.7;  // what the two contours err by
+    std::vector<double> at(points);
+    for (std::size_t i = 0; i < points; ++i) {
+      at[i] = (edge.nearby_face[i] - contour[i]).dot(normal[i]);
+    }
+    const double usual = median_of(at), spread = learnt.blur_px * std::numbers::sqrt2;
+    for (std::size_t i = 0; i < points; ++i) {
+      const double off = at[i] - usual, by = off * off * off / (kMoved_px * kMoved_px + off * off);
+      for (std::size_t j = 0; j < samples; ++j) {
+        const double s = static_cast<double>(j) * kSample_px - edge.inside - at[i];
+        grey[i * samples + j] +=
+            learnt.nearby_height * (blurred_step((s + by) / spread) - blurred_step(s / spread));
+      }
+    }
+  }
+
  private:
   static double sample(const cv::Mat& m, const Point& p) {
     const int x = static_cast<int>(p.x), y = static_cast<int>(p.y);
@@ -144,7 +163,7 @@ class CommonShape {
   struct Variance {
     std::vector<double> all, lasting;
   };
-  [[nodiscard]] Variance variance(double noise, EdgeScatter& mean) const;
+  [[nodiscard]] Variance variance(double noise, EdgeLearnt& mean) const;
 
  private:
   void average();
@@ -379,7 +398,7 @@ void CommonShape::smooth_places() {
 
 // The raw places scatter by the picture's noise, which differs from point to point and from frame to frame,
 // and by what is beside the edge, of which neighbours see the same and the next frames, too.
-CommonShape::Variance CommonShape::variance(double noise, EdgeScatter& mean) const {
+CommonShape::Variance CommonShape::variance(double noise, EdgeLearnt& mean) const {
   const std::size_t n = profiles_.points;
   double points = 0, weight = 0, square = 0, weights = 0, difference = 0, by_noise = 0;
   for (std::size_t i = 0; i < n; ++i) {
@@ -426,8 +445,12 @@ class BlurredSteps {
  public:
   BlurredSteps(const std::vector<double>& shape, const EdgeShape& edge) : shape_(shape), edge_(edge) {}
 
-  // Where the own step lies, px from the contour; empty when no such step explains the shape.
-  [[nodiscard]] std::optional<double> own_place() {
+  struct Fit {
+    double own = 0;  // where the own step lies, px from the contour
+    double blur_px = 0, nearby_height = 0;
+  };
+  // Empty when no such steps explain the shape.
+  [[nodiscard]] std::optional<Fit> fit() {
     cv::Vec3d x(0, kBlurFirst_px, edge_.nearby ? edge_.nearby->at : 0);
     double cost = residuals(x, now_), damping = 1e-3;
     for (int round = 0; round < 25 && damping < 1e4; ++round) {
@@ -447,13 +470,17 @@ class BlurredSteps {
       }
     }
     const bool plausible = std::abs(x[0]) < kMost_px && x[1] > kBlurLeast_px && x[1] < kBlurMost_px;
-    return plausible ? std::optional(x[0]) : std::nullopt;
+    if (!plausible) {
+      return std::nullopt;
+    }
+    (void)residuals(x, now_);
+    return Fit{x[0], x[1], heights_[2]};
   }
 
  private:
   [[nodiscard]] bool free(int k) const { return k < 2 || (edge_.nearby && edge_.nearby->tolerance_px > 0); }
   // Returns the sum of their squares.
-  double residuals(const cv::Vec3d& x, std::vector<double>& out) const {
+  double residuals(const cv::Vec3d& x, std::vector<double>& out) {
     const double blur = std::clamp(x[1], 0.3, 8.0) * std::numbers::sqrt2;
     std::vector<cv::Vec3d> column(shape_.size());
     cv::Matx33d a = cv::Matx33d::zeros();
@@ -467,7 +494,7 @@ class BlurredSteps {
     for (int p = 0; p < 3; ++p) {
       a(p, p) += 1e-9 * static_cast<double>(shape_.size());
     }
-    const cv::Vec3d h = a.solve(b, cv::DECOMP_CHOLESKY);
+    const cv::Vec3d h = heights_ = a.solve(b, cv::DECOMP_CHOLESKY);
     out.clear();
     double cost = 0;
     for (std::size_t j = 0; j < shape_.size(); ++j) {
@@ -517,30 +544,41 @@ class BlurredSteps {
   const std::vector<double>& shape_;
   const EdgeShape& edge_;
   std::vector<double> now_, ahead_;
+  cv::Vec3d heights_;  // of the last residuals: level, own step, nearby step
 };
 
 }  // namespace
 
 std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Contour& contour,
                                        const std::vector<double>& soft, const EdgeShape& edge,
-                                       EdgeScatter& scatter) {
+                                       EdgeLearnt& learnt) {
   if (contour.size() < 64 || soft.size() != contour.size()) {
     return std::nullopt;
   }
   const Contour base = smoothed(contour, soft, edge.modes);
-  const Profiles profiles(picture, base, edge);
+  Profiles profiles(picture, base, edge);
+  const bool apart = edge.nearby && edge.nearby_face.size() == base.size();
+  if (apart && learnt.nearby_height != 0) {
+    profiles.move_nearby(base, edge, learnt);
+  }
   CommonShape common(profiles, soft, edge);
   if (!common.find()) {
     return std::nullopt;
   }
-  const auto own = BlurredSteps(common.shape(), edge).own_place();
-  if (!own) {
+  const auto steps = BlurredSteps(common.shape(), edge).fit();
+  if (!steps) {
     return std::nullopt;
   }
-  CommonShape::Variance variance = common.variance(picture.noise, scatter);
+  if (apart) {
+    constexpr double kPart = 0.3;
+    const double part = learnt.nearby_height == 0 ? 1 : kPart;
+    learnt.nearby_height += part * (steps->nearby_height - learnt.nearby_height);
+    learnt.blur_px += part * (steps->blur_px - learnt.blur_px);
+  }
+  CommonShape::Variance variance = common.variance(picture.noise, learnt);
   SeenOutline out{Contour(base.size()), std::move(variance.all), std::move(variance.lasting)};
   for (std::size_t i = 0; i < base.size(); ++i) {
-    out.contour[i] = base[i] + (common.places()[i] + *own) * profiles.normal[i];
+    out.contour[i] = base[i] + (common.places()[i] + steps->own) * profiles.normal[i];
   }
   return out;
 }

@@ -23,14 +23,17 @@ struct EdgeShape {
   double modes = 12;               // finer waves round the contour are noise
   double lasting = 0;  // of the places' scatter at least this share is the same in the next frames
   std::optional<NearbyEdge> nearby;
+  Contour nearby_face;  // where it lies, per point, if it is not equally far everywhere; or empty
   std::vector<std::uint8_t> beside;  // per point, 1: beside a line that is not its own; or empty
 };
 
-// By how much the places of single points scatter about the contour, over the last frames: the mean square of
-// what they are off, and of half of what neighbours differ by, px^2.
-struct EdgeScatter {
+// What is learnt of an edge over the frames.
+struct EdgeLearnt {
+  // By how much the places of single points scatter about the contour: mean square of what they are off, and
+  // of half of what neighbours differ by, px^2.
   double square = 0, difference = 0;
-  int frames = 0;
+  int frames = 0;                         // of these two
+  double nearby_height = 0, blur_px = 0;  // of the nearby edge: half of its change of grey, outwards
 };
 
 // soft: per point of the contour, 1 where the membrane may have any shape (beside the needle), 0 elsewhere.
@@ -38,6 +41,6 @@ struct EdgeScatter {
 // in.
 [[nodiscard]] std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Contour& contour,
                                                      const std::vector<double>& soft, const EdgeShape& edge,
-                                                     EdgeScatter& scatter);
+                                                     EdgeLearnt& learnt);
 
 }  // namespace punctum::vision

@@ -24,7 +24,7 @@ struct FollowedMembrane {
   Contour nodes;     // of the snake
   RestOutline rest;
   CarriedOutline carried;
-  EdgeScatter scatter;
+  EdgeLearnt edge;
   bool held = true;                                 // the needle pushes it, or would where it touched it
   double dimple_px = 0;                             // depth of its dimple
   std::array<double, kDimpleShapes> dimple_odds{};  // log odds of the shape of its dimple

@@ -103,9 +103,18 @@ SeenOutline seen_by_path(const MembraneSearch& search, const EdgePath& path, Con
   return out;
 }
 
+// Of the wall of the membrane around, seen from the centre of the band; empty where that is not known.
+Contour inner_face(const MembraneSearch& search, const FollowedMembrane& around, double wall) {
+  std::vector<double> r = polar_radii(around.carried.contour(), search.band.centre, search.angles);
+  for (double& x : r) {
+    x -= wall;
+  }
+  return from_polar(search.band.centre, r);
+}
+
 // The path moved to where the edge looks as it does all round.
 SeenOutline refined(const MembraneSearch& search, const EdgePath& path, const VisionConfig& config,
-                    const Surroundings& surroundings, EdgeScatter& scatter) {
+                    const Surroundings& surroundings, EdgeLearnt& learnt) {
   Contour contour = from_polar(search.band.centre, path.r);
   if (search.m.polarity != Polarity::any) {
     std::vector<double> soft(contour.size(), 0.0);
@@ -127,10 +136,11 @@ SeenOutline refined(const MembraneSearch& search, const EdgePath& path, const Vi
         const double gap = mean_radius(surroundings.around->contour()) - mean_radius(contour) - wall;
         if (gap > 1) {
           edge.nearby = {gap, 0};
+          edge.nearby_face = inner_face(search, *surroundings.around, wall);
         }
       }
     }
-    if (auto shaped = shaped_edge(search.picture, contour, soft, edge, scatter)) {
+    if (auto shaped = shaped_edge(search.picture, contour, soft, edge, learnt)) {
       return *std::move(shaped);
     }
   }
@@ -225,7 +235,7 @@ Membrane follow(FollowedMembrane& m, const ClearedPicture& picture, const Vision
     ++m.lost_frames;
     return out;
   }
-  const SeenOutline seen = refined(search, path, config, surroundings, m.scatter);
+  const SeenOutline seen = refined(search, path, config, surroundings, m.edge);
   out.contour = seen.contour;
   out.support = path.support;
   out.visible = path.visible;

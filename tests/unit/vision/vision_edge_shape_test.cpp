@@ -20,6 +20,7 @@ const Point kMiddle{118.3, 121.6};
 struct Ring {
   double R = 75, wall = 5.6;  // px, of the outer face; 30 grey levels darker than the ground
   double gap = 0;             // px between the wall's inner face and a dark body; 0: no body
+  double nearer = 0;          // px by which the gap is narrower at angle 0
   double blur = 1.2, noise = 0;
   double ripple = 0;  // px, of the outline, three times round
   double fade = 0;    // the contrast varies by this share round the cell
@@ -32,6 +33,11 @@ double outline(const Ring& ring, double t) {
   return ring.R + ring.ripple * std::cos(3 * t) - ring.dimple * std::exp(-u * u / 2);
 }
 
+double gap_at(const Ring& ring, double t) {
+  const double u = std::atan2(std::sin(t), std::cos(t)) / 0.25;
+  return ring.gap - ring.nearer * std::exp(-u * u / 2);
+}
+
 cv::Mat drawn(const Ring& ring) {
   cv::Mat m(kSide, kSide, CV_32F);
   for (int y = 0; y < kSide; ++y) {
@@ -41,7 +47,7 @@ cv::Mat drawn(const Ring& ring) {
         const Point d = Point(x + (k % 8 + 0.5) / 8 - 0.5, y + (k / 8 + 0.5) / 8 - 0.5) - kMiddle;
         const double t = std::atan2(d.y, d.x), r = cv::norm(d) - outline(ring, t);
         const double contrast = 1 + ring.fade * std::cos(t);
-        const bool body = ring.gap > 0 && r < -ring.wall - ring.gap;
+        const bool body = ring.gap > 0 && r < -ring.wall - gap_at(ring, t);
         sum += (body ? -25 : r < 0 && r > -ring.wall ? -30 : r < 0 ? -8 : 0) * contrast / 64;
       }
       m.at<float>(y, x) = static_cast<float>(150 + ring.slope * (x - kMiddle.x) + sum);
@@ -81,8 +87,8 @@ Contour rough(const Ring& ring, double offset, double waves) {
 
 std::optional<SeenOutline> place_edge(const ClearedPicture& picture, const Contour& contour,
                                       const std::vector<double>& soft, const EdgeShape& edge) {
-  EdgeScatter scatter;
-  return shaped_edge(picture, contour, soft, edge, scatter);
+  EdgeLearnt learnt;
+  return shaped_edge(picture, contour, soft, edge, learnt);
 }
 
 struct Error {
@@ -162,11 +168,11 @@ TEST(EdgeShape, says_by_how_much_each_point_may_be_off) {
   for (const double grains : {0.0, 6.0}) {
     for (const double noise : {2.0, 5.0, 10.0, 20.0}) {
       double points = 0, within_one = 0, within_two = 0, square = 0, said = 0;
-      EdgeScatter scatter;
+      EdgeLearnt learnt;
       for (unsigned seed = 1; seed <= 8; ++seed) {
         const cv::Mat clean = granular(smooth, grains, 100 + seed);
         const auto found = shaped_edge(noisy(clean, noise, seed), rough(ring, -0.5, 0.5), kNowhereSoft,
-                                       wall_of(5.6), scatter);
+                                       wall_of(5.6), learnt);
         ASSERT_TRUE(found) << noise;
         for (std::size_t i = 0; i < found->contour.size(); ++i) {
           const Point d = found->contour[i] - kMiddle;
@@ -262,6 +268,38 @@ TEST(EdgeShape, of_a_body_is_not_shifted_by_the_wall_around_it) {
   const auto found = place_edge(picture_with(ring), rough(body, -0.5, 0.2), kNowhereSoft, edge);
   ASSERT_TRUE(found);
   EXPECT_NEAR(error_against(found->contour, body).mean, 0, 0.08);
+}
+
+// As in a dimple, where the wall comes nearer to the body that it dents.
+TEST(EdgeShape, of_a_body_is_not_shifted_where_the_wall_is_nearer_than_elsewhere) {
+  const Ring ring{.gap = 5, .nearer = 2.5, .blur = 1.5, .noise = 0.5};
+  const ClearedPicture picture = picture_with(ring);
+  std::vector<double> soft(kAngles);
+  Contour face, begun, body;
+  for (int i = 0; i < kAngles; ++i) {
+    const double t = polar_angle(i, kAngles), in = ring.R - ring.wall;
+    soft[static_cast<std::size_t>(i)] = angle_between(t, 0) < 0.9 ? 1 : 0;
+    face.push_back(on_ray(kMiddle, i, kAngles, in));
+    body.push_back(on_ray(kMiddle, i, kAngles, in - gap_at(ring, t)));
+    begun.push_back(on_ray(kMiddle, i, kAngles, in - gap_at(ring, t) - 0.3));
+  }
+  EdgeShape edge;
+  edge.inside = 6;
+  edge.outside = 5;
+  edge.modes = 9;
+  edge.nearby = {5, 0};
+  const auto error_at_0 = [&](const EdgeShape& how) {
+    EdgeLearnt learnt;
+    std::optional<SeenOutline> found;
+    for (int frame = 0; frame < 5; ++frame) {
+      found = shaped_edge(picture, begun, soft, how, learnt);
+    }
+    return found ? cv::norm(found->contour[0] - body[0]) : 99;
+  };
+  const double plain = error_at_0(edge);
+  edge.nearby_face = face;
+  EXPECT_LT(error_at_0(edge), 0.3);
+  EXPECT_LT(error_at_0(edge), 0.6 * plain) << plain;
 }
 
 TEST(EdgeShape, is_none_where_there_is_no_edge_or_too_little_of_it) {

@@ -7,9 +7,9 @@
 #include <numbers>
 #include <opencv2/core.hpp>
 
-#include "hal/math/elementary.hpp"
 #include "vision/image/median.hpp"
 #include "vision/image/periodic_smoothing.hpp"
+#include "vision/image/polar_contour.hpp"
 
 namespace punctum::vision {
 
@@ -92,7 +92,7 @@ void BandSearch::set_rays() {
   normal_.resize(band_.middle.size());
   double r_mean = 0;
   for (int i = 0; i < n_; ++i) {
-    ray_[angle(i)] = Point(math::cos(i * turn), math::sin(i * turn));
+    ray_[angle(i)] = on_ray(Point(0, 0), i, n_, 1);
     r_mean += band_.middle[angle(i)] / n_;
   }
   arc_ = std::max(0.5, r_mean * turn);

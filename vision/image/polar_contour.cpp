@@ -8,24 +8,41 @@
 
 namespace punctum::vision {
 
+namespace {
+
+// Unit vectors along the rays. Almost every contour has the same number of them.
+const std::vector<Point>& rays(int angles) {
+  thread_local std::vector<Point> of_last;
+  if (of_last.size() != static_cast<std::size_t>(angles)) {
+    of_last.clear();
+    for (int i = 0; i < angles; ++i) {
+      const double t = polar_angle(i, angles);
+      of_last.emplace_back(math::cos(t), math::sin(t));
+    }
+  }
+  return of_last;
+}
+
+}  // namespace
+
 std::vector<double> polar_radii(std::span<const Point> contour, const Point& centre, int angles) {
   const std::size_t n = static_cast<std::size_t>(angles);
   std::vector<double> out(n, -1.0);
   const double step = 2 * std::numbers::pi / angles;
+  const std::vector<Point>& ray = rays(angles);
   for (std::size_t i = 0; i < contour.size(); ++i) {
     const Point p = contour[i] - centre, q = contour[(i + 1) % contour.size()] - centre;
     const double t0 = math::atan2(p.y, p.x);
     double dt = math::atan2(p.cross(q), p.dot(q));
     const double lo = std::min(t0, t0 + dt), hi = std::max(t0, t0 + dt);
     for (int k = static_cast<int>(std::ceil(lo / step - 1e-9)); k * step <= hi + 1e-9; ++k) {
-      const Point d(math::cos(k * step), math::sin(k * step));
-      const Point e = q - p;
+      const std::size_t at = static_cast<std::size_t>(((k % angles) + angles) % angles);
+      const Point d = ray[at], e = q - p;
       const double den = d.cross(e);
       if (std::abs(den) < 1e-12) {
         continue;
       }
       const double r = p.cross(e) / den;
-      std::size_t at = static_cast<std::size_t>(((k % angles) + angles) % angles);
       if (r > out[at]) {
         out[at] = r;  // where a wall overhangs, the outermost crossing
       }
@@ -57,9 +74,9 @@ std::vector<double> polar_radii(std::span<const Point> contour, const Point& cen
 Contour from_polar(const Point& centre, std::span<const double> radii) {
   Contour out;
   out.reserve(radii.size());
+  const std::vector<Point>& ray = rays(static_cast<int>(radii.size()));
   for (std::size_t i = 0; i < radii.size(); ++i) {
-    const double t = 2 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(radii.size());
-    out.push_back(centre + radii[i] * Point(math::cos(t), math::sin(t)));
+    out.push_back(centre + radii[i] * ray[i]);
   }
   return out;
 }
@@ -72,8 +89,7 @@ int polar_index(const Point& direction, int angles) {
 }
 
 Point on_ray(const Point& centre, int i, int angles, double r) {
-  const double t = polar_angle(i, angles);
-  return centre + r * Point(math::cos(t), math::sin(t));
+  return centre + r * rays(angles)[static_cast<std::size_t>(i)];
 }
 
 double angle_between(double a, double b) { return std::abs(std::remainder(a - b, 2 * std::numbers::pi)); }

@@ -19,6 +19,7 @@ namespace {
 
 constexpr double kSample_px = 0.5;      // between two samples across the contour
 constexpr int kRounds = 3;              // shape and places in turn; a fourth changes less than 0.01 px
+constexpr int kRoundsOn = 2;            // once the shape is known
 constexpr double kMost_px = 2.5;        // a place further from the contour is another edge's
 constexpr int kLeastSamples = 12;       // of a profile
 constexpr double kLeastShare = 0.35;    // of the points must be seen
@@ -92,7 +93,8 @@ struct Profiles {
   // Where the nearby edge is nearer or further than elsewhere, it is moved to its usual distance, as it was
   // learnt. contour: of the profiles.
   void move_nearby(const Contour& contour, const EdgeShape& edge, const EdgeLearnt& learnt) {
-    constexpr double kMoved_px = 0.7;  // what the two contours err by
+    constexpr double kMoved_px = 0.7;      // what the two contours err by
+    constexpr double kNotMoved_px = 0.05;  // less changes nothing
     std::vector<double> at(points);
     for (std::size_t i = 0; i < points; ++i) {
       at[i] = (edge.nearby_face[i] - contour[i]).dot(normal[i]);
@@ -100,7 +102,7 @@ struct Profiles {
     const double usual = median_of(at), spread = learnt.blur_px * std::numbers::sqrt2;
     for (std::size_t i = 0; i < points; ++i) {
       const double off = at[i] - usual, by = off * off * off / (kMoved_px * kMoved_px + off * off);
-      for (std::size_t j = 0; j < samples; ++j) {
+      for (std::size_t j = 0; j < samples && std::abs(by) > kNotMoved_px; ++j) {
         const double s = static_cast<double>(j) * kSample_px - edge.inside - at[i];
         grey[i * samples + j] +=
             learnt.nearby_height * (blurred_step((s + by) / spread) - blurred_step(s / spread));
@@ -139,9 +141,15 @@ class CommonShape {
         moved_shape_(profiles.samples),
         moved_slope_(profiles.samples) {}
 
-  [[nodiscard]] bool find() {
-    average();
-    for (int round = 0; round < kRounds; ++round) {
+  // known: how the shape was one frame ago; or empty.
+  [[nodiscard]] bool find(const std::vector<double>& known) {
+    const bool begun = known.size() == shape_.size();
+    if (begun) {
+      shape_ = known;
+    } else {
+      average();
+    }
+    for (int round = 0; round < (begun ? kRoundsOn : kRounds); ++round) {
       if (!place_all()) {
         return false;
       }
@@ -232,15 +240,19 @@ void CommonShape::average() {
 void CommonShape::move_shape(double place_px) {
   const auto m = static_cast<std::ptrdiff_t>(shape_.size());
   const double shift = place_px / kSample_px, whole = std::ceil(shift), u = whole - shift;
+  const auto moved = static_cast<std::ptrdiff_t>(whole);
   const auto at = [&](std::ptrdiff_t j) {
     return shape_[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(j, 0, m - 1))];
   };
+  double before = at(-moved - 1), here = at(-moved), after = at(1 - moved);
   for (std::ptrdiff_t j = 0; j < m; ++j) {
-    const std::ptrdiff_t k = j - static_cast<std::ptrdiff_t>(whole);
-    const double before = at(k - 1), here = at(k), after = at(k + 1), next = at(k + 2);
+    const double next = at(j - moved + 2);
     moved_shape_[static_cast<std::size_t>(j)] = (1 - u) * here + u * after;
     moved_slope_[static_cast<std::size_t>(j)] =
         ((1 - u) * (after - before) + u * (next - here)) / (2 * kSample_px);
+    before = here;
+    here = after;
+    after = next;
   }
 }
 
@@ -276,62 +288,66 @@ bool CommonShape::place_all() {
 bool CommonShape::place(std::size_t i, double shape_energy, std::vector<double>& square,
                         std::vector<int>& count) {
   move_shape(place_[i]);
-  // Weighted normal equations for level, gain and step; the derivative by the place is -gain slope.
-  cv::Matx33d a = cv::Matx33d::zeros();
-  cv::Vec3d b = cv::Vec3d::all(0);
+  // Weighted normal equations for level, gain and step; the derivative by the place is -gain slope. In
+  // variables of their own: this is where a frame's time goes.
+  double a00 = 0, a01 = 0, a02 = 0, a11 = 0, a12 = 0, a22 = 0, b_level = 0, b_gain = 0, b_step = 0;
   double energy = 0, slopes = 0;
   int n = 0;
-  const double* grey = &profiles_.grey[i * profiles_.samples];
-  const std::uint8_t* seen = &profiles_.seen[i * profiles_.samples];
-  for (std::size_t j = 0; j < profiles_.samples; ++j) {
+  const std::size_t samples = profiles_.samples;
+  const double g = gain_[i];
+  const double *grey = &profiles_.grey[i * samples], *trust = trust_.data();
+  const double *shape = moved_shape_.data(), *steep = moved_slope_.data();
+  const std::uint8_t* seen = &profiles_.seen[i * samples];
+  for (std::size_t j = 0; j < samples; ++j) {
     if (seen[j] == 0) {
       continue;
     }
-    const double w = trust_[j], t = moved_shape_[j], d = -gain_[i] * moved_slope_[j];
-    a(0, 0) += w;
-    a(0, 1) += w * t;
-    a(0, 2) += w * d;
-    a(1, 1) += w * t * t;
-    a(1, 2) += w * t * d;
-    a(2, 2) += w * d * d;
-    b += w * grey[j] * cv::Vec3d(1, t, d);
-    energy += w * grey[j] * grey[j];
-    slopes += moved_slope_[j] * moved_slope_[j];
+    const double w = trust[j], t = shape[j], d = -g * steep[j], wt = w * t, wg = w * grey[j];
+    a00 += w;
+    a01 += wt;
+    a02 += w * d;
+    a11 += wt * t;
+    a12 += wt * d;
+    a22 += w * d * d;
+    b_level += wg;
+    b_gain += wg * t;
+    b_step += wg * d;
+    energy += wg * grey[j];
+    slopes += steep[j] * steep[j];
     ++n;
   }
   if (n < kLeastSamples || slopes < 0.5 * shape_energy) {
     return false;
   }
-  a(1, 0) = a(0, 1);
-  a(2, 0) = a(0, 2);
-  a(2, 1) = a(1, 2);
+  const cv::Matx33d a(a00, a01, a02, a01, a11, a12, a02, a12, a22);
+  const cv::Vec3d b(b_level, b_gain, b_step);
   const cv::Vec3d x = a.solve(b, cv::DECOMP_CHOLESKY);
   if (!(x[1] > 0)) {
     return false;
   }
   gain_raw_[i] = std::clamp(x[1], 0.2, 5.0);
-  const double spread = energy - b[0] * b[0] / a(0, 0), left = std::max(0.0, energy - x.dot(b));
+  const double spread = energy - b[0] * b[0] / a00, left = std::max(0.0, energy - x.dot(b));
   likeness_[i] = spread > 0 ? std::max(0.0, 1 - left / spread) : 0;
-  misfit_[i] = std::sqrt(left / a(0, 0));
+  misfit_[i] = std::sqrt(left / a00);
   // The place with the neighbourhood's contrast: of one profile alone contrast and place are hard to tell
   // apart.
-  const double g = gain_[i], b0 = b[0] - g * a(0, 1), b2 = b[2] - g * a(2, 1);
-  const double det = a(0, 0) * a(2, 2) - a(0, 2) * a(0, 2);
+  const double b0 = b[0] - g * a01, b2 = b[2] - g * a12;
+  const double det = a00 * a22 - a02 * a02;
   if (!(det > 0)) {
     return false;
   }
-  const double level = (b0 * a(2, 2) - b2 * a(0, 2)) / det, step = (a(0, 0) * b2 - a(0, 2) * b0) / det;
+  const double level = (b0 * a22 - b2 * a02) / det, step = (a00 * b2 - a02 * b0) / det;
   raw_[i] = std::clamp(place_[i] + step, -kMost_px, kMost_px);
   weight_[i] = 1;
-  const double mean_slope = a(0, 2) / a(0, 0), told = det / a(0, 0);
+  const double mean_slope = a02 / a00, told = det / a00;
   double doubted = 0;
-  for (std::size_t j = 0; j < profiles_.samples; ++j) {
+  for (std::size_t j = 0; j < samples; ++j) {
     if (seen[j] != 0) {
-      const double slope = g * moved_slope_[j] + mean_slope, pull = trust_[j] * slope * slope / told;
-      doubted += std::pow(trust_[j] * slope, 2);
+      const double slope = g * steep[j] + mean_slope, pulled = trust[j] * slope;
+      const double rest = grey[j] - level - g * (shape[j] - step * steep[j]);
+      doubted += pulled * pulled;
       // The place follows the samples that tell it, so that little is left of what they err by.
-      square[j] += std::pow(grey[j] - level - g * (moved_shape_[j] - step * moved_slope_[j]), 2) /
-                   std::max(1 - pull, kLeastLeft);
+      square[j] += rest * rest / std::max(1 - pulled * slope / told, kLeastLeft);
       ++count[j];
     }
   }
@@ -562,9 +578,12 @@ std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Cont
     profiles.move_nearby(base, edge, learnt);
   }
   CommonShape common(profiles, soft, edge);
-  if (!common.find()) {
+  // Beside another edge that comes and goes the shape is not the same from frame to frame.
+  if (!common.find(apart ? std::vector<double>() : learnt.shape)) {
+    learnt.shape.clear();
     return std::nullopt;
   }
+  learnt.shape = common.shape();
   const auto steps = BlurredSteps(common.shape(), edge).fit();
   if (!steps) {
     return std::nullopt;

@@ -33,6 +33,7 @@ struct EdgeLearnt {
   // of half of what neighbours differ by, px^2.
   double square = 0, difference = 0;
   int frames = 0;                         // of these two
+  std::vector<double> shape;              // the mean profile across the contour
   double nearby_height = 0, blur_px = 0;  // of the nearby edge: half of its change of grey, outwards
 };
 

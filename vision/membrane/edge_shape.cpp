@@ -32,6 +32,7 @@ constexpr double kLeastLeft = 0.2, kMostTrust = 3;
 constexpr double kGrain = 0.6;  // per point, for granules of about 2 px
 constexpr double kSampledNoise =
     0.5;                         // of its variance, once samples between pixels and weights have taken theirs
+constexpr double kClip = 1.3;    // times the spread: Huber's limit
 constexpr double kBeside = 0.1;  // weight of a place beside a line that is not its own
 constexpr double kCommon_px = 0.03;  // sd of what is wrong alike all round: the steps are no perfect model
 constexpr double kShapeNoise = 0.5;  // grey levels: what the common shape itself is worth
@@ -188,6 +189,8 @@ class CommonShape {
   double modes_, least_lasting_;
   std::vector<double> shape_;
   std::vector<double> trust_;  // per sample: the less other things differ there, the more
+  std::vector<double>
+      spread_;  // per sample: what single profiles differ from it by, grey levels; empty: not known
   std::vector<double> place_, raw_, weight_, gain_, gain_raw_;
   std::vector<double> robust_, stiffness_;  // of the smoothing that gave the places
   std::vector<double> noise_;               // variance of a raw place for noise of one grey level, px^2
@@ -211,6 +214,15 @@ double middle_mean(std::vector<double>& v) {
   return sum / static_cast<double>(v.end() - v.begin() - 2 * quarter);
 }
 
+// Of what is within `most` of the middle, what lies further out counts as if it lay there.
+double clipped_mean(const std::vector<double>& v, double middle, double most) {
+  double sum = 0;
+  for (const double x : v) {
+    sum += std::clamp(x, middle - most, middle + most);
+  }
+  return v.empty() ? 0 : sum / static_cast<double>(v.size());
+}
+
 void CommonShape::average() {
   const std::size_t m = profiles_.samples;
   std::vector<double> level(profiles_.points);
@@ -232,7 +244,7 @@ void CommonShape::average() {
         values_.push_back(((1 - u) * row[low] + u * row[low + 1] - level[i]) / gain_[i]);
       }
     }
-    shape_[j] = middle_mean(values_);
+    shape_[j] = spread_.empty() ? middle_mean(values_) : clipped_mean(values_, shape_[j], kClip * spread_[j]);
   }
 }
 
@@ -278,7 +290,9 @@ bool CommonShape::place_all() {
     square[j] = count[j] > 0 ? square[j] / count[j] : 0;
     usual += square[j] / static_cast<double>(square.size());
   }
+  spread_.resize(square.size());
   for (std::size_t j = 0; j < square.size(); ++j) {
+    spread_[j] = std::sqrt(square[j]);
     trust_[j] = usual / std::max(square[j], usual / kMostTrust + 1e-9);
   }
   return static_cast<double>(used) >= kLeastShare * static_cast<double>(profiles_.points);

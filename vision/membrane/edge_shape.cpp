@@ -91,18 +91,23 @@ struct Profiles {
     }
   }
 
-  // Where the nearby edge is nearer or further than elsewhere, it is moved to its usual distance, as it was
-  // learnt. contour: of the profiles.
-  void move_nearby(const Contour& contour, const EdgeShape& edge, const EdgeLearnt& learnt) {
+  // Where the membrane is soft and the nearby edge nearer or further than elsewhere, that is moved to its
+  // usual distance, as it was learnt. contour: of the profiles.
+  void move_nearby(const Contour& contour, const std::vector<double>& soft, const EdgeShape& edge,
+                   const EdgeLearnt& learnt) {
     constexpr double kMoved_px = 0.7;      // what the two contours err by
     constexpr double kNotMoved_px = 0.05;  // less changes nothing
+    constexpr double kApart = 2.5;
     std::vector<double> at(points);
     for (std::size_t i = 0; i < points; ++i) {
       at[i] = (edge.nearby_face[i] - contour[i]).dot(normal[i]);
     }
     const double usual = median_of(at), spread = learnt.blur_px * std::numbers::sqrt2;
+    if (usual < kApart * learnt.blur_px) {  // the picture does not tell the two apart
+      return;
+    }
     for (std::size_t i = 0; i < points; ++i) {
-      const double off = at[i] - usual, by = off * off * off / (kMoved_px * kMoved_px + off * off);
+      const double off = at[i] - usual, by = soft[i] * off * off * off / (kMoved_px * kMoved_px + off * off);
       for (std::size_t j = 0; j < samples && std::abs(by) > kNotMoved_px; ++j) {
         const double s = static_cast<double>(j) * kSample_px - edge.inside - at[i];
         grey[i * samples + j] +=
@@ -589,11 +594,10 @@ std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Cont
   Profiles profiles(picture, base, edge);
   const bool apart = edge.nearby && edge.nearby_face.size() == base.size();
   if (apart && learnt.nearby_height != 0) {
-    profiles.move_nearby(base, edge, learnt);
+    profiles.move_nearby(base, soft, edge, learnt);
   }
   CommonShape common(profiles, soft, edge);
-  // Beside another edge that comes and goes the shape is not the same from frame to frame.
-  if (!common.find(apart ? std::vector<double>() : learnt.shape)) {
+  if (!common.find(edge.steady ? learnt.shape : std::vector<double>())) {
     learnt.shape.clear();
     return std::nullopt;
   }

@@ -21,6 +21,7 @@ struct NearbyEdge {
 struct EdgeShape {
   double inside = 8, outside = 6;  // px of the picture that are looked at on either side of the contour
   double modes = 12;               // finer waves round the contour are noise
+  bool steady = false;             // no other membrane comes and goes beside it: it looks as one frame ago
   double lasting = 0;  // of the places' scatter at least this share is the same in the next frames
   std::optional<NearbyEdge> nearby;
   Contour nearby_face;  // where it lies, per point, if it is not equally far everywhere; or empty

@@ -126,6 +126,7 @@ SeenOutline refined(const MembraneSearch& search, const EdgePath& path, const Vi
     edge.beside = search.band.hidden;
     if (surroundings.outermost) {
       edge.modes = kOuterModes;
+      edge.steady = true;
       edge.nearby = {-wall, kWallTolerance * wall};
     } else {
       edge.inside = 6;
@@ -136,7 +137,10 @@ SeenOutline refined(const MembraneSearch& search, const EdgePath& path, const Vi
         const double gap = mean_radius(surroundings.around->contour()) - mean_radius(contour) - wall;
         if (gap > 1) {
           edge.nearby = {gap, 0};
-          edge.nearby_face = inner_face(search, *surroundings.around, wall);
+          if (search.needle && !surroundings.punctured && !search.rest.empty() &&
+              search.depth_of_tip() > -gap - wall) {  // the needle may dent it
+            edge.nearby_face = inner_face(search, *surroundings.around, wall);
+          }
         }
       }
     }

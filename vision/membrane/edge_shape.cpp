@@ -582,6 +582,17 @@ class BlurredSteps {
   cv::Vec3d heights_;  // of the last residuals: level, own step, nearby step
 };
 
+std::vector<double> moved_by(const std::vector<double>& shape, double px) {
+  const double last = static_cast<double>(shape.size()) - 1.001;
+  std::vector<double> out;
+  for (std::size_t j = 0; j < shape.size(); ++j) {
+    const double x = std::clamp(static_cast<double>(j) - px / kSample_px, 0.0, last);
+    const auto low = static_cast<std::size_t>(x);
+    out.push_back(shape[low] + (x - static_cast<double>(low)) * (shape[low + 1] - shape[low]));
+  }
+  return out;
+}
+
 }  // namespace
 
 std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Contour& contour,
@@ -601,9 +612,9 @@ std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Cont
     learnt.shape.clear();
     return std::nullopt;
   }
-  learnt.shape = common.shape();
   const auto steps = BlurredSteps(common.shape(), edge).fit();
   if (!steps) {
+    learnt.shape.clear();
     return std::nullopt;
   }
   if (apart) {
@@ -612,6 +623,7 @@ std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Cont
     learnt.nearby_height += part * (steps->nearby_height - learnt.nearby_height);
     learnt.blur_px += part * (steps->blur_px - learnt.blur_px);
   }
+  learnt.shape = moved_by(common.shape(), -steps->own);  // or it would wander off
   CommonShape::Variance variance = common.variance(picture.noise, learnt);
   SeenOutline out{Contour(base.size()), std::move(variance.all), std::move(variance.lasting)};
   for (std::size_t i = 0; i < base.size(); ++i) {

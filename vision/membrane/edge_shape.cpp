@@ -607,12 +607,13 @@ std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Cont
   if (apart && learnt.nearby_height != 0) {
     profiles.move_nearby(base, soft, edge, learnt);
   }
-  CommonShape common(profiles, soft, edge);
-  if (!common.find(edge.steady ? learnt.shape : std::vector<double>())) {
-    learnt.shape.clear();
-    return std::nullopt;
+  std::optional<CommonShape> common(std::in_place, profiles, soft, edge);
+  bool found = edge.steady && !learnt.shape.empty() && common->find(learnt.shape);
+  if (!found) {
+    common.emplace(profiles, soft, edge);
+    found = common->find({});
   }
-  const auto steps = BlurredSteps(common.shape(), edge).fit();
+  const auto steps = found ? BlurredSteps(common->shape(), edge).fit() : std::nullopt;
   if (!steps) {
     learnt.shape.clear();
     return std::nullopt;
@@ -623,11 +624,11 @@ std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Cont
     learnt.nearby_height += part * (steps->nearby_height - learnt.nearby_height);
     learnt.blur_px += part * (steps->blur_px - learnt.blur_px);
   }
-  learnt.shape = moved_by(common.shape(), -steps->own);  // or it would wander off
-  CommonShape::Variance variance = common.variance(picture.noise, learnt);
+  learnt.shape = moved_by(common->shape(), -steps->own);  // or it would wander off
+  CommonShape::Variance variance = common->variance(picture.noise, learnt);
   SeenOutline out{Contour(base.size()), std::move(variance.all), std::move(variance.lasting)};
   for (std::size_t i = 0; i < base.size(); ++i) {
-    out.contour[i] = base[i] + (common.places()[i] + steps->own) * profiles.normal[i];
+    out.contour[i] = base[i] + (common->places()[i] + steps->own) * profiles.normal[i];
   }
   return out;
 }

@@ -17,6 +17,7 @@ namespace punctum::vision {
 namespace {
 
 constexpr int kCircles = 6;            // candidates that are tried
+constexpr double kHalo = 1.4;
 constexpr double kCircleScore = 0.35;  // share of a circumference that must have voted
 
 // For a dark line with a face on either side and no other edge. It is the zona, with a brighter space inside
@@ -59,7 +60,10 @@ StartedMembranes tell_apart(const MainEdge& found, const ClearedPicture& picture
   }
   const double mean = median_of(r1);
   const SecondEdge outside = find_second(r1, centre, main.polarity, true, picture, config);
-  const bool outside_clear = clear_enough(outside, main.path.level, picture);
+  // The bright halo of a dark cell out of perfect focus: its outer flank is weaker than its inner one.
+  const bool halo = main.polarity == Polarity::brighter_out && outside.polarity == Polarity::darker_out &&
+                    main.path.level > kHalo * outside.path.level;
+  const bool outside_clear = !halo && clear_enough(outside, main.path.level, picture);
   const auto begin = [&centre](const auto& edge) {
     return started(centre, edge.path.r, edge.polarity, edge.path.level);
   };

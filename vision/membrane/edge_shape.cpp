@@ -19,7 +19,6 @@ namespace {
 
 constexpr double kSample_px = 0.5;      // between two samples across the contour
 constexpr int kRounds = 3;              // shape and places in turn; a fourth changes less than 0.01 px
-constexpr int kRoundsOn = 2;            // once the shape is known
 constexpr double kMost_px = 2.5;        // a place further from the contour is another edge's
 constexpr int kLeastSamples = 12;       // of a profile
 constexpr double kLeastShare = 0.35;    // of the points must be seen
@@ -147,15 +146,9 @@ class CommonShape {
         moved_shape_(profiles.samples),
         moved_slope_(profiles.samples) {}
 
-  // known: how the shape was one frame ago; or empty.
-  [[nodiscard]] bool find(const std::vector<double>& known) {
-    const bool begun = known.size() == shape_.size();
-    if (begun) {
-      shape_ = known;
-    } else {
-      average();
-    }
-    for (int round = 0; round < (begun ? kRoundsOn : kRounds); ++round) {
+  [[nodiscard]] bool find() {
+    average();
+    for (int round = 0; round < kRounds; ++round) {
       if (!place_all()) {
         return false;
       }
@@ -582,17 +575,6 @@ class BlurredSteps {
   cv::Vec3d heights_;  // of the last residuals: level, own step, nearby step
 };
 
-std::vector<double> moved_by(const std::vector<double>& shape, double px) {
-  const double last = static_cast<double>(shape.size()) - 1.001;
-  std::vector<double> out;
-  for (std::size_t j = 0; j < shape.size(); ++j) {
-    const double x = std::clamp(static_cast<double>(j) - px / kSample_px, 0.0, last);
-    const auto low = static_cast<std::size_t>(x);
-    out.push_back(shape[low] + (x - static_cast<double>(low)) * (shape[low + 1] - shape[low]));
-  }
-  return out;
-}
-
 }  // namespace
 
 std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Contour& contour,
@@ -607,15 +589,9 @@ std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Cont
   if (apart && learnt.nearby_height != 0) {
     profiles.move_nearby(base, soft, edge, learnt);
   }
-  std::optional<CommonShape> common(std::in_place, profiles, soft, edge);
-  bool found = edge.steady && !learnt.shape.empty() && common->find(learnt.shape);
-  if (!found) {
-    common.emplace(profiles, soft, edge);
-    found = common->find({});
-  }
-  const auto steps = found ? BlurredSteps(common->shape(), edge).fit() : std::nullopt;
+  CommonShape common(profiles, soft, edge);
+  const auto steps = common.find() ? BlurredSteps(common.shape(), edge).fit() : std::nullopt;
   if (!steps) {
-    learnt.shape.clear();
     return std::nullopt;
   }
   if (apart) {
@@ -624,11 +600,10 @@ std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Cont
     learnt.nearby_height += part * (steps->nearby_height - learnt.nearby_height);
     learnt.blur_px += part * (steps->blur_px - learnt.blur_px);
   }
-  learnt.shape = moved_by(common->shape(), -steps->own);  // or it would wander off
-  CommonShape::Variance variance = common->variance(picture.noise, learnt);
+  CommonShape::Variance variance = common.variance(picture.noise, learnt);
   SeenOutline out{Contour(base.size()), std::move(variance.all), std::move(variance.lasting)};
   for (std::size_t i = 0; i < base.size(); ++i) {
-    out.contour[i] = base[i] + (common->places()[i] + steps->own) * profiles.normal[i];
+    out.contour[i] = base[i] + (common.places()[i] + steps->own) * profiles.normal[i];
   }
   return out;
 }

@@ -21,7 +21,6 @@ struct NearbyEdge {
 struct EdgeShape {
   double inside = 8, outside = 6;  // px of the picture that are looked at on either side of the contour
   double modes = 12;               // finer waves round the contour are noise
-  bool steady = false;             // no other membrane comes and goes beside it: it looks as one frame ago
   double lasting = 0;  // of the places' scatter at least this share is the same in the next frames
   std::optional<NearbyEdge> nearby;
   Contour nearby_face;  // where it lies, per point, if it is not equally far everywhere; or empty
@@ -34,7 +33,6 @@ struct EdgeLearnt {
   // of half of what neighbours differ by, px^2.
   double square = 0, difference = 0;
   int frames = 0;                         // of these two
-  std::vector<double> shape;              // the mean profile across the contour
   double nearby_height = 0, blur_px = 0;  // of the nearby edge: half of its change of grey, outwards
 };
 

@@ -126,7 +126,6 @@ SeenOutline refined(const MembraneSearch& search, const EdgePath& path, const Vi
     edge.beside = search.band.hidden;
     if (surroundings.outermost) {
       edge.modes = kOuterModes;
-      edge.steady = true;
       edge.nearby = {-wall, kWallTolerance * wall};
     } else {
       edge.inside = 6;

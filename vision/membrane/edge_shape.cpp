@@ -35,6 +35,9 @@ constexpr double kClip = 1.3;    // times the spread: Huber's limit
 constexpr double kBeside = 0.1;  // weight of a place beside a line that is not its own
 constexpr double kCommon_px = 0.03;  // sd of what is wrong alike all round: the steps are no perfect model
 constexpr double kShapeNoise = 0.5;  // grey levels: what the common shape itself is worth
+constexpr double kHalo_px = 0.1;     // sd by which a halo may shift the whole contour
+// Width of a halo's line, its place outside the step, and by what that differs; of the blur.
+constexpr double kHaloBlur = 1.3, kHaloAt = 1.2, kHaloTolerance = 0.2;
 constexpr double kBlurFirst_px = 1.8, kBlurLeast_px = 0.6, kBlurMost_px = 5;
 
 // Of a smoothing that leaves out waves of more than `modes` periods round the contour.
@@ -467,22 +470,25 @@ CommonShape::Variance CommonShape::variance(double noise, EdgeLearnt& mean) cons
   return out;
 }
 
-// The common shape as one or two blurred steps. Unknown are the place of the own step, the blur, and the
-// place of the nearby one against it; for given ones, level and heights follow by linear least squares.
+// The common shape as one or two blurred steps, and a halo where there is one. Unknown are the place of the
+// own step, the blur, and the places of the others against it; for given ones, level and heights follow by
+// linear least squares.
 class BlurredSteps {
  public:
-  BlurredSteps(const std::vector<double>& shape, const EdgeShape& edge) : shape_(shape), edge_(edge) {}
+  BlurredSteps(const std::vector<double>& shape, const EdgeShape& edge)
+      : shape_(shape), edge_(edge), halo_(bright_outside(shape, edge)) {}
 
   struct Fit {
     double own = 0;  // where the own step lies, px from the contour
     double blur_px = 0, nearby_height = 0;
+    bool halo = false;
   };
   // Empty when no such steps explain the shape.
   [[nodiscard]] std::optional<Fit> fit() {
-    cv::Vec3d x(0, kBlurFirst_px, edge_.nearby ? edge_.nearby->at : 0);
+    cv::Vec4d x(0, kBlurFirst_px, edge_.nearby ? edge_.nearby->at : 0, 1.5);
     double cost = residuals(x, now_), damping = 1e-3;
     for (int round = 0; round < 25 && damping < 1e4; ++round) {
-      const cv::Vec3d y = x + step(x, damping);
+      const cv::Vec4d y = x + step(x, damping);
       const double next = residuals(y, ahead_);
       if (!(next < cost)) {
         damping *= 10;
@@ -502,27 +508,45 @@ class BlurredSteps {
       return std::nullopt;
     }
     (void)residuals(x, now_);
-    return Fit{x[0], x[1], heights_[2]};
+    return Fit{x[0], x[1], heights_[2], halo_};
   }
 
  private:
-  [[nodiscard]] bool free(int k) const { return k < 2 || (edge_.nearby && edge_.nearby->tolerance_px > 0); }
+  static constexpr int kUnknown = 4;  // own place; blur; places of the nearby step and of the halo against it
+  // Whether it is brighter beside the outer face of a wall than further out: the halo of a cell out of
+  // perfect focus.
+  static bool bright_outside(const std::vector<double>& shape, const EdgeShape& edge) {
+    constexpr double kShare = 0.15;  // of what the shape spans
+    constexpr std::ptrdiff_t kFarOut = 3;
+    if (!edge.nearby || edge.nearby->at > 0) {
+      return false;
+    }
+    const auto [least, most] = std::minmax_element(shape.begin(), shape.end());
+    const double far = *std::max_element(shape.end() - kFarOut, shape.end());
+    return *most - far > kShare * (*most - *least) &&
+           static_cast<double>(most - shape.begin()) * kSample_px > edge.inside - kMost_px;
+  }
+  [[nodiscard]] bool free(int k) const {
+    return k < 2 || (k == 2 && edge_.nearby && edge_.nearby->tolerance_px > 0) || (k == 3 && halo_);
+  }
   // Returns the sum of their squares.
-  double residuals(const cv::Vec3d& x, std::vector<double>& out) {
+  double residuals(const cv::Vec4d& x, std::vector<double>& out) {
     const double blur = std::clamp(x[1], 0.3, 8.0) * std::numbers::sqrt2;
-    std::vector<cv::Vec3d> column(shape_.size());
-    cv::Matx33d a = cv::Matx33d::zeros();
-    cv::Vec3d b = cv::Vec3d::all(0);
+    std::vector<cv::Vec4d> column(shape_.size());
+    cv::Matx44d a = cv::Matx44d::zeros();
+    cv::Vec4d b = cv::Vec4d::all(0);
     for (std::size_t j = 0; j < shape_.size(); ++j) {
       const double s = static_cast<double>(j) * kSample_px - edge_.inside - x[0];
-      column[j] = {1, blurred_step(s / blur), edge_.nearby ? blurred_step((s - x[2]) / blur) : 0};
+      const double z = (s - x[3]) / (kHaloBlur * std::clamp(x[1], 0.3, 8.0));
+      column[j] = {1, blurred_step(s / blur), edge_.nearby ? blurred_step((s - x[2]) / blur) : 0,
+                   halo_ ? math::exp(-0.5 * z * z) : 0};
       a += column[j] * column[j].t();
       b += shape_[j] * column[j];
     }
-    for (int p = 0; p < 3; ++p) {
+    for (int p = 0; p < kUnknown; ++p) {
       a(p, p) += 1e-9 * static_cast<double>(shape_.size());
     }
-    const cv::Vec3d h = heights_ = a.solve(b, cv::DECOMP_CHOLESKY);
+    const cv::Vec4d h = heights_ = a.solve(b, cv::DECOMP_CHOLESKY);
     out.clear();
     double cost = 0;
     for (std::size_t j = 0; j < shape_.size(); ++j) {
@@ -533,22 +557,26 @@ class BlurredSteps {
       out.push_back(kShapeNoise * (x[2] - edge_.nearby->at) / edge_.nearby->tolerance_px);
       cost += out.back() * out.back();
     }
+    if (halo_) {
+      out.push_back(kShapeNoise * (x[3] - kHaloAt * x[1]) / (kHaloTolerance * x[1]));
+      cost += out.back() * out.back();
+    }
     return cost;
   }
   // Of Levenberg and Marquardt, with differences.
-  cv::Vec3d step(const cv::Vec3d& x, double damping) {
+  cv::Vec4d step(const cv::Vec4d& x, double damping) {
     constexpr double kDifference = 1e-4;
-    std::array<std::vector<double>, 3> slope;
-    cv::Matx33d a = cv::Matx33d::eye();
-    cv::Vec3d b = cv::Vec3d::all(0);
-    for (int p = 0; p < 3; ++p) {
+    std::array<std::vector<double>, kUnknown> slope;
+    cv::Matx44d a = cv::Matx44d::eye();
+    cv::Vec4d b = cv::Vec4d::all(0);
+    for (int p = 0; p < kUnknown; ++p) {
       if (free(p)) {
-        cv::Vec3d y = x;
+        cv::Vec4d y = x;
         y[p] += kDifference;
         residuals(y, slope[static_cast<std::size_t>(p)]);
       }
     }
-    for (int p = 0; p < 3; ++p) {
+    for (int p = 0; p < kUnknown; ++p) {
       for (int q = 0; q <= p && free(p); ++q) {
         a(p, q) = 0;
         for (std::size_t j = 0; j < now_.size(); ++j) {
@@ -562,8 +590,8 @@ class BlurredSteps {
       }
       a(p, p) = a(p, p) * (1 + damping) + 1e-9;
     }
-    cv::Vec3d d = a.solve(b, cv::DECOMP_CHOLESKY);
-    for (int p = 0; p < 3; ++p) {
+    cv::Vec4d d = a.solve(b, cv::DECOMP_CHOLESKY);
+    for (int p = 0; p < kUnknown; ++p) {
       d[p] = free(p) ? std::clamp(d[p], -1.0, 1.0) : 0;
     }
     return d;
@@ -571,8 +599,9 @@ class BlurredSteps {
 
   const std::vector<double>& shape_;
   const EdgeShape& edge_;
+  bool halo_;
   std::vector<double> now_, ahead_;
-  cv::Vec3d heights_;  // of the last residuals: level, own step, nearby step
+  cv::Vec4d heights_;  // of the last residuals: level, own step, nearby step, halo
 };
 
 }  // namespace
@@ -603,6 +632,10 @@ std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Cont
   CommonShape::Variance variance = common.variance(picture.noise, learnt);
   SeenOutline out{Contour(base.size()), std::move(variance.all), std::move(variance.lasting)};
   for (std::size_t i = 0; i < base.size(); ++i) {
+    if (steps->halo) {  // its shape is not known
+      out.variance[i] += kHalo_px * kHalo_px;
+      out.lasting[i] += kHalo_px * kHalo_px;
+    }
     out.contour[i] = base[i] + (common.places()[i] + steps->own) * profiles.normal[i];
   }
   return out;

@@ -26,6 +26,7 @@ struct Ring {
   double fade = 0;    // the contrast varies by this share round the cell
   double dimple = 0;  // px, at angle 0
   double slope = 0;   // grey levels per px of the ground
+  double halo = 0;    // grey levels: a bright lobe, 4 px wide, outside of the wall
 };
 
 double outline(const Ring& ring, double t) {
@@ -48,6 +49,7 @@ cv::Mat drawn(const Ring& ring) {
         const double t = std::atan2(d.y, d.x), r = cv::norm(d) - outline(ring, t);
         const double contrast = 1 + ring.fade * std::cos(t);
         const bool body = ring.gap > 0 && r < -ring.wall - gap_at(ring, t);
+        sum += r > 0 && r < 4 ? ring.halo * (1 - std::cos(std::numbers::pi * r / 2)) / 2 / 64 : 0;
         sum += (body ? -25 : r < 0 && r > -ring.wall ? -30 : r < 0 ? -8 : 0) * contrast / 64;
       }
       m.at<float>(y, x) = static_cast<float>(150 + ring.slope * (x - kMiddle.x) + sum);
@@ -213,6 +215,15 @@ TEST(EdgeShape, tells_what_the_next_frame_repeats_from_what_it_tells_anew) {
       }
     }
     EXPECT_NEAR(said / between, 1, 0.5) << grains;
+  }
+}
+
+TEST(EdgeShape, is_not_shifted_by_a_halo) {
+  for (const double halo : {15.0, 25.0}) {
+    const Ring ring{.noise = 2, .halo = halo};
+    const auto found = place_edge(picture_with(ring), rough(ring, 0.8, 0.3), kNowhereSoft, wall_of(5.6));
+    ASSERT_TRUE(found) << halo;
+    EXPECT_LT(std::abs(error_against(found->contour, ring).mean), 0.3) << halo;  // px: a quarter of a um
   }
 }
 

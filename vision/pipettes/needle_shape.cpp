@@ -251,8 +251,6 @@ NeedleShape::Profiles NeedleShape::blurred(double sigma_px) const {
 
 namespace {
 
-constexpr std::size_t kAtOnce = 4;  // ends; the compiler keeps their sums in registers
-
 // What a row of power `power` in the shape tells for the needle. A speck or another edge may tell for or
 // against it no more than the needle itself.
 double gain_of_row(double product, double power) {
@@ -263,49 +261,55 @@ double gain_of_row(double product, double power) {
 
 void NeedleShape::Look::arrange() {
   const std::size_t n = rows.size();
-  lane_size = n + kAtOnce - 1;  // ahead of the shape is nothing
-  power.assign(lane_size, 0.0);
-  lanes.assign(kLanes * lane_size, 0.0);
+  power.resize(n);
+  lanes.resize(kLanes * n);
   for (std::size_t k = 0; k < n; ++k) {
     const Profile& row = rows[n - 1 - k];
     power[k] = product(row, row);
     for (std::size_t i = 0; i < kLanes; ++i) {
-      lanes[i * lane_size + k] = row[i];
+      lanes[i * n + k] = row[i];
     }
   }
 }
 
-// Of the ends from..to - 1. This is where the needle's time goes: row by row of the picture, several ends at
-// once. The shape of the e-th end begins at the e-th row.
+// Of a row of the picture with the n rows of the shape from the k-th on, the last one being the first.
+void NeedleShape::Look::products(const Profile& row, std::size_t k, std::size_t n, double* out) const {
+  constexpr std::size_t kAtOnce = 7;  // lanes: the compiler keeps them in registers
+  static_assert(kLanes % kAtOnce == 0);
+  std::fill_n(out, n, 0.0);
+  for (std::size_t i = 0; i < kLanes; i += kAtOnce) {
+    const std::size_t size = rows.size();
+    const double *r = row.data() + i, *lane = lanes.data() + i * size + k;
+    for (std::size_t q = 0; q < n; ++q) {
+      out[q] += r[0] * lane[q] + r[1] * lane[q + size] + r[2] * lane[q + 2 * size] +
+                r[3] * lane[q + 3 * size] + r[4] * lane[q + 4 * size] + r[5] * lane[q + 5 * size] +
+                r[6] * lane[q + 6 * size];
+    }
+  }
+}
+
+// Of the ends from..to - 1; the shape of the e-th end begins at the e-th row. This is where the needle's time
+// goes: row by row of the picture, all ends at once.
 std::vector<double> NeedleShape::gains(const Profiles& seen, const Look& look, int from, int to) {
   const int n = static_cast<int>(seen.size()), last = static_cast<int>(look.rows.size()) - 1;
-  std::vector<double> gain(static_cast<std::size_t>(to - from) + kAtOnce - 1, 0.0);
+  std::vector<double> gain(static_cast<std::size_t>(to - from), 0.0), sum(gain);
   for (int j = from; j < n; ++j) {
     const Profile& row = seen[static_cast<std::size_t>(j)];
-    int e = from;
-    if (j - e >= last) {  // the shaft goes on as the shape ends
+    // Of the ends so far ahead that the row lies behind their shape, the shaft goes on as the shape ends.
+    const int first = std::clamp(j - last, from, to), ends = std::min(to, j + 1) - first;
+    if (first > from) {
       const double shaft = gain_of_row(product(row, look.rows.back()), look.power.front());
-      for (; e < to && j - e >= last; ++e) {
-        gain[static_cast<std::size_t>(e - from)] += shaft;
-      }
+      std::for_each(gain.begin(), gain.begin() + (first - from), [shaft](double& g) { g += shaft; });
     }
-    for (; e < to && e <= j; e += kAtOnce) {
-      const std::size_t k = static_cast<std::size_t>(last - j + e);
-      std::array<double, kAtOnce> sum{};
-      for (std::size_t i = 0; i < kLanes; ++i) {
-        const double* lane = look.lanes.data() + i * look.lane_size + k;
-        for (std::size_t q = 0; q < kAtOnce; ++q) {
-          sum[q] += row[i] * lane[q];
-        }
-      }
-      const double* power = look.power.data() + k;
-      double* of_ends = gain.data() + (e - from);
-      for (std::size_t q = 0; q < kAtOnce; ++q) {
-        of_ends[q] += gain_of_row(sum[q], power[q]);
+    if (ends > 0) {
+      const std::size_t k = static_cast<std::size_t>(last - j + first), many = static_cast<std::size_t>(ends);
+      look.products(row, k, many, sum.data());
+      double* of_ends = gain.data() + (first - from);
+      for (std::size_t q = 0; q < many; ++q) {
+        of_ends[q] += gain_of_row(sum[q], look.power[k + q]);
       }
     }
   }
-  gain.resize(static_cast<std::size_t>(to - from));
   return gain;
 }
 

@@ -65,8 +65,8 @@ class NeedleShape {
     Profiles rows;
     std::vector<double> power;  // of the rows, the last one first
     std::vector<double> lanes;  // the rows lane by lane, in each the last row first
-    std::size_t lane_size = 0;
-    void arrange();  // power and lanes
+    void arrange();             // power and lanes
+    void products(const Profile& row, std::size_t k, std::size_t n, double* out) const;
   };
   struct Fit {
     std::vector<double> gain;  // of each end, over no needle; in squares of the absorption

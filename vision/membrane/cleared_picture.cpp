@@ -21,6 +21,24 @@ constexpr double kImpurityKeep_px = 4;  // nearer to a membrane, it belongs to t
 constexpr double kFaceReach_px =
     6.5;  // nearer to the face of the holding pipette, an edge is blurred into it
 
+// The first rows that vary enough for the whole picture decide.
+bool has_contrast(const cv::Mat& grey) {
+  const double least = kLeastContrast * kLeastContrast * static_cast<double>(grey.total());
+  double sum = 0, squares = 0, n = 0;
+  for (int y = 0; y < grey.rows; ++y) {
+    const std::uint8_t* row = grey.ptr(y);
+    for (int x = 0; x < grey.cols; ++x) {
+      sum += row[x];
+      squares += row[x] * row[x];
+    }
+    n += grey.cols;
+    if (squares - sum * sum / n >= least) {
+      return true;
+    }
+  }
+  return false;
+}
+
 // Rows of n pixels; short loops, which the compiler vectorises.
 void above(const float* v, int n, float limit, std::uint8_t* out) {
   for (int i = 0; i < n; ++i) {
@@ -53,10 +71,8 @@ std::string ClearedPicture::load(const hal::Frame& frame, int width, int height)
   cv::Mat(height, width, CV_8U, const_cast<std::uint8_t*>(frame.pixels),
           static_cast<std::size_t>(frame.stride))
       .copyTo(grey);
-  cv::Scalar mean, sd;
-  cv::meanStdDev(grey, mean, sd);
-  if (sd[0] < kLeastContrast) {
-    return "no contrast: every pixel is about " + std::to_string(std::lround(mean[0]));
+  if (!has_contrast(grey)) {
+    return "no contrast: every pixel is about " + std::to_string(std::lround(cv::mean(grey)[0]));
   }
   noise = std::max(noise_level(grey), kLeastNoise);
   return {};

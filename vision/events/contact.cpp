@@ -5,19 +5,39 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "vision/image/components.hpp"
+
 namespace punctum::vision {
 
 namespace {
 
-// Label with the largest count; the background, label 0, does not count. 0 when all counts are 0.
+// Label of the component with the largest count, from 1 on. 0 when all counts are 0.
 int largest_label(const std::vector<int>& count) {
-  int best = 0;
-  for (std::size_t i = 1; i < count.size(); ++i) {
-    if (count[i] > 0 && (best == 0 || count[i] > count[static_cast<std::size_t>(best)])) {
-      best = static_cast<int>(i);
+  const auto best = std::max_element(count.begin(), count.end());
+  return best != count.end() && *best > 0 ? static_cast<int>(best - count.begin()) + 1 : 0;
+}
+
+void add_pixels(const std::uint8_t* from, int n, std::uint8_t* to) {
+  for (int x = 0; x < n; ++x) {
+    to[x] |= from[x];
+  }
+}
+
+// By an element one pixel wide and `rows` high.
+cv::Mat dilated_upright(const cv::Mat& binary, int rows) {
+  cv::Mat out = cv::Mat::zeros(binary.size(), CV_8U);
+  const int below = rows / 2, above = rows - 1 - below;
+  for (int y = 0; y < binary.rows; ++y) {
+    for (int i = std::max(0, y - above); i <= std::min(binary.rows - 1, y + below); ++i) {
+      add_pixels(binary.ptr(i), binary.cols, out.ptr(y));
     }
   }
-  return best;
+  return out;
+}
+
+int set_pixels(const cv::Mat& mask, const PixelRun& run) {
+  const std::uint8_t* row = mask.ptr(run.y);
+  return static_cast<int>(std::count_if(row + run.from, row + run.to, [](std::uint8_t v) { return v > 0; }));
 }
 
 }  // namespace
@@ -28,22 +48,11 @@ Classes merge_classes(const cv::Mat& binary, const cv::Mat& needle_pixels, const
   if (binary.empty() || needle_pixels.size() != binary.size() || cell_pixels.size() != binary.size()) {
     return out;
   }
-  cv::Mat grown, labels;
-  if (rows > 1) {
-    const cv::Mat column = cv::Mat::ones(rows, 1, CV_8U);
-    cv::dilate(binary, grown, column, cv::Point(0, (rows - 1) / 2), 1, cv::BORDER_CONSTANT, cv::Scalar(0));
-  } else {
-    grown = binary;
-  }
-  const int n = cv::connectedComponents(grown, labels, 8, CV_32S);
-  std::vector<int> needle(static_cast<std::size_t>(n), 0), cell(static_cast<std::size_t>(n), 0);
-  for (int y = 0; y < labels.rows; ++y) {
-    const int* l = labels.ptr<int>(y);
-    const std::uint8_t *a = needle_pixels.ptr(y), *b = cell_pixels.ptr(y);
-    for (int x = 0; x < labels.cols; ++x) {
-      needle[static_cast<std::size_t>(l[x])] += a[x] > 0;
-      cell[static_cast<std::size_t>(l[x])] += b[x] > 0;
-    }
+  const Components all = components_of(rows > 1 ? dilated_upright(binary, rows) : binary);
+  std::vector<int> needle(all.box.size(), 0), cell(all.box.size(), 0);
+  for (const PixelRun& run : all.runs) {
+    needle[run.component] += set_pixels(needle_pixels, run);
+    cell[run.component] += set_pixels(cell_pixels, run);
   }
   out.needle = largest_label(needle);
   out.cell = largest_label(cell);

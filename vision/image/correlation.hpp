@@ -9,7 +9,8 @@
 namespace punctum::vision {
 
 // sum M I / sqrt(sum M^2 sum I^2) of the template M at every place inside `window` (OpenCV's
-// TM_CCORR_NORMED). CV_32F, of the size window - template + 1; empty if the template does not fit.
+// TM_CCORR_NORMED), both CV_8U. CV_32F, of the size window - template + 1; empty if the template does not
+// fit.
 [[nodiscard]] cv::Mat correlation_map(const cv::Mat& window, const cv::Mat& pattern);
 
 // The same with both means removed: it tells a pattern from an evenly bright patch.

@@ -1,49 +1,46 @@
 #include "vision/image/impurities.hpp"
 
+#include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 
 namespace punctum::vision {
 
-int find_impurities(const cv::Mat& binary, const std::vector<Contour>& membranes, double max_side,
-                    int min_area, double keep, cv::Mat& mask) {
-  mask.create(binary.size(), CV_8U);
-  mask.setTo(0);
-  if (binary.empty()) {
-    return 0;
-  }
-  cv::Mat labels, stats, centres;
-  const int n = cv::connectedComponentsWithStats(binary, labels, stats, centres, 8, CV_32S);
-  // What lies on a membrane belongs to the cell.
-  std::vector<bool> cell(static_cast<std::size_t>(n), false);
-  const int reach = static_cast<int>(std::ceil(keep));
+namespace {
+
+// Which components have a pixel in the square of `reach` px round a point of a membrane.
+std::vector<bool> near_membranes(const Components& all, const std::vector<Contour>& membranes, int reach) {
+  std::vector<bool> near(all.box.size(), false);
+  const int rows = static_cast<int>(all.row.size()) - 1;
   for (const Contour& c : membranes) {
     for (const Point& p : c) {
       const int px = static_cast<int>(std::lround(p.x)), py = static_cast<int>(std::lround(p.y));
-      for (int y = std::max(0, py - reach); y <= std::min(labels.rows - 1, py + reach); ++y) {
-        for (int x = std::max(0, px - reach); x <= std::min(labels.cols - 1, px + reach); ++x) {
-          cell[static_cast<std::size_t>(labels.at<int>(y, x))] = true;
+      for (int y = std::max(0, py - reach); y <= std::min(rows - 1, py + reach); ++y) {
+        for (const PixelRun& run : all.in_row(y)) {
+          if (run.from <= px + reach && run.to > px - reach) {
+            near[run.component] = true;
+          }
         }
       }
     }
   }
-  int count = 0;
-  std::vector<std::uint8_t> chosen(static_cast<std::size_t>(n), 0);
-  for (int i = 1; i < n; ++i) {
-    if (!cell[static_cast<std::size_t>(i)] && stats.at<int>(i, cv::CC_STAT_AREA) >= min_area &&
-        stats.at<int>(i, cv::CC_STAT_WIDTH) <= max_side && stats.at<int>(i, cv::CC_STAT_HEIGHT) <= max_side) {
-      chosen[static_cast<std::size_t>(i)] = 255;
-      ++count;
-    }
+  return near;
+}
+
+}  // namespace
+
+int find_impurities(const cv::Mat& binary, const std::vector<Contour>& membranes, double max_side,
+                    int min_area, double keep, std::vector<PixelRun>& pixels) {
+  pixels.clear();
+  const Components all = components_of(binary);
+  // What lies on a membrane belongs to the cell.
+  std::vector<bool> chosen = near_membranes(all, membranes, static_cast<int>(std::ceil(keep)));
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    chosen[i] = !chosen[i] && all.pixels[i] >= min_area && all.box[i].width <= max_side &&
+                all.box[i].height <= max_side;
   }
-  for (int y = 0; y < labels.rows; ++y) {
-    const int* l = labels.ptr<int>(y);
-    std::uint8_t* m = mask.ptr(y);
-    for (int x = 0; x < labels.cols; ++x) {
-      m[x] = chosen[static_cast<std::size_t>(l[x])];
-    }
-  }
-  return count;
+  std::copy_if(all.runs.begin(), all.runs.end(), std::back_inserter(pixels),
+               [&chosen](const PixelRun& run) { return chosen[run.component]; });
+  return static_cast<int>(std::count(chosen.begin(), chosen.end(), true));
 }
 
 }  // namespace punctum::vision

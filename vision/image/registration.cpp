@@ -6,7 +6,6 @@
 #include <opencv2/imgproc.hpp>
 
 #include "hal/math/elementary.hpp"
-#include "vision/image/correlation.hpp"
 
 namespace punctum::vision {
 
@@ -48,8 +47,21 @@ double Registration::similarity(const cv::Mat& grey, const cv::Point& corner) co
   cv::Mat smooth;
   grey(box).convertTo(smooth, CV_32F);
   cv::GaussianBlur(smooth, smooth, cv::Size(0, 0), kSigma_px, kSigma_px, cv::BORDER_REPLICATE);
-  const cv::Mat map = centred_correlation_map(smooth, pattern_.smooth);
-  return map.empty() ? 0 : static_cast<double>(map.at<float>(0, 0));
+  double n = 0, v1 = 0, p1 = 0, vv = 0, vp = 0, pp = 0;
+  for (int y = 0; y < box.height; ++y) {
+    const float *seen = smooth.ptr<float>(y), *pattern = pattern_.smooth.ptr<float>(y);
+    for (int x = 0; x < box.width; ++x) {
+      const double v = static_cast<double>(seen[x]) - mean_, p = static_cast<double>(pattern[x]) - mean_;
+      v1 += v;
+      p1 += p;
+      vv += v * v;
+      vp += v * p;
+      pp += p * p;
+    }
+    n += box.width;
+  }
+  const double power = (vv - v1 * v1 / n) * (pp - p1 * p1 / n);
+  return power > 0 ? (vp - v1 * p1 / n) / std::sqrt(power) : 0;
 }
 
 std::optional<Registration::Place> Registration::place(const cv::Mat& grey, const Point& corner) const {
@@ -74,12 +86,18 @@ std::optional<Registration::Place> Registration::place(const cv::Mat& grey, cons
       return std::nullopt;
     }
     double sum = 0, dot = 0, n = 0;
+    const int x0 = static_cast<int>(std::floor(at.x)), y0 = static_cast<int>(std::floor(at.y));
+    const double u = at.x - x0, t = at.y - y0;  // the same for every pixel
     for (int y = kMargin; y < h - kMargin; ++y) {
+      const float *a = smooth.ptr<float>(y0 + y) + x0, *b = smooth.ptr<float>(y0 + y + 1) + x0,
+                  *pattern = pattern_.smooth.ptr<float>(y);
+      float* out = shifted.ptr<float>(y);
       for (int x = kMargin; x < w - kMargin; ++x) {
-        const double v = Bilinear(at.x + x, at.y + y).of(smooth);
-        shifted.at<float>(y, x) = static_cast<float>(v);
+        const double v = (1 - t) * ((1 - u) * static_cast<double>(a[x]) + u * static_cast<double>(a[x + 1])) +
+                         t * ((1 - u) * static_cast<double>(b[x]) + u * static_cast<double>(b[x + 1]));
+        out[x] = static_cast<float>(v);
         sum += v;
-        dot += v * (static_cast<double>(pattern_.smooth.at<float>(y, x)) - mean_);
+        dot += v * (static_cast<double>(pattern[x]) - mean_);
         ++n;
       }
     }

@@ -46,6 +46,11 @@ struct ClearedPicture {
   // cannot be; along the face it is not visible, because of the dark line of the face. expected: radius of
   // the membrane per angle of the band.
   void exclude_holder(EdgeBand& band, const std::vector<double>& expected) const;
+
+ private:
+  void find_strong(double threshold);
+
+  cv::Mat open_;  // CV_8U, field.area: 255 = strong gradient that is not covered
 };
 
 }  // namespace punctum::vision

@@ -11,7 +11,22 @@ namespace {
 
 constexpr double kBeside_px = 10;   // of the needle's walls: their blur, out of focus
 constexpr double kAhead_px = 40;    // of the tip: it may be seen short of where it is
-constexpr double kPart = 1.0 / 16;  // of a frame in the mean
+constexpr float kPart = 1.0F / 16;  // of a frame in the mean
+
+void learn_row(const float* now, const std::uint8_t* hidden, const std::uint8_t* known, int n, float* mean) {
+  for (int x = 0; x < n; ++x) {
+    const float before = mean[x], here = now[x];
+    const float mean_so_far = known[x] > 0 ? before : here;
+    const float learnt = mean_so_far * (1 - kPart) + here * kPart;
+    mean[x] = hidden[x] > 0 ? before : learnt;
+  }
+}
+
+void join_seen(const std::uint8_t* hidden, int n, std::uint8_t* known) {
+  for (int x = 0; x < n; ++x) {
+    known[x] |= hidden[x] > 0 ? 0 : 255;
+  }
+}
 
 }  // namespace
 
@@ -23,13 +38,16 @@ void Backdrop::learn(const GradientField& field, const NeedlePose& needle) {
     mean_ = cv::Mat::zeros(field.picture, CV_32F);
     known_ = cv::Mat::zeros(field.picture, CV_8U);
   }
-  cv::Mat covered = cv::Mat::zeros(field.picture, CV_8U);
-  draw_mask(covered, {needle_polygon(needle, field.picture, kBeside_px, kAhead_px)});
-  const cv::Mat free = covered(field.area) == 0;
-  cv::Mat mean = mean_(field.area), known = known_(field.area);
-  field.smooth.copyTo(mean, free & ~known);
-  cv::accumulateWeighted(field.smooth, mean, kPart, free);
-  known |= free;
+  hidden_.create(field.picture, CV_8U);
+  hidden_.setTo(0);
+  draw_mask(hidden_, {needle_polygon(needle, field.picture, kBeside_px, kAhead_px)});
+  const cv::Rect& a = field.area;
+  for (int y = 0; y < a.height; ++y) {
+    const std::uint8_t* hidden = hidden_.ptr(a.y + y) + a.x;
+    std::uint8_t* known = known_.ptr(a.y + y) + a.x;
+    learn_row(field.smooth.ptr<float>(y), hidden, known, a.width, mean_.ptr<float>(a.y + y) + a.x);
+    join_seen(hidden, a.width, known);
+  }
 }
 
 std::optional<double> Backdrop::grey(const Point& p) const {

@@ -19,8 +19,9 @@ class Backdrop {
   [[nodiscard]] std::optional<double> grey(const Point& p) const;
 
  private:
-  cv::Mat mean_;   // CV_32F, the whole picture
-  cv::Mat known_;  // CV_8U, likewise: 255 = seen without the needle
+  cv::Mat mean_;    // CV_32F, the whole picture
+  cv::Mat known_;   // CV_8U, likewise: 255 = seen without the needle
+  cv::Mat hidden_;  // CV_8U, likewise: 255 = near the needle in this frame
 };
 
 }  // namespace punctum::vision

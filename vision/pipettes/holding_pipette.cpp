@@ -10,6 +10,7 @@ namespace punctum::vision {
 
 namespace {
 
+constexpr int kStill_px = 3;            // a frame moves it by less
 constexpr double kCertainMouth_px = 1;  // of a mouth that is less certain nothing is claimed
 
 }  // namespace
@@ -73,14 +74,27 @@ HolderPose HoldingPipette::find(const cv::Mat& grey) {
   }
   const cv::Rect all(0, 0, grey.cols, grey.rows);
   cv::Rect window = all;
-  if (last_ && lost_ < 5) {
-    const int r = config_.window_px;
+  std::optional<Peak> p;
+  const auto search = [&](int r) {
     window =
         cv::Rect(static_cast<int>(std::lround(last_->x)) - r, static_cast<int>(std::lround(last_->y)) - r,
                  template_.cols + 2 * r, template_.rows + 2 * r) &
         all;
+    p = peak(correlation_map(grey(window), template_));
+  };
+  if (last_ && lost_ < 5) {
+    // It hardly moves. Where the best place lies on the rim, a better one may lie outside.
+    if (lost_ == 0) {
+      search(kStill_px);
+    }
+    const auto on_rim = [](double at, int places) { return at <= 0 || at >= places - 1; };
+    if (!p || on_rim(p->at.x, window.width - template_.cols + 1) ||
+        on_rim(p->at.y, window.height - template_.rows + 1)) {
+      search(config_.window_px);
+    }
+  } else {
+    p = peak(correlation_map(grey, template_));
   }
-  const auto p = peak(correlation_map(grey(window), template_));
   if (!p) {
     holder.reason = "template larger than the picture";
     return holder;

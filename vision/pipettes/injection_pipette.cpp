@@ -20,6 +20,7 @@ constexpr double kJump_px = 4;       // along the axis, from what motion and cor
 constexpr int kJumpsMax = 3;         // frames in a row; then it is where it is seen
 constexpr double kAside_px = 2;      // across the axis; further aside the shaft must lie there, too
 constexpr double kDoubtMax_px = 5;   // an end that is less certain is not seen
+constexpr double kAgain_px = 16;     // by no more is the end put right once the walls are fitted there
 constexpr double kSameEnd_px = 5;    // the walls end where the shape does, but for what either errs
 // By which the walls may seem to end too early: 1.9 to 4.2 px in pictures of two renderers; later it is
 // known.
@@ -282,8 +283,8 @@ bool InjectionPipette::find_end(const GradientField& field, double noise, Needle
   view_ = end->view;
   needle.tip += end->ahead * needle.axis;
   (void)fit_walls(field, noise, radius_px_, needle, longest_);
-  if (const auto again = shape_.end_in(view_, field, backdrop_, needle, 16, 16)) {
-    needle.tip += again->ahead * needle.axis;
+  if (const auto again = shape_.end_near(view_, field, backdrop_, needle, kAgain_px)) {
+    needle.tip += *again * needle.axis;
   }
   shape_origin_ = needle.tip;
   needle.tip += shape_offset_ * needle.axis;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numeric>
 
 #include "hal/math/elementary.hpp"
 #include "vision/image/median.hpp"
@@ -24,49 +25,77 @@ constexpr double kDoubt = 3;  // log-likelihood below the best; a Gaussian has f
 // A needle that left the plane of focus: its walls blur into each other, most of all near the tip.
 constexpr std::array kBlurs_px = {0.0, 0.8, 1.2, 1.6, 2.0, 2.5};
 
-// Where a lane stands across the needle: -1 .. 1.
-double place(std::size_t lane, std::size_t lanes) {
-  return 2.0 * static_cast<double>(lane) / static_cast<double>(lanes - 1) - 1;
+// Where the lanes stand across the needle: -1 .. 1.
+template <std::size_t kLanes>
+constexpr std::array<double, kLanes> places() {
+  std::array<double, kLanes> out{};
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    out[i] = 2.0 * static_cast<double>(i) / (kLanes - 1) - 1;
+  }
+  return out;
 }
 
 }  // namespace
 
 void NeedleShape::remove_mean_and_slope(Profile& p) {
-  double mean = 0, tilt = 0, xx = 0;
+  constexpr auto kPlaces = places<kLanes>();
+  double sum = 0, tilt = 0, xx = 0;
   for (std::size_t i = 0; i < kLanes; ++i) {
-    mean += p[i] / kLanes;
-    tilt += place(i, kLanes) * p[i];
-    xx += place(i, kLanes) * place(i, kLanes);
+    sum += p[i];
+    tilt += kPlaces[i] * p[i];
+    xx += kPlaces[i] * kPlaces[i];
   }
+  const double mean = sum / kLanes, slope = tilt / xx;
   for (std::size_t i = 0; i < kLanes; ++i) {
-    p[i] -= mean + tilt / xx * place(i, kLanes);
+    p[i] -= mean + slope * kPlaces[i];
   }
 }
 
-std::optional<NeedleShape::Profile> NeedleShape::profile(const GradientField& field, const Backdrop* backdrop,
-                                                         const NeedlePose& needle, double behind) const {
+// Empty near the border of the field.
+std::optional<NeedleShape::Profile> NeedleShape::light_across(const GradientField& field,
+                                                              const NeedlePose& needle, double behind) const {
+  constexpr auto kPlaces = places<kLanes>();
   const cv::Rect& a = field.area;
-  Profile v{}, without{};
-  double light = 0;
-  bool known = backdrop != nullptr;
-  for (std::size_t i = 0; i < kLanes; ++i) {
-    const Point p = needle.at(behind, place(i, kLanes) * reach_);
+  for (const double side : {-reach_, reach_}) {
+    const Point p = needle.at(behind, side);
     if (p.x < a.x + 1 || p.y < a.y + 1 || p.x > a.x + a.width - 2 || p.y > a.y + a.height - 2) {
       return std::nullopt;
     }
-    v[i] = field.grey(p);
-    light += v[i] / kLanes;
-    if (known) {
-      const auto g = backdrop->grey(p);
-      known = g && *g > 1;
-      without[i] = g.value_or(0);
+  }
+  Profile light{};
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    const Point p = needle.at(behind, kPlaces[i] * reach_);
+    light[i] = Bilinear(p.x - a.x, p.y - a.y).of(field.smooth);
+  }
+  return light;
+}
+
+NeedleShape::Profile NeedleShape::absorption(Profile light) {
+  const double usual = std::accumulate(light.begin(), light.end(), 0.0) / kLanes;
+  for (double& v : light) {
+    v /= std::max(usual, 1.0);
+  }
+  remove_mean_and_slope(light);
+  return light;
+}
+
+// Where the backdrop is not known, of the usual light.
+NeedleShape::Profile NeedleShape::absorption_over(const Backdrop& backdrop, const NeedlePose& needle,
+                                                  double behind, Profile light) const {
+  constexpr auto kPlaces = places<kLanes>();
+  Profile without{};
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    const auto g = backdrop.grey(needle.at(behind, kPlaces[i] * reach_));
+    if (!g || *g <= 1) {
+      return absorption(light);
     }
+    without[i] = *g;
   }
   for (std::size_t i = 0; i < kLanes; ++i) {
-    v[i] /= known ? without[i] : std::max(light, 1.0);
+    light[i] /= without[i];
   }
-  remove_mean_and_slope(v);
-  return v;
+  remove_mean_and_slope(light);
+  return light;
 }
 
 void NeedleShape::learn(const GradientField& field, const NeedlePose& needle) {
@@ -76,11 +105,11 @@ void NeedleShape::learn(const GradientField& field, const NeedlePose& needle) {
   }
   std::vector<Profile> now;
   for (int k = -kAhead; k <= kBehind; ++k) {
-    const auto v = profile(field, nullptr, needle, k * kStep_px);
-    if (!v) {
+    const auto light = light_across(field, needle, k * kStep_px);
+    if (!light) {
       break;
     }
-    now.push_back(*v);
+    now.push_back(absorption(*light));
   }
   if (now.size() < static_cast<std::size_t>(kAhead + kLeastShaft)) {
     return;
@@ -104,7 +133,7 @@ void NeedleShape::smooth_along_shaft() {
   const std::size_t tip = kAhead + (frames_ < kMemory / 2 ? 8 : 16);
   constexpr std::size_t kReach = 24, kStride = 4;  // steps: a speck is shorter
   constexpr double kBlur_px = 4;                   // ahead of the face
-  Profiles& shape = shape_.front();
+  Profiles& shape = shape_.front().rows;
   shape = mean_;
   std::vector<double> near;
   for (std::size_t k = tip; k < mean_.size(); ++k) {
@@ -127,11 +156,14 @@ void NeedleShape::smooth_along_shaft() {
     shape[k].fill(0);
   }
   for (std::size_t b = 1; b < shape_.size(); ++b) {
-    shape_[b] = blurred(kBlurs_px[b]);
+    shape_[b].rows = blurred(kBlurs_px[b]);
+  }
+  for (Look& look : shape_) {
+    look.arrange();
   }
 }
 
-// In three sums that do not wait for each other: this is where a frame's time goes.
+// In three sums that do not wait for each other.
 double NeedleShape::product(const Profile& a, const Profile& b) {
   static_assert(kLanes % 3 == 0);
   std::array<double, 3> sum{};
@@ -146,7 +178,7 @@ double NeedleShape::product(const Profile& a, const Profile& b) {
 // Blur does not move the middle of a step: there the walls have half of their strength. From the walls to
 // the front, so that a speck ahead of the tip does not count.
 std::optional<double> NeedleShape::face() const {
-  const Profiles& shape = shape_.front();
+  const Profiles& shape = shape_.front().rows;
   constexpr std::size_t kFrom = 6, kTo = 16;    // steps behind the face: the walls in full strength
   constexpr std::size_t kSurely = kAhead + 30;  // steps: there the shape shows walls however wrong the start
   if (shape.size() < kSurely + kTo) {
@@ -173,7 +205,7 @@ std::optional<double> NeedleShape::face() const {
 
 // The shape out of focus.
 NeedleShape::Profiles NeedleShape::blurred(double sigma_px) const {
-  Profiles out = shape_.front();
+  Profiles out = shape_.front().rows;
   const auto kernel = [](double sigma) {
     std::vector<double> k;
     double sum = 0;
@@ -217,53 +249,86 @@ NeedleShape::Profiles NeedleShape::blurred(double sigma_px) const {
   return out;
 }
 
-// What the picture shows, from the most forward end on; the j-th is j steps behind it. Up to the border.
-NeedleShape::Profiles NeedleShape::profiles(const GradientField& field, const Backdrop* backdrop,
-                                            const NeedlePose& needle, double ahead, int ends) const {
-  Profiles seen;
-  for (int j = -kAhead; j < ends + kBehind - kAhead; ++j) {
-    const auto v = profile(field, backdrop, needle, j * kStep_px - ahead);
-    if (!v) {
-      break;
+namespace {
+
+// What a row of power `power` in the shape tells for the needle. A speck or another edge may tell for or
+// against it no more than the needle itself.
+double gain_of_row(double product, double power) {
+  return std::min(std::max(product, -0.5 * power), 1.5 * power) - 0.5 * power;
+}
+
+}  // namespace
+
+void NeedleShape::Look::arrange() {
+  const std::size_t n = rows.size();
+  power.resize(n);
+  lanes.resize(kLanes * n);
+  for (std::size_t k = 0; k < n; ++k) {
+    const Profile& row = rows[n - 1 - k];
+    power[k] = product(row, row);
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      lanes[i * n + k] = row[i];
     }
-    seen.push_back(*v);
   }
-  return seen;
+}
+
+// Of a row of the picture with the n rows of the shape from the k-th on, the last one being the first.
+void NeedleShape::Look::products(const Profile& row, std::size_t k, std::size_t n, double* out) const {
+  constexpr std::size_t kAtOnce = 7;  // lanes: the compiler keeps them in registers
+  static_assert(kLanes % kAtOnce == 0);
+  std::fill_n(out, n, 0.0);
+  for (std::size_t i = 0; i < kLanes; i += kAtOnce) {
+    const std::size_t size = rows.size();
+    const double *r = row.data() + i, *lane = lanes.data() + i * size + k;
+    for (std::size_t q = 0; q < n; ++q) {
+      out[q] += r[0] * lane[q] + r[1] * lane[q + size] + r[2] * lane[q + 2 * size] +
+                r[3] * lane[q + 3 * size] + r[4] * lane[q + 4 * size] + r[5] * lane[q + 5 * size] +
+                r[6] * lane[q + 6 * size];
+    }
+  }
+}
+
+// Of the ends from..to - 1; the shape of the e-th end begins at the e-th row. This is where the needle's time
+// goes: row by row of the picture, all ends at once.
+std::vector<double> NeedleShape::gains(const Profiles& seen, const Look& look, int from, int to) {
+  const int n = static_cast<int>(seen.size()), last = static_cast<int>(look.rows.size()) - 1;
+  std::vector<double> gain(static_cast<std::size_t>(to - from), 0.0), sum(gain);
+  for (int j = from; j < n; ++j) {
+    const Profile& row = seen[static_cast<std::size_t>(j)];
+    // Of the ends so far ahead that the row lies behind their shape, the shaft goes on as the shape ends.
+    const int first = std::clamp(j - last, from, to), ends = std::min(to, j + 1) - first;
+    if (first > from) {
+      const double shaft = gain_of_row(product(row, look.rows.back()), look.power.front());
+      std::for_each(gain.begin(), gain.begin() + (first - from), [shaft](double& g) { g += shaft; });
+    }
+    if (ends > 0) {
+      const std::size_t k = static_cast<std::size_t>(last - j + first), many = static_cast<std::size_t>(ends);
+      look.products(row, k, many, sum.data());
+      double* of_ends = gain.data() + (first - from);
+      for (std::size_t q = 0; q < many; ++q) {
+        of_ends[q] += gain_of_row(sum[q], look.power[k + q]);
+      }
+    }
+  }
+  return gain;
 }
 
 NeedleShape::Fit NeedleShape::fit(const Profiles& seen, View view, int ends) const {
-  const Profiles& shape = shape_[view.blur];
-  const int n = static_cast<int>(seen.size());
-  std::vector<double> power;  // of the shape, step by step
-  for (const Profile& p : shape) {
-    power.push_back(product(p, p));
-  }
-  const int last_shape = static_cast<int>(shape.size()) - 1;
+  const Look& look = shape_[view.blur];
   Fit out;
   out.view = view;
-  out.gain.assign(static_cast<std::size_t>(ends), 0.0);
-  for (int e = 0; e < ends; ++e) {
-    for (int j = e; j < n; ++j) {
-      const std::size_t k = static_cast<std::size_t>(std::min(j - e, last_shape));
-      if (power[k] <= 0) {
-        continue;
-      }
-      const double dot = product(seen[static_cast<std::size_t>(j)], shape[k]);
-      // A speck or another edge may tell for or against it no more than the needle itself.
-      const double share = std::clamp(dot / power[k], -0.5, 1.5);
-      out.gain[static_cast<std::size_t>(e)] += power[k] * (share - 0.5);
-    }
-  }
+  out.gain = gains(seen, look, 0, ends);
   out.best = static_cast<int>(std::max_element(out.gain.begin(), out.gain.end()) - out.gain.begin());
   // What the surroundings of the needle show is noise to it. Variance of a lane: by the profiles ahead of
   // this end, and of what is left behind it.
   double sum = 0;
   int count = 0;
-  for (int j = 0; j < n && j - out.best < kLeastShaft; ++j) {
+  for (int j = 0; j < static_cast<int>(seen.size()) && j - out.best < kLeastShaft; ++j) {
     const int k = j - out.best;
+    const Profile of_shape =
+        k < 0 ? Profile{} : look.rows[std::min(static_cast<std::size_t>(k), look.rows.size() - 1)];
     for (std::size_t i = 0; i < kLanes; ++i, ++count) {
-      const double of_shape = k < 0 ? 0 : shape[static_cast<std::size_t>(std::min(k, last_shape))][i];
-      const double d = seen[static_cast<std::size_t>(j)][i] - of_shape;
+      const double d = seen[static_cast<std::size_t>(j)][i] - of_shape[i];
       sum += d * d;
     }
   }
@@ -271,26 +336,42 @@ NeedleShape::Fit NeedleShape::fit(const Profiles& seen, View view, int ends) con
   return out;
 }
 
+// first: of the first end.
+double NeedleShape::Fit::ahead_of(double first) const {
+  const auto at = [&](int e) { return gain[static_cast<std::size_t>(e)]; };
+  return first - (best + vertex_offset(at(best - 1), at(best), at(best + 1))) * kStep_px;
+}
+
 std::optional<NeedleShape::End> NeedleShape::end(const GradientField& field, const Backdrop& backdrop,
                                                  const NeedlePose& needle, double back, double ahead,
                                                  View near) const {
   const int ends = static_cast<int>((back + ahead) / kStep_px) + 1;
-  const Profiles plain = profiles(field, nullptr, needle, ahead, ends);
+  // A backdrop takes granules off, unless they have moved since; then it doubles them.
+  Profiles plain, over;
+  for (int j = -kAhead; j < ends + kBehind - kAhead; ++j) {
+    const double behind = j * kStep_px - ahead;
+    const auto light = light_across(field, needle, behind);
+    if (!light) {
+      break;
+    }
+    plain.push_back(absorption(*light));
+    over.push_back(absorption_over(backdrop, needle, behind, *light));
+  }
   if (!known() || static_cast<int>(plain.size()) < ends + kAhead + kLeastShaft) {
     return std::nullopt;
   }
-  // A backdrop takes granules off, unless they have moved since; then it doubles them.
-  const Profiles over = profiles(field, &backdrop, needle, ahead, ends);
   Fit best = fit(plain, {false, near.blur}, ends);
   if (Fit f = fit(over, {true, near.blur}, ends); f.variance < best.variance) {
     best = std::move(f);
   }
   const Profiles& seen = best.view.over_backdrop ? over : plain;
+  constexpr int kNear = 6;  // steps: another blur does not move the end further
   const auto better = [&](std::size_t blur) {
-    Fit f = fit(seen, {best.view.over_backdrop, blur}, ends);
-    const bool is = f.top() > best.top();
+    const auto near_best =
+        gains(seen, shape_[blur], std::max(best.best - kNear, 0), std::min(best.best + kNear + 1, ends));
+    const bool is = *std::max_element(near_best.begin(), near_best.end()) > best.top();
     if (is) {
-      best = std::move(f);
+      best = fit(seen, {best.view.over_backdrop, blur}, ends);
     }
     return is;
   };
@@ -303,36 +384,44 @@ std::optional<NeedleShape::End> NeedleShape::end(const GradientField& field, con
   return end_of(best, ahead);
 }
 
-std::optional<NeedleShape::End> NeedleShape::end_in(View view, const GradientField& field,
-                                                    const Backdrop& backdrop, const NeedlePose& needle,
-                                                    double back, double ahead) const {
-  const int ends = static_cast<int>((back + ahead) / kStep_px) + 1;
-  const Profiles seen = profiles(field, view.over_backdrop ? &backdrop : nullptr, needle, ahead, ends);
+std::optional<double> NeedleShape::end_near(View view, const GradientField& field, const Backdrop& backdrop,
+                                            const NeedlePose& needle, double reach) const {
+  const int ends = static_cast<int>(2 * reach / kStep_px) + 1;
+  Profiles seen;
+  for (int j = -kAhead; j < ends + kBehind - kAhead; ++j) {
+    const double behind = j * kStep_px - reach;
+    const auto light = light_across(field, needle, behind);
+    if (!light) {
+      break;
+    }
+    seen.push_back(view.over_backdrop ? absorption_over(backdrop, needle, behind, *light)
+                                      : absorption(*light));
+  }
   if (!known() || static_cast<int>(seen.size()) < ends + kAhead + kLeastShaft) {
     return std::nullopt;
   }
-  return end_of(fit(seen, view, ends), ahead);
+  const Fit f = fit(seen, view, ends);
+  return f.inside() ? std::optional(f.ahead_of(reach)) : std::nullopt;
 }
 
 std::optional<NeedleShape::End> NeedleShape::end_of(const Fit& f, double ahead) {
-  const int ends = static_cast<int>(f.gain.size()), best = f.best;
-  if (best < 2 || best > ends - 3) {
+  if (!f.inside()) {
     return std::nullopt;
   }
+  const int ends = static_cast<int>(f.gain.size());
   const double unit = kJoined * std::max(f.variance, 1e-8);
-  const auto at = [&](int e) { return f.gain[static_cast<std::size_t>(e)] / unit; };
-  if (at(best) - at(0) < kClear || at(best) - at(ends - 1) < kClear) {
+  const auto below_best = [&](int e) { return (f.top() - f.gain[static_cast<std::size_t>(e)]) / unit; };
+  if (below_best(0) < kClear || below_best(ends - 1) < kClear) {
     return std::nullopt;
   }
   End out;
   out.view = f.view;
   for (int e = 0; e < ends; ++e) {
-    if (at(best) - at(e) < kDoubt) {
-      out.doubt = std::max(out.doubt, std::abs(e - best) * kStep_px);
+    if (below_best(e) < kDoubt) {
+      out.doubt = std::max(out.doubt, std::abs(e - f.best) * kStep_px);
     }
   }
-  const double peak = best + vertex_offset(at(best - 1), at(best), at(best + 1));
-  out.ahead = ahead - peak * kStep_px;
+  out.ahead = f.ahead_of(ahead);
   return out;
 }
 

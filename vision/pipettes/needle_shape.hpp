@@ -39,9 +39,10 @@ class NeedleShape {
   // The views near the given one are tried.
   [[nodiscard]] std::optional<End> end(const GradientField& field, const Backdrop& backdrop,
                                        const NeedlePose& needle, double back, double ahead, View near) const;
-  // In this view alone.
-  [[nodiscard]] std::optional<End> end_in(View view, const GradientField& field, const Backdrop& backdrop,
-                                          const NeedlePose& needle, double back, double ahead) const;
+  // How far ahead of the tip an end is, px, that is known to be within `reach` px of it. In this view alone.
+  [[nodiscard]] std::optional<double> end_near(View view, const GradientField& field,
+                                               const Backdrop& backdrop, const NeedlePose& needle,
+                                               double reach) const;
 
  private:
   static constexpr int kReliable = 8;  // frames
@@ -52,29 +53,40 @@ class NeedleShape {
   using Profiles = std::vector<Profile>;  // every half pixel along the needle, from ahead of the tip
   [[nodiscard]] static double product(const Profile& a, const Profile& b);
   static void remove_mean_and_slope(Profile& p);
-  // backdrop: null: the picture as it is.
-  [[nodiscard]] std::optional<Profile> profile(const GradientField& field, const Backdrop* backdrop,
-                                               const NeedlePose& needle, double behind) const;
-  [[nodiscard]] Profiles profiles(const GradientField& field, const Backdrop* backdrop,
-                                  const NeedlePose& needle, double ahead, int ends) const;
+  [[nodiscard]] std::optional<Profile> light_across(const GradientField& field, const NeedlePose& needle,
+                                                    double behind) const;
+  [[nodiscard]] static Profile absorption(Profile light);
+  [[nodiscard]] Profile absorption_over(const Backdrop& backdrop, const NeedlePose& needle, double behind,
+                                        Profile light) const;
   [[nodiscard]] Profiles blurred(double sigma_px) const;
 
+  // The shape in one sharpness.
+  struct Look {
+    Profiles rows;
+    std::vector<double> power;  // of the rows, the last one first
+    std::vector<double> lanes;  // the rows lane by lane, in each the last row first
+    void arrange();             // power and lanes
+    void products(const Profile& row, std::size_t k, std::size_t n, double* out) const;
+  };
   struct Fit {
     std::vector<double> gain;  // of each end, over no needle; in squares of the absorption
     int best = 0;
     double variance = 0;  // of a lane, once the needle is taken off
     View view;
     [[nodiscard]] double top() const { return gain[static_cast<std::size_t>(best)]; }
+    [[nodiscard]] bool inside() const { return best >= 2 && best + 3 <= static_cast<int>(gain.size()); }
+    [[nodiscard]] double ahead_of(double first) const;
   };
+  [[nodiscard]] static std::vector<double> gains(const Profiles& seen, const Look& look, int from, int to);
   [[nodiscard]] Fit fit(const Profiles& seen, View view, int ends) const;
   [[nodiscard]] static std::optional<End> end_of(const Fit& fit, double ahead);
 
   // The shape without what lay beside the needle in a few frames only.
   void smooth_along_shaft();
 
-  double reach_ = 0;               // to either side of the axis, px
-  Profiles mean_;                  // of the frames
-  std::array<Profiles, 6> shape_;  // likewise, without specks; ever less sharp
+  double reach_ = 0;           // to either side of the axis, px
+  Profiles mean_;              // of the frames
+  std::array<Look, 6> shape_;  // likewise, without specks; ever less sharp
   int frames_ = 0;
 };
 

@@ -41,11 +41,4 @@ void draw_mask(cv::Mat& mask, const std::vector<Polygon>& polygons) {
   }
 }
 
-void erase(cv::Mat& edge, const cv::Mat& mask, cv::Point offset) {
-  const cv::Rect part = cv::Rect(offset, edge.size()) & cv::Rect(0, 0, mask.cols, mask.rows);
-  if (part.size() == edge.size()) {
-    edge.setTo(cv::Scalar(0), mask(part));
-  }
-}
-
 }  // namespace punctum::vision

@@ -18,7 +18,5 @@ using Polygon = std::vector<Point>;
 
 // Sets the pixels of the polygons in mask (CV_8U) to 255.
 void draw_mask(cv::Mat& mask, const std::vector<Polygon>& polygons);
-// Sets the masked pixels of an edge picture (CV_32F) to 0. offset: of the edge picture in the mask.
-void erase(cv::Mat& edge, const cv::Mat& mask, cv::Point offset);
 
 }  // namespace punctum::vision

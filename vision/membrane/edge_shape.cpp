@@ -27,7 +27,8 @@ constexpr double kTukey = 4.7;          // times the scale: 95 % efficiency for 
 constexpr double kLeastScale_px = 0.05;
 constexpr double kSoft = 0.02;       // of the stiffness, where the membrane may have any shape
 constexpr double kGainReach = 0.04;  // of the circumference to either side, over which contrast is averaged
-constexpr double kLeastLeft = 0.2, kMostTrust = 3;
+// A place follows the samples that tell it, so that little is left of what they err by.
+constexpr double kMostTrust = 3;
 constexpr double kGrain = 0.6;  // per point, for granules of about 2 px
 constexpr double kSampledNoise =
     0.5;                         // of its variance, once samples between pixels and weights have taken theirs
@@ -361,8 +362,7 @@ bool CommonShape::place(std::size_t i, double shape_energy, std::vector<double>&
       const double slope = g * steep[j] + mean_slope, pulled = trust[j] * slope;
       const double rest = grey[j] - level - g * (shape[j] - step * steep[j]);
       doubted += pulled * pulled;
-      // The place follows the samples that tell it, so that little is left of what they err by.
-      square[j] += rest * rest / std::max(1 - pulled * slope / told, kLeastLeft);
+      square[j] += rest * rest;
       ++count[j];
     }
   }

@@ -16,7 +16,7 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr int kCircles = 6;            // candidates that are tried
+constexpr int kCircles = 6;  // candidates that are tried
 constexpr double kHalo = 1.4;
 constexpr double kCircleScore = 0.35;  // share of a circumference that must have voted
 

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
+#include <random>
+#include <string>
+#include <vector>
 
 #include "vision/events/contact.hpp"
 #include "vision/events/puncture.hpp"
@@ -85,6 +88,50 @@ TEST(Impurities, are_small_components_away_from_the_membrane) {
                             [](int n, const PixelRun& run) { return n + run.to - run.from; }),
             36);
   EXPECT_EQ(find_impurities(cv::Mat(), {}, 20, 6, 4, pixels), 0);
+}
+
+TEST(Components, touch_at_corners_and_join_from_both_sides) {
+  const auto drawn = [](const std::vector<std::string>& rows) {
+    cv::Mat m(static_cast<int>(rows.size()), static_cast<int>(rows[0].size()), CV_8U, cv::Scalar(0));
+    for (int y = 0; y < m.rows; ++y) {
+      for (int x = 0; x < m.cols; ++x) {
+        m.at<std::uint8_t>(y, x) =
+            rows[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)] == '#' ? 255 : 0;
+      }
+    }
+    return m;
+  };
+  EXPECT_EQ(components_of(drawn({"#...", ".#..", "..#.", "...#"})).box.size(), 1u);
+  EXPECT_EQ(components_of(drawn({"..#", ".#.", "#.."})).box.size(), 1u);
+  EXPECT_EQ(components_of(drawn({"#..#", "#..#", ".##."})).box.size(), 1u);
+  const Components two = components_of(drawn({"##..#", "....#", "##.##"}));
+  ASSERT_EQ(two.box.size(), 3u);
+  EXPECT_EQ(two.box[1], cv::Rect(3, 0, 2, 3));
+  EXPECT_EQ(two.pixels[1], 4);
+}
+
+// Against OpenCV's, on random pictures.
+TEST(Components, are_those_of_another_labelling) {
+  std::mt19937 random(1);
+  for (int k = 0; k < 60; ++k) {
+    cv::Mat m(17 + k % 5, 23, CV_8U);
+    for (int y = 0; y < m.rows; ++y) {
+      for (int x = 0; x < m.cols; ++x) {
+        m.at<std::uint8_t>(y, x) = random() % 100 < static_cast<unsigned>(15 + k) ? 255 : 0;
+      }
+    }
+    cv::Mat labels, stats, centres;
+    const int n = cv::connectedComponentsWithStats(m, labels, stats, centres, 8, CV_32S);
+    const Components all = components_of(m);
+    ASSERT_EQ(all.box.size(), static_cast<std::size_t>(n - 1)) << k;
+    for (const PixelRun& run : all.runs) {
+      const int label = labels.at<int>(run.y, run.from);
+      EXPECT_EQ(all.pixels[run.component], stats.at<int>(label, cv::CC_STAT_AREA));
+      EXPECT_EQ(all.box[run.component].width, stats.at<int>(label, cv::CC_STAT_WIDTH));
+      EXPECT_EQ(all.box[run.component].tl(),
+                cv::Point(stats.at<int>(label, cv::CC_STAT_LEFT), stats.at<int>(label, cv::CC_STAT_TOP)));
+    }
+  }
 }
 
 // 40 ms frames; depth of tip and membrane past the undeformed membrane, px.

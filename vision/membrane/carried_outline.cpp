@@ -20,7 +20,7 @@ constexpr double kBroken = 3;       // mean squared surprise, over its variance,
 constexpr double kFar = 9;          // a larger surprise is no noise
 constexpr double kPushed_px = 0.1;  // an angle that a needle may change by more tells nothing of the cell
 // By which the shape of a cell changes in a frame, sd: at first, and within which it is learnt, and how fast.
-constexpr double kChange_px = 0.05, kLeastChange_px = 0.01, kMostChange_px = 0.3, kLearnt = 0.1;
+constexpr double kChange_px = 0.05, kLeastChange_px = 0.01, kMostChange_px = 0.3, kChangeLearnt = 0.1;
 
 }  // namespace
 
@@ -56,7 +56,7 @@ void CarriedOutline::update(const SeenOutline& seen, const std::vector<double>& 
       still += 1;
     }
   }
-  change_ = std::clamp(change_ + kLearnt * more_than_expected / std::max(still, 1.0),
+  change_ = std::clamp(change_ + kChangeLearnt * more_than_expected / std::max(still, 1.0),
                        kLeastChange_px * kLeastChange_px, kMostChange_px * kMostChange_px);
   constexpr std::size_t kReach = 7;  // angles
   double sum = 0;

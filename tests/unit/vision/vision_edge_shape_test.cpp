@@ -149,7 +149,7 @@ TEST(EdgeShape, averages_the_noise_out_round_the_cell) {
 }
 
 // Granules of 1.8 px, as in a yolk.
-cv::Mat granular(cv::Mat m, double sd, unsigned seed) {
+cv::Mat granular(const cv::Mat& m, double sd, unsigned seed) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal(0, 1);
   cv::Mat grains(kSide, kSide, CV_32F);

@@ -57,7 +57,7 @@ class ProfileTracer {
 
   // False: the profile at the border is flat.
   bool learn_at_border(double strip) {
-    learnt_ = profile(tube_.root, strip * 0.8);
+    learnt_ = profile(tube_.root, strip * 0.8, n_, 1);
     contrast_ = normalise(learnt_);
     return contrast_ > 0;
   }
@@ -94,7 +94,7 @@ class ProfileTracer {
 
  private:
   void step(double s);
-  [[nodiscard]] std::vector<double> profile(const Point& at, double length) const;
+  [[nodiscard]] std::vector<double> profile(const Point& at, double length, int samples, double apart) const;
 
   const GradientField& field_;
   const TubeTrace& tube_;
@@ -106,14 +106,15 @@ class ProfileTracer {
   std::vector<double> along_, shift_, similarity_;
 };
 
-std::vector<double> ProfileTracer::profile(const Point& at, double length) const {
+// Mean grey over `length` px along the tube; across it, at samples that are `apart` px apart, about `at`.
+std::vector<double> ProfileTracer::profile(const Point& at, double length, int samples, double apart) const {
   const cv::Rect& a = field_.area;
-  std::vector<double> v(static_cast<std::size_t>(n_), 0.0);
+  std::vector<double> v(static_cast<std::size_t>(samples), 0.0);
   int stations = 0;
   for (double k = 0; k < length; k += kAlongStep_px) {
     ++stations;
-    for (int i = 0; i < n_; ++i) {
-      Point q = at + k * tube_.axis + (i - n_ / 2) * across_;
+    for (int i = 0; i < samples; ++i) {
+      Point q = at + k * tube_.axis + (i - samples / 2) * apart * across_;
       q.y = std::clamp(q.y, a.y + 0.0, a.y + a.height - 1.001);
       q.x = std::clamp(q.x, a.x + 0.0, a.x + a.width - 1.001);
       v[static_cast<std::size_t>(i)] += field_.grey(q);
@@ -126,10 +127,18 @@ std::vector<double> ProfileTracer::profile(const Point& at, double length) const
 }
 
 void ProfileTracer::step(double s) {
+  constexpr int kHalfPixels = 4;  // that it is looked for to either side
   double top = -2, at = lateral_, top_contrast = 0;
   std::vector<double> top_profile;
-  for (double dl = -2; dl <= 2; dl += 0.5) {
-    std::vector<double> v = profile(tube_.root + s * tube_.axis + (lateral_ + dl) * across_, kWindow_px);
+  // The profiles at all these places share their samples.
+  const std::vector<double> wide = profile(tube_.root + s * tube_.axis + lateral_ * across_, kWindow_px,
+                                           2 * (n_ - 1) + 2 * kHalfPixels + 1, 0.5);
+  std::vector<double> v(static_cast<std::size_t>(n_));
+  for (int aside = -kHalfPixels; aside <= kHalfPixels; ++aside) {
+    const double dl = 0.5 * aside;
+    for (int i = 0; i < n_; ++i) {
+      v[static_cast<std::size_t>(i)] = wide[static_cast<std::size_t>(2 * i + aside + kHalfPixels)];
+    }
     const double strength = normalise(v);
     if (!(strength > 0)) {
       continue;

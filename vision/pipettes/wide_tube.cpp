@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <numeric>
 #include <opencv2/core.hpp>
-#include <tuple>
 #include <vector>
 
 #include "vision/image/parabola.hpp"
@@ -34,20 +33,29 @@ struct Stations {
 };
 
 // What a wall looks like across the tube, without its mean: grey levels at equal steps.
-constexpr double kAcross_px = 4, kWallStep_px = 0.5;
-using WallProfile = std::array<double, 17>;
-static_assert(kAcross_px / kWallStep_px * 2 + 1 == std::tuple_size_v<WallProfile>);
+constexpr double kWallStep_px = 0.5;
+constexpr std::size_t kWallSamples = 17;
+using WallProfile = std::array<double, kWallSamples>;
+constexpr std::size_t kBeside = 6;  // steps to either side, in which a wall is looked for at the next station
 
-WallProfile wall_at(const GradientField& field, const Point& p, const Point& along, const Point& across) {
-  WallProfile out{};
-  double mean = 0;
-  for (std::size_t i = 0; i < out.size(); ++i) {
-    const Point q = p + (static_cast<double>(i) * kWallStep_px - kAcross_px) * across;
+template <std::size_t samples>
+std::array<double, samples> greys_across(const GradientField& field, const Point& p, const Point& along,
+                                         const Point& across) {
+  std::array<double, samples> out{};
+  for (std::size_t i = 0; i < samples; ++i) {
+    const double u = (static_cast<double>(i) - static_cast<double>(samples / 2)) * kWallStep_px;
+    const Point q = p + u * across;
     out[i] = 0.5 * (field.grey(q - 0.4 * along) + field.grey(q + 0.4 * along));
-    mean += out[i] / static_cast<double>(out.size());
   }
-  for (double& grey : out) {
-    grey -= mean;
+  return out;
+}
+
+WallProfile without_mean(const double* grey) {
+  WallProfile out{};
+  std::copy_n(grey, out.size(), out.begin());
+  const double mean = std::accumulate(out.begin(), out.end(), 0.0) / static_cast<double>(out.size());
+  for (double& g : out) {
+    g -= mean;
   }
   return out;
 }
@@ -56,7 +64,7 @@ double dot(const WallProfile& a, const WallProfile& b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
 }
 
-// Follows both outer edges, each within 3 px of where it was, by what they look like at the border. The tube
+// Follows both outer edges, each near where it was, by what they look like at the border. The tube
 // ends where the sum of (similarity - kContinued) is largest. Empty when it does not end in the picture.
 std::optional<Stations> follow_edges(const GradientField& field, const TubeTrace& t, const Point& across) {
   std::array<double, 2> at{-t.half_width, t.half_width};
@@ -64,7 +72,8 @@ std::optional<Stations> follow_edges(const GradientField& field, const TubeTrace
   for (std::size_t k = 0; k < 2; ++k) {
     for (std::size_t i = 0; i < kUsualStations; ++i) {
       const double s = static_cast<double>(i) * kStride_px;
-      const WallProfile wall = wall_at(field, t.root + s * t.axis + at[k] * across, t.axis, across);
+      const WallProfile wall = without_mean(
+          greys_across<kWallSamples>(field, t.root + s * t.axis + at[k] * across, t.axis, across).data());
       for (std::size_t j = 0; j < wall.size(); ++j) {
         usual[k][j] += wall[j] / kUsualStations;
       }
@@ -81,12 +90,14 @@ std::optional<Stations> follow_edges(const GradientField& field, const TubeTrace
     std::array<double, 2> place = at, like{-1, -1};
     for (std::size_t k = 0; k < 2; ++k) {
       WallProfile most{};
-      for (double du = -3; du <= 3; du += kWallStep_px) {
-        const WallProfile wall = wall_at(field, t.root + s * t.axis + (at[k] + du) * across, t.axis, across);
+      const auto greys = greys_across<kWallSamples + 2 * kBeside>(field, t.root + s * t.axis + at[k] * across,
+                                                                  t.axis, across);
+      for (std::size_t i = 0; i <= 2 * kBeside; ++i) {
+        const WallProfile wall = without_mean(greys.data() + i);
         const double as_usual = dot(wall, usual[k]) / dot(usual[k], usual[k]);
         if (as_usual > like[k]) {
           like[k] = as_usual;
-          place[k] = at[k] + du;
+          place[k] = at[k] + (static_cast<double>(i) - static_cast<double>(kBeside)) * kWallStep_px;
           most = wall;
         }
       }

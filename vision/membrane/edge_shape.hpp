@@ -37,7 +37,7 @@ struct EdgeLearnt {
 };
 
 // soft: per point of the contour, 1 where the membrane may have any shape (beside the needle), 0 elsewhere.
-// Empty where too little is seen, or where the edge does not look alike all round. scatter: takes this frame
+// Empty where too little is seen, or where the edge does not look alike all round. learnt: takes this frame
 // in.
 [[nodiscard]] std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Contour& contour,
                                                      const std::vector<double>& soft, const EdgeShape& edge,

@@ -30,10 +30,10 @@ constexpr double kGainReach = 0.04;  // of the circumference to either side, ove
 // A place follows the samples that tell it, so that little is left of what they err by.
 constexpr double kMostTrust = 3;
 constexpr double kGrain = 0.6;  // per point, for granules of about 2 px
-constexpr double kSampledNoise =
-    0.5;                         // of its variance, once samples between pixels and weights have taken theirs
-constexpr double kClip = 1.3;    // times the spread: Huber's limit
-constexpr double kBeside = 0.1;  // weight of a place beside a line that is not its own
+// Of the variance of the noise: samples between pixels and the weights of the places leave so much.
+constexpr double kSampledNoise = 0.5;
+constexpr double kClip = 1.3;        // times the spread: Huber's limit
+constexpr double kBeside = 0.1;      // weight of a place beside a line that is not its own
 constexpr double kCommon_px = 0.03;  // sd of what is wrong alike all round: the steps are no perfect model
 constexpr double kShapeNoise = 0.5;  // grey levels: what the common shape itself is worth
 constexpr double kHalo_px = 0.1;     // sd by which a halo may shift the whole contour
@@ -190,9 +190,8 @@ class CommonShape {
   const std::vector<std::uint8_t>& beside_;
   double modes_, least_lasting_;
   std::vector<double> shape_;
-  std::vector<double> trust_;  // per sample: the less other things differ there, the more
-  std::vector<double>
-      spread_;  // per sample: what single profiles differ from it by, grey levels; empty: not known
+  std::vector<double> trust_;   // per sample: the less other things differ there, the more
+  std::vector<double> spread_;  // per sample, of single profiles about it, grey levels; empty: not known
   std::vector<double> place_, raw_, weight_, gain_, gain_raw_;
   std::vector<double> robust_, stiffness_;  // of the smoothing that gave the places
   std::vector<double> noise_;               // variance of a raw place for noise of one grey level, px^2

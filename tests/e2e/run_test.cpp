@@ -324,9 +324,11 @@ TEST_F(Programs, every_program_tells_its_version_and_commit) {
 TEST_F(Programs, explain_says_what_runs_and_what_is_left_out) {
   ASSERT_EQ(punctum({"explain", "icsi"}), 0);
   for (const char* word : {"punctum-core", "punctum-vision", "SCHED_FIFO 80", "1000 Hz", "membrane",
-                           "cone guide", "withdrawal axis", "damping", "snake", "25 per s"}) {
+                           "cone guide", "withdrawal axis", "damping", "256 points", "25 per s"}) {
     EXPECT_NE(said_.find(word), std::string::npos) << word;
   }
+  ASSERT_EQ(punctum({"explain", "icsi", "--set", "vision.method=paper"}), 0);
+  EXPECT_NE(said_.find("snake, 16 nodes"), std::string::npos);
   ASSERT_EQ(punctum({"explain", "free"}), 0);
   EXPECT_EQ(said_.find("punctum-vision"), std::string::npos);
   EXPECT_NE(said_.find("left out"), std::string::npos);

@@ -248,11 +248,12 @@ std::string frame_text(const Scene& s) {
   if (v.method == vision::Method::truth) {
     return out + "  truth                 the simulated world's own; no picture is drawn or looked at\n";
   }
-  out += fmt::format("  {}{}impurities, outer membrane{} (snake, {} nodes{}), {}w_d, a, R\n",
+  out += fmt::format("  {}{}impurities, outer membrane{} ({}), {}w_d, a, R\n",
                      v.holder ? "holding pipette (correlation), " : "",
                      v.needle ? "injection pipette and tip, erase pipettes, " : "",
-                     v.inner ? " and inner membrane" : "", v.snake.nodes,
-                     v.method == vision::Method::tracker ? ", refined" : "",
+                     v.inner ? " and inner membrane" : "",
+                     v.method == vision::Method::tracker ? fmt::format("{} points", v.contour_points)
+                                                         : fmt::format("snake, {} nodes", v.snake.nodes),
                      v.needle ? "contact, puncture, " : "");
   if (v.surface) {
     out += "  control nets of the membranes' surfaces\n";

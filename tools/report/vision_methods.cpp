@@ -46,14 +46,6 @@ std::vector<VisionMethod> vision_methods() {
        },
        1,
        static_cast<double>(shipped.contour_points)},
-      {"closed path (finer snake)",
-       "{} nodes",
-       {32, 64, 128},
-       {64},
-       [](VisionConfig c, double nodes, int w, int h) {
-         c.snake.nodes = static_cast<int>(nodes);
-         return tracked(c, w, h);
-       }},
       {"closed path (outer only)",
        "{} angles",
        {256},

@@ -2,8 +2,7 @@
 // every angle, and smoothed where nothing is seen.
 //
 // The greedy snake with 16 nodes cannot follow a dimple: its spline is 2 um away from a dimple 10 um deep.
-// The snake gives the start and the motion from frame to frame; the closed path gives the contour that is
-// measured.
+// The tracker measures the closed path.
 #pragma once
 
 #include <cstdint>

@@ -18,6 +18,7 @@ constexpr double kDimpleReach = 6;   // half-widths of the needle to either side
 constexpr double kAbove_px = 4;      // above the outline at rest
 constexpr double kPast_px = 1;       // past the tip
 constexpr double kDepthStep_px = 1;  // the blur is wider
+constexpr int kLeastReach = 8;       // rays to either side: a thin needle hides two or three
 constexpr int kLeastRays = 6;        // fewer tell nothing
 constexpr double kModel = 0.08;      // variance of an edge that looks unusual, in squared usual edges
 constexpr double kJoined_px = 3.5;   // along the membrane, by the smoothing
@@ -29,7 +30,8 @@ constexpr double kSinking = 4;     // log odds against each px of it
 constexpr double kThrough = 12;    // log odds that a membrane is not on the tip that went through it
 constexpr double kStays = 3;       // log odds that it stays on the tip, or off it, for a frame
 constexpr double kSteepest = 1.8;  // slope of a wall that ends at its width; the needle hides a steeper one
-constexpr double kFreeHalf_px = 7;  // half-width of the band
+constexpr double kFreeHalf_px = 7;    // half-width of the band
+constexpr double kWithinHalf_px = 4;  // of an inner membrane's: granules are near
 
 // A flat bottom with a logarithmic wall is what a stretched membrane has; the others end at their width.
 struct Shape {
@@ -71,15 +73,16 @@ class Dimples {
         spacing_(s_.usual_r * 2 * std::numbers::pi / s_.angles) {
     const NeedlePose& n = s_.surroundings.needle;
     if (const auto entry = entry_point(outline_, n.tip, n.axis)) {
-      deepest_ = (n.tip - *entry).dot(n.axis);
+      depth_of_tip_ = (n.tip - *entry).dot(n.axis);
       meets_the_cell_ = true;
       entry_ = polar_index(*entry - s_.band.centre, s_.angles);
-      reach_ = std::min(static_cast<int>(kDimpleReach * n.half_width / spacing_), s_.angles / 8);
+      reach_ =
+          std::clamp(static_cast<int>(kDimpleReach * n.half_width / spacing_), kLeastReach, s_.angles / 8);
     }
   }
 
   [[nodiscard]] bool meets_the_cell() const { return meets_the_cell_; }
-  [[nodiscard]] double deepest() const { return deepest_; }
+  [[nodiscard]] double depth_of_tip() const { return depth_of_tip_; }
   [[nodiscard]] std::optional<double> evidence(const Shape& shape, double depth) const;
   [[nodiscard]] Contour contour(const Shape& shape, double depth) const {
     Contour out;
@@ -101,7 +104,7 @@ class Dimples {
   const MembraneSearch& s_;
   Contour outline_;
   double spacing_;  // px between two points
-  double deepest_ = 0;
+  double depth_of_tip_ = 0;
   bool meets_the_cell_ = false;
   int entry_ = 0;  // index of the angle
   int reach_ = 0;
@@ -115,7 +118,11 @@ std::optional<double> Dimples::evidence(const Shape& shape, double depth) const 
         here = point(share_of_depth(shape, from_entry(entry_ - reach_)), depth, entry_ - reach_);
   for (int i = entry_ - reach_; i <= entry_ + reach_; ++i) {
     const Point next = point(share_of_depth(shape, from_entry(i + 1)), depth, i + 1);
-    if (!s_.picture.hidden(here)) {
+    const std::size_t k = static_cast<std::size_t>((i % s_.angles + s_.angles) % s_.angles);
+    if (!s_.band.upper.empty() && cv::norm(here - s_.band.centre) > s_.band.upper[k]) {
+      sum -= 0.5;
+      ++rays;
+    } else if (!s_.picture.hidden(here)) {
       // The outside is on the left of a contour of rising angle, with y down.
       const Point along = next - last;
       const double edge =
@@ -140,15 +147,28 @@ std::optional<SeenDimple> likeliest_dimple(const MembraneSearch& search) {
   if (!dimples.meets_the_cell()) {
     return std::nullopt;
   }
-  const double on_tip_from = dimples.deepest() - std::max(kOnTip_px, kOnTip * dimples.deepest());
+  const FollowedMembrane &m = search.m, *around = search.surroundings.around;
+  const bool within = !search.surroundings.outermost;
+  const bool punctured = search.surroundings.punctured || (around && !around->held);  // the outer one
+  const double tip = dimples.depth_of_tip();
+  double deepest = tip, on_tip_from = tip - std::max(kOnTip_px, kOnTip * tip);
+  // The outer membrane pushes an inner one before the tip does, until it gives way.
+  const bool by_the_outer = within && !punctured;
+  if (within) {
+    deepest = std::max(tip, punctured ? m.dimple_px : around ? around->dimple_px : 0);
+    on_tip_from = punctured ? std::max(on_tip_from, kTip_px) : -kAbove_px - 1;
+  }
+  if (deepest < 1) {
+    return std::nullopt;
+  }
   std::optional<SeenDimple> pushed, free;
   std::array<double, kDimpleShapes> best;
   best.fill(-1e9);
   for (std::size_t k = 0; k < kDimpleShapes; ++k) {
-    for (double depth = -kAbove_px; depth <= dimples.deepest() + kPast_px; depth += kDepthStep_px) {
+    for (double depth = -kAbove_px; depth <= deepest + kPast_px; depth += kDepthStep_px) {
       // What the needle does not push does not sink.
-      const double sunk = search.m.held ? 0 : std::max(0.0, depth - search.m.dimple_px);
-      if (sunk > kSinks_px && (search.surroundings.punctured || depth <= on_tip_from)) {
+      const double sunk = m.held ? 0 : std::max(0.0, depth - m.dimple_px);
+      if (sunk > kSinks_px && (punctured || depth <= on_tip_from)) {
         continue;
       }
       if (steepness(kShapes[k]) * depth > kSteepest * search.surroundings.needle.half_width) {
@@ -159,21 +179,19 @@ std::optional<SeenDimple> likeliest_dimple(const MembraneSearch& search) {
         continue;
       }
       const bool on_tip = depth > on_tip_from;
-      if (depth > dimples.deepest() - kTip_px) {
+      if (by_the_outer || depth > deepest - kTip_px) {
         best[k] = std::max(best[k], *evidence);
       }
       std::optional<SeenDimple>& kept = on_tip ? pushed : free;
-      const double with_odds = *evidence + search.m.dimple_odds[k] - (on_tip ? 0 : kSinking * sunk);
+      const double with_odds = *evidence + m.dimple_odds[k] - (on_tip ? 0 : kSinking * sunk);
       if (!kept || with_odds > kept->evidence) {
-        kept = SeenDimple{depth, with_odds, k, on_tip, search.m.dimple_odds};
+        kept = SeenDimple{depth, with_odds, k, on_tip, m.dimple_odds};
       }
     }
   }
-  if (!pushed || !free) {
-    return pushed ? pushed : free;
-  }
-  const double on_tip = search.surroundings.punctured ? -kThrough : search.m.held ? kStays : -kStays;
-  if (pushed->evidence + on_tip < free->evidence) {
+  const bool through = punctured && !(within && m.held);
+  const double on_tip = through ? -kThrough : m.held && !punctured ? kStays : -kStays;
+  if (!pushed || (free && pushed->evidence + on_tip < free->evidence)) {
     return free;
   }
   // A dimple keeps its shape while it grows, and while it goes back.
@@ -194,7 +212,7 @@ EdgeBand band_along(const MembraneSearch& search, const SeenDimple& dimple) {
     const double weight = std::clamp((1.1 - search.from_needle(i)) / 0.3, 0.0, 1.0);
     out.middle[k] += weight * (r[k] - out.middle[k]);
   }
-  out.half_width = std::min(out.half_width, kFreeHalf_px);
+  out.half_width = std::min(out.half_width, search.surroundings.outermost ? kFreeHalf_px : kWithinHalf_px);
   return out;
 }
 

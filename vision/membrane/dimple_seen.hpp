@@ -1,4 +1,4 @@
-// Whether the needle pushes the outer membrane or is through it, told by the picture alone: of dimples of all
+// Whether the needle pushes a membrane or is through it, told by the picture alone: of dimples of all
 // depths and of several shapes, which has the edge of the membrane along it.
 #pragma once
 

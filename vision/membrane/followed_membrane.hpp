@@ -21,7 +21,7 @@ struct FollowedMembrane {
   std::vector<double> r;  // px per angle
   Polarity polarity = Polarity::any;
   double level = 0;  // usual edge along it, grey levels per px
-  Contour nodes;     // of the snake
+  Contour nodes;     // of the paper's snake
   RestOutline rest;
   CarriedOutline carried;
   EdgeLearnt edge;

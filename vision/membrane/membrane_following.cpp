@@ -7,48 +7,18 @@
 #include <utility>
 
 #include "vision/image/median.hpp"
-#include "vision/image/snake.hpp"
-#include "vision/image/spline.hpp"
 #include "vision/membrane/edge_shape.hpp"
 
 namespace punctum::vision {
 
 namespace {
 
-constexpr double kMotionMax_px = 2.0;    // of the whole membrane, per frame and direction
-constexpr double kMotionLeast_px = 1.2;  // the nodes are on whole pixels: less is no motion
-constexpr double kOuterModes = 12;       // periods round the cell: finer waves a stiff shell does not have
-constexpr double kInnerModes = 9;        // granules beside the inner membrane look like waves of it
+constexpr double kOuterModes = 12;  // periods round the cell: finer waves a stiff shell does not have
+constexpr double kInnerModes = 9;   // granules beside the inner membrane look like waves of it
 constexpr double kGranules = 0.75;  // of the variance of its places, at least: they are inside every cell
 constexpr double kWallTolerance = 0.15;  // of the wall's thickness: cells differ from the scene's
 constexpr double kSoftHalf = 1.2;        // rad to either side of the entry: where a dimple bends the membrane
 constexpr double kNeedleHalf = 1.2;      // rad to either side of the entry: what a needle may dent
-
-// One evolution of the snake, in the coordinates of the whole picture.
-Contour snake_from(const Contour& nodes, const ClearedPicture& picture, const SnakeParams& params) {
-  const Point offset(picture.field.area.x, picture.field.area.y);
-  Contour local = nodes;
-  for (Point& p : local) {
-    p -= offset;
-  }
-  local = evolve(picture.edge, std::move(local), params, picture.snake_floor());
-  for (Point& p : local) {
-    p += offset;
-  }
-  return local;
-}
-
-// Median motion of the nodes; 0 when it is less than the snake can tell.
-Point common_motion(const Contour& from, const Contour& to) {
-  std::vector<double> dx, dy;
-  for (std::size_t i = 0; i < from.size() && i < to.size(); ++i) {
-    dx.push_back(to[i].x - from[i].x);
-    dy.push_back(to[i].y - from[i].y);
-  }
-  const Point shift(std::clamp(median_of(dx), -kMotionMax_px, kMotionMax_px),
-                    std::clamp(median_of(dy), -kMotionMax_px, kMotionMax_px));
-  return cv::norm(shift) < kMotionLeast_px ? Point() : shift;
-}
 
 // Blur moves the two faces of a wall apart that is thinner than the blur. The outer face then lies too far
 // out, by half of the difference between the apparent and the true thickness. 0 where the wall appears as
@@ -190,7 +160,7 @@ bool left_outline(const MembraneSearch& s, const EdgePath& path) {
 }
 
 // Empty when it is still the same edge.
-std::string why_not_the_same_edge(const MembraneSearch& s, const EdgeFound& found, double shift) {
+std::string why_not_the_same_edge(const MembraneSearch& s, const EdgeFound& found) {
   const EdgePath& path = found.path;
   std::vector<double> jump;
   for (int i = 0; i < s.angles; ++i) {
@@ -208,7 +178,7 @@ std::string why_not_the_same_edge(const MembraneSearch& s, const EdgeFound& foun
   if (path.level < 0.35 * s.m.level) {
     return "edge has faded";
   }
-  if (median_of(jump) + shift > 0.6 * s.band.half_width) {
+  if (median_of(jump) > 0.6 * s.band.half_width) {
     return "contour jumped";
   }
   if (left_outline(s, path)) {
@@ -226,11 +196,7 @@ Membrane follow(FollowedMembrane& m, const ClearedPicture& picture, const Vision
     out.reason = "not found";
     return out;
   }
-  const Contour nodes = spline_through(m.contour(), config.snake.nodes);
-  m.nodes = snake_from(nodes, picture, config.snake);
-  out.nodes = m.nodes;
-  const Point shift = common_motion(nodes, m.nodes);
-  const MembraneSearch search(m, picture, surroundings, shift);
+  const MembraneSearch search(m, picture, surroundings);
   const EdgeFound found = pushed_or_free(search);
   const EdgePath& path = found.path;
   if (path.r.empty()) {
@@ -243,7 +209,7 @@ Membrane follow(FollowedMembrane& m, const ClearedPicture& picture, const Vision
   out.support = path.support;
   out.visible = path.visible;
   out.residual_px = path.residual;
-  out.reason = why_not_the_same_edge(search, found, cv::norm(shift));
+  out.reason = why_not_the_same_edge(search, found);
   if (!out.reason.empty()) {
     ++m.lost_frames;
     return out;

@@ -1,5 +1,5 @@
-// One membrane, followed from frame to frame: the greedy snake from the last contour, then the sub-pixel edge
-// in a band round it, and whether that is still the same edge.
+// One membrane, followed from frame to frame: the sub-pixel edge in a band round the last contour, and
+// whether that is still the same edge.
 #pragma once
 
 #include <string>
@@ -13,7 +13,7 @@ namespace punctum::vision {
 // What one frame shows of a membrane.
 struct Membrane {
   bool ok = false;
-  Contour nodes;              // of the greedy snake
+  Contour nodes;              // of the paper's snake
   Contour contour;            // at least 128 points
   std::vector<double> sd_px;  // of each of them, across the contour; empty when not ok
   double support = 0;         // share of the visible angles with an edge above the noise

@@ -15,25 +15,20 @@ namespace punctum::vision {
 namespace {
 
 constexpr double kSaturation = 0.7;  // times the usual edge: a stronger one is not better
-// Beside the needle, as a share of the tip's depth: a membrane that is sunk by less has let the needle
-// through. The zona dents over a narrower arc than what is within it.
-constexpr double kHardlySunkInner = 0.4;
-constexpr double kFreeHalf_px = 7;    // a free membrane is looked for so near to its outline at rest
-constexpr double kDeepInner_px = 12;  // counts as the depth of a tip that is deeper inside the inner membrane
-constexpr double kNearHalf = 0.5;     // rad to either side of the entry: the dimple and its rim
-constexpr double kApart_px = 1.5;     // nearer, two paths are the same edge
+constexpr double kTouching_px = 1;   // a tip that is deeper pushes the membrane, or is through it
+constexpr double kFreeHalf_px = 7;   // a free membrane is looked for so near to its outline at rest
 
 }  // namespace
 
 MembraneSearch::MembraneSearch(const FollowedMembrane& followed, const ClearedPicture& cleared,
-                               const Surroundings& s, const Point& shift)
+                               const Surroundings& s)
     : m(followed),
       picture(cleared),
       surroundings(s),
       angles(static_cast<int>(m.r.size())),
       usual_r(median_of(m.r)),
       saturation(kSaturation * m.level) {
-  band.centre = m.centre + shift;
+  band.centre = m.centre;
   band.middle = m.r;
   band.half_width = std::clamp(0.11 * usual_r, 6.0, 14.0);
   band.slope = 1.0;
@@ -147,56 +142,20 @@ EdgePath MembraneSearch::path_pushed() const {
   return path_in(pushed);
 }
 
-Differing MembraneSearch::where_further_out(const EdgePath& path, const EdgePath& other) const {
-  Differing out;
-  int n = 0;
-  for (int i = 0; i < angles; ++i) {
-    const std::size_t k = static_cast<std::size_t>(i);
-    const double by = path.raw[k] - other.raw[k];
-    if (from_needle(i) < kNearHalf && by > kApart_px &&
-        !picture.hidden(on_ray(band.centre, i, angles, path.raw[k]))) {
-      out.seen += std::clamp(static_cast<double>(path.strength[k]) / saturation, 0.0, 1.0);
-      out.by += by;
-      out.from_rest += std::abs(path.raw[k] - rest[k]);
-      ++n;
-    }
-  }
-  if (n > 0) {
-    for (double* sum : {&out.seen, &out.by, &out.from_rest}) {
-      *sum /= n;
-    }
-  }
-  return out;
-}
-
 double MembraneSearch::depth_of_tip() const {
   return rest[static_cast<std::size_t>(needle->tip_index)] - needle->tip_r;
 }
 
-// As a share of the tip's depth, where it is seen nearest to the needle on either side; 1 where it is not
-// seen.
-double MembraneSearch::sunk_beside_needle(const EdgePath& path) const {
-  constexpr int kNearest = 3;        // rays on either side
-  constexpr double kFurthest = 0.5;  // rad from the needle
-  const auto ray = [this](int i) { return ((i % angles) + angles) % angles; };
-  double sum = 0;
-  int n = 0;
-  for (const int side : {-1, 1}) {
-    int seen = 0;
-    for (int i = needle->tip_index; seen < kNearest && from_needle(ray(i)) < kFurthest; i += side) {
-      const std::size_t k = static_cast<std::size_t>(ray(i));
-      if (path.seen[k] != 0 && !picture.hidden(on_ray(band.centre, ray(i), angles, path.raw[k]))) {
-        sum += rest[k] - path.raw[k];
-        ++seen;
-        ++n;
-      }
-    }
-  }
-  const double deep = std::min(depth_of_tip(), kDeepInner_px);
-  return n == 2 * kNearest ? sum / n / deep : 1;
-}
-
 namespace {
+
+// The needle hides the bottom of a dimple that is not on its tip.
+void anchor_under_needle(const MembraneSearch& s, const SeenDimple& dimple, EdgeBand& band) {
+  constexpr double kShallow_px = 2;  // it hardly differs from the outline at rest
+  if (dimple.depth > kShallow_px) {
+    const int i = s.needle->tip_index;
+    band.anchors = {{i, band.middle[static_cast<std::size_t>(i)]}};
+  }
+}
 
 EdgeFound outer_pushed_or_free(const MembraneSearch& s) {
   const auto dimple = likeliest_dimple(s);
@@ -222,15 +181,30 @@ EdgeFound outer_pushed_or_free(const MembraneSearch& s) {
     found.held = s.m.held;
     return found;
   }
-  constexpr double kShallow_px = 2;  // it hardly differs from the outline at rest
   EdgeBand band = band_along(s, *dimple);
-  if (dimple->depth > kShallow_px) {
-    const int i = s.needle->tip_index;
-    band.anchors = {{i, band.middle[static_cast<std::size_t>(i)]}};  // the needle hides it there
-  }
+  anchor_under_needle(s, *dimple, band);
   found.path = s.path_in(band);
   found.is_free = true;
   found.held = false;
+  return found;
+}
+
+EdgeFound inner_pushed_or_free(const MembraneSearch& s) {
+  EdgeFound found;
+  found.held = s.m.held;
+  if (const auto dimple = likeliest_dimple(s)) {
+    EdgeBand band = band_along(s, *dimple);
+    anchor_under_needle(s, *dimple, band);
+    found.path = s.path_in(band);
+    found.is_free = s.surroundings.punctured && !dimple->on_tip;
+    found.held = !found.is_free || s.depth_of_tip() < kTouching_px;
+    found.dimple_px = dimple->depth;
+    found.dimple_odds = dimple->odds;
+    return found;
+  }
+  found.is_free = s.surroundings.punctured;
+  found.path = found.is_free ? s.path_free() : s.path_in(s.band);
+  found.held = s.m.held || s.depth_of_tip() < kTouching_px;
   return found;
 }
 
@@ -240,28 +214,10 @@ EdgeFound pushed_or_free(const MembraneSearch& s) {
   if (!s.needle || s.rest.empty()) {
     return {s.path_in(s.band), false, s.m.held, s.m.dimple_px, s.m.dimple_odds};
   }
-  if (s.depth_of_tip() <= 1.0) {
-    // Nothing pushes an inner membrane then: the outer one, which dents it before the tip is there, has given
-    // way.
-    const bool is_free = s.surroundings.punctured && !s.surroundings.outermost;
-    return {is_free ? s.path_free() : s.path_in(s.band), is_free};
-  }
   if (s.surroundings.outermost) {
-    return outer_pushed_or_free(s);
+    return s.depth_of_tip() > kTouching_px ? outer_pushed_or_free(s) : EdgeFound{s.path_in(s.band)};
   }
-  EdgePath path = s.path_in(s.band);
-  EdgePath free = s.path_free();
-  if (path.r.empty() || free.r.empty()) {
-    return {std::move(path)};
-  }
-  // Where another edge lies further out than the dimple and is seen as well, the dimple belongs to another
-  // membrane. But an edge that is nearer to the dimple than to the rest outline is the wall of the dimple.
-  const Differing outside = s.where_further_out(free, path);
-  constexpr double kLeast = 0.7;
-  // And where the membrane beside the needle is hardly lower than at rest, the needle has gone through it.
-  const bool is_free = s.sunk_beside_needle(free) < kHardlySunkInner ||
-                       (outside.by > outside.from_rest && outside.seen > kLeast);
-  return {is_free ? std::move(free) : std::move(path), is_free};
+  return inner_pushed_or_free(s);
 }
 
 }  // namespace punctum::vision

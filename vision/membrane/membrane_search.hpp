@@ -29,14 +29,6 @@ struct NeedleSeen {
   double tip_r = 0;        // px
 };
 
-// Of the visible rays near the needle on which one path lies further out than another: means, 0 if there are
-// none.
-struct Differing {
-  double seen = 0;       // edge, as a share of the saturated one
-  double by = 0;         // px
-  double from_rest = 0;  // px, of the path further out
-};
-
 struct MembraneSearch {
   const FollowedMembrane& m;
   const ClearedPicture& picture;
@@ -48,8 +40,7 @@ struct MembraneSearch {
   std::vector<double> rest;  // rest outline, seen from the centre of the band; empty: not known
   std::optional<NeedleSeen> needle;
 
-  MembraneSearch(const FollowedMembrane& followed, const ClearedPicture& cleared, const Surroundings& s,
-                 const Point& shift);
+  MembraneSearch(const FollowedMembrane& followed, const ClearedPicture& cleared, const Surroundings& s);
 
   // Angle between the ray i and the entry of the needle, rad.
   [[nodiscard]] double from_needle(int i) const {
@@ -61,9 +52,7 @@ struct MembraneSearch {
   [[nodiscard]] EdgePath path_free() const;
   [[nodiscard]] EdgePath path_pushed() const;
   [[nodiscard]] std::vector<std::pair<int, double>> end_face() const;
-  [[nodiscard]] double depth_of_tip() const;                            // px below the rest outline
-  [[nodiscard]] double sunk_beside_needle(const EdgePath& path) const;  // as a share of the tip's depth
-  [[nodiscard]] Differing where_further_out(const EdgePath& path, const EdgePath& other) const;
+  [[nodiscard]] double depth_of_tip() const;  // px below the rest outline
 
  private:
   void keep_membranes_apart();

@@ -325,6 +325,7 @@ Surroundings Tracker::Impl::surroundings() const {
   return {.needle = result.needle,
           .last_tip = tip.last,
           .punctured = punctured,
+          .dents_seen = result.needle.ok || !config.needle,
           .undeformed = undeformed.shape() ? &*undeformed.shape() : nullptr};
 }
 
@@ -348,7 +349,7 @@ void Tracker::Impl::follow_membranes(Stopwatch& watch) {
   if (config.inner) {
     const bool outer_seen = outer.known && result.outer.ok;
     if (outer_seen && (!inner.known || inner.lost())) {
-      if (auto begun = start_inner(picture, config, outer)) {
+      if (auto begun = start_inner(picture, config, outer, surroundings().dents_seen)) {
         begun->rest = std::move(inner.rest);
         inner = std::move(*begun);
       }

@@ -7,6 +7,7 @@
 //   force     the force on the hand stays within the scene's limit and does not jump
 //   relay     a drive that does not obey loses its power
 #include <gtest/gtest.h>
+#include <sched.h>
 
 #include <algorithm>
 #include <cmath>
@@ -128,6 +129,15 @@ Measured measure(const Row& row, const std::vector<sim::Snapshot>& run) {
 
 class Lies : public Programs, public testing::WithParamInterface<Row> {
  protected:
+  // The world and this reader of it share one processor: the scheduler takes turns, so that the world cannot
+  // run a whole ring ahead, however loaded the machine is.
+  static void SetUpTestSuite() {
+    cpu_set_t one;
+    CPU_ZERO(&one);
+    CPU_SET(sched_getcpu(), &one);
+    ASSERT_EQ(sched_setaffinity(0, sizeof(one), &one), 0);
+  }
+
   // Every snapshot of one run; empty if some were missed.
   std::vector<sim::Snapshot> run(const Strings& args) {
     Strings all = args;

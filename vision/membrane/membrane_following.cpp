@@ -172,7 +172,11 @@ std::string why_not_the_same_edge(const MembraneSearch& s, const EdgeFound& foun
   if (path.visible < 0.35) {
     return "mostly hidden";
   }
-  if (path.support < 0.55) {
+  // A path through noise alone has a level of less than 2 times the noise. A dimple by a needle that is not
+  // seen needs a clear edge.
+  constexpr double kClear_noise = 2.7;
+  if (path.support < 0.55 &&
+      !(s.surroundings.dents_seen && path.level > kClear_noise * s.picture.gradient_noise)) {
     return "edge seen over " + std::to_string(std::lround(100 * path.support)) + " % only";
   }
   if (path.level < 0.35 * s.m.level) {

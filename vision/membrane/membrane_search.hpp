@@ -16,6 +16,7 @@ struct Surroundings {
   const NeedlePose& needle;
   std::optional<Point> last_tip;  // one frame ago
   bool punctured = false;
+  bool dents_seen = true;                    // no needle that is not seen may dent it
   bool outermost = true;                     // the membrane is the outer one
   const FollowedMembrane* around = nullptr;  // the membrane outside of it, if this frame shows it
   const FollowedMembrane* within = nullptr;  // the membrane inside of it, one frame ago

@@ -11,6 +11,7 @@
 #include "vision/image/median.hpp"
 #include "vision/image/polar_contour.hpp"
 #include "vision/membrane/edge_candidates.hpp"
+#include "vision/membrane/parallel_edge.hpp"
 
 namespace punctum::vision {
 
@@ -173,12 +174,19 @@ StartedMembranes start_membranes(const ClearedPicture& picture, const VisionConf
 }
 
 std::optional<FollowedMembrane> start_inner(const ClearedPicture& picture, const VisionConfig& config,
-                                            const FollowedMembrane& outer) {
+                                            const FollowedMembrane& outer, bool faint_too) {
   const SecondEdge inside = find_second(outer.r, outer.centre, outer.polarity, false, picture, config);
-  if (!clear_enough(inside, outer.level, picture)) {
+  if (clear_enough(inside, outer.level, picture)) {
+    return started(outer.centre, inside.path.r, inside.polarity, inside.path.level);
+  }
+  std::optional<EdgePath> parallel;
+  if (faint_too) {
+    parallel = parallel_edge_within(outer.r, outer.centre, outer.polarity, picture, config);
+  }
+  if (!parallel) {
     return std::nullopt;
   }
-  return started(outer.centre, inside.path.r, inside.polarity, inside.path.level);
+  return started(outer.centre, parallel->r, outer.polarity, parallel->level);
 }
 
 }  // namespace punctum::vision

@@ -18,9 +18,10 @@ struct StartedMembranes {
 [[nodiscard]] StartedMembranes start_membranes(const ClearedPicture& picture, const VisionConfig& config,
                                                const std::optional<Circle>& seed);
 
-// The inner membrane alone, inside an outer membrane that is followed.
+// The inner membrane alone, inside an outer membrane that is followed. faint_too: even if single rays do not
+// show it.
 [[nodiscard]] std::optional<FollowedMembrane> start_inner(const ClearedPicture& picture,
                                                           const VisionConfig& config,
-                                                          const FollowedMembrane& outer);
+                                                          const FollowedMembrane& outer, bool faint_too);
 
 }  // namespace punctum::vision

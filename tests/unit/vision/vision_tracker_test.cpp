@@ -37,6 +37,7 @@ struct Drawing {
   double dent_half_rad = 0.42;
   double inner_dent = -1;  // px; < 0: 0.9 of the outer membrane's
   bool granules = false;   // in the ooplasm, where a dimple's sides may be
+  double ooplasm = 34;     // grey levels darker than the space round it
 };
 
 cv::Mat draw(const Drawing& d) {
@@ -61,7 +62,7 @@ cv::Mat draw(const Drawing& d) {
         }
         const double inner_in = d.inner_dent < 0 ? in * 0.9 : dent(std::atan2(q.y, q.x), d.inner_dent);
         if (r < kInner - inner_in) {
-          g -= 34;  // ooplasm
+          g -= d.ooplasm;
         }
         if (d.granules && std::hypot(q.x - kInner + 12, std::abs(q.y) - 5) < 4) {
           g -= 40;
@@ -355,6 +356,30 @@ TEST(Tracker, follows_an_inner_membrane_that_the_needle_pushes) {
     ASSERT_TRUE(r.inner.ok) << depth << r.verdict;
     EXPECT_LT(rms_error(r.inner.contour, kInner, pushed, 1), 1.0) << depth;
     EXPECT_FALSE(r.inner_punctured) << depth;
+  }
+}
+
+// Single rays show an edge at its place in four tenths of the directions.
+TEST(Tracker, finds_an_inner_membrane_that_only_all_rays_together_show) {
+  VisionConfig config;
+  config.needle = false;
+  for (const double ooplasm : {0.0, 22.0}) {
+    Tracker tracker(config, kW, kH);
+    int claimed = 0;
+    for (unsigned n = 0; n < 6; ++n) {
+      const cv::Mat m = draw({.noise = 20, .seed = n + 1, .needle = false, .ooplasm = ooplasm});
+      const Result& r = tracker.process(frame_of(m, n));
+      ASSERT_TRUE(r.outer.ok) << r.verdict;
+      if (r.inner.ok) {
+        ++claimed;
+        EXPECT_LT(rms_error(r.inner.contour, kInner, 0, 0), 0.6);
+      }
+    }
+    if (ooplasm > 0) {
+      EXPECT_GE(claimed, 5);
+    } else {
+      EXPECT_EQ(claimed, 0);
+    }
   }
 }
 

@@ -30,7 +30,7 @@ constexpr double kShortest_px = 4, kLongest_px = 40;  // of a wall that an edge 
 constexpr double kFollowed_px = 24;                   // and later, of a faint one: it may bend
 // Standard deviation of the end of a faint needle. A tip that is less certain does more harm than one that is
 // not claimed: membranes are then taken for pushed that are free.
-constexpr double kEndKnown_px = 0.45;
+constexpr double kEndKnown_px = 0.7;
 // In a needle with a smaller half-width no lumen is left between the walls, and a line across it looks like
 // them.
 constexpr double kLumen_px = 4.5;
@@ -69,13 +69,18 @@ std::array<double, 2> faces(const GradientField& field, const NeedlePose& needle
 // As fit_walls, from a pose whose width is not certain.
 double fit_walls_at_start(const GradientField& field, double noise, double radius_px, NeedlePose& needle) {
   const NeedlePose traced = needle;
-  double straight = 0;
-  for (const double wider : {1.0, 0.7, 0.5}) {  // noise may have hidden the walls near the end
-    needle = traced;
-    needle.half_width *= wider;
-    straight = fit_walls(field, noise, radius_px, needle, kLongest_px);
-    if (straight > 0) {
-      break;
+  double straight = -1;
+  // Noise may have hidden the walls near the end; a speck beside a wall draws the tube aside.
+  constexpr double kSurely = 0.9;
+  for (const double reach : {kWallReach_px, kWallReachAtStart_px}) {
+    for (const double wider : {1.0, 0.7, 0.5}) {
+      NeedlePose tried = traced;
+      tried.half_width *= wider;
+      const double s = straight < kSurely ? fit_walls(field, noise, radius_px, tried, kLongest_px, reach) : 0;
+      if (s > straight) {
+        straight = s;
+        needle = tried;
+      }
     }
   }
   // It may hold on to the inner face of one wall: then both faces have the same sense, and on one side there
@@ -302,6 +307,9 @@ bool InjectionPipette::find_end(const GradientField& field, double noise, Needle
 // The profile of the walls ends a little before the end face. How far, the steepest change of grey along the
 // walls tells, averaged over 30 frames.
 void InjectionPipette::calibrate_walls(const GradientField& field, const NeedlePose& walls, double noise) {
+  if (glass_frames_ > 0) {  // it counts from where the walls end
+    return;
+  }
   const auto step = steepest_wall_step(field, walls, 3.5, 3 * field.noise_of_gradient(noise), step_sign_);
   if (!step) {
     return;

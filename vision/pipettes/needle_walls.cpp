@@ -18,41 +18,42 @@ namespace {
 
 constexpr double kPlain_px = 4;  // of a wall that stands out by itself
 
-// The outermost strong edge near the distance u0 across the axis; a wall has two faces. Averaged over
-// `length` px of it. Empty when no edge exceeds the floor.
+// The outermost strong edge within `reach` px of the distance u0 across the axis; a wall has two faces.
+// Averaged over `length` px of it. Empty when no edge exceeds the floor.
 std::optional<double> outer_edge(const GradientField& field, const NeedlePose& needle, double s, double u0,
-                                 double length, double floor) {
+                                 double reach, double length, double floor) {
   constexpr double kStep_px = 0.5;
   // A wall is thin and its inner face may be twice as strong; an average over noise makes it three times.
   const double outer_face = length > kPlain_px ? 0.35 : 0.5;
-  constexpr int kReach = 6, kSamples = 2 * kReach + 1;
   constexpr double kAlong_px = 1.5;
+  const int half = static_cast<int>(std::min(reach, kWallReachAtStart_px) / kStep_px);
+  const std::size_t count = static_cast<std::size_t>(2 * half + 1);
   const int samples = 2 * static_cast<int>(length / (2 * kAlong_px)) + 1;
   const Point across(-needle.axis.y, needle.axis.x);
-  std::array<double, kSamples> g{};
-  for (int k = 0; k < kSamples; ++k) {
+  std::array<double, 2 * static_cast<std::size_t>(kWallReachAtStart_px / kStep_px) + 1> g{};
+  for (int k = 0; k <= 2 * half; ++k) {
     double e = 0;
     for (int i = 0; i < samples; ++i) {
       const double t = s + (i - samples / 2) * kAlong_px;
-      const double u = u0 + std::copysign(needle.taper * (t - s), u0) + (k - kReach) * kStep_px;
+      const double u = u0 + std::copysign(needle.taper * (t - s), u0) + (k - half) * kStep_px;
       e += field.gradient(needle.at(t, u)).dot(across) / samples;
     }
     g[static_cast<std::size_t>(k)] = std::abs(e);
   }
   const auto is_peak = [&g](std::size_t k) { return g[k] >= g[k - 1] && g[k] >= g[k + 1]; };
   double strongest = 0;
-  for (std::size_t k = 1; k + 1 < kSamples; ++k) {
+  for (std::size_t k = 1; k + 1 < count; ++k) {
     if (is_peak(k)) {
       strongest = std::max(strongest, g[k]);
     }
   }
-  for (std::size_t q = 1; q + 1 < kSamples; ++q) {
-    const std::size_t k = u0 > 0 ? kSamples - 1 - q : q;  // from outside
+  for (std::size_t q = 1; q + 1 < count; ++q) {
+    const std::size_t k = u0 > 0 ? count - 1 - q : q;  // from outside
     if (is_peak(k) && g[k] >= outer_face * strongest) {
       if (strongest < floor) {
         return std::nullopt;
       }
-      const double at = static_cast<int>(k) - kReach + vertex_offset(g[k - 1], g[k], g[k + 1]);
+      const double at = static_cast<int>(k) - half + vertex_offset(g[k - 1], g[k], g[k + 1]);
       return u0 + at * kStep_px;
     }
   }
@@ -64,8 +65,8 @@ struct ShaftStations {
   int tried = 0;
 };
 
-ShaftStations stations_along(const GradientField& field, const NeedlePose& needle, double length,
-                             double floor) {
+ShaftStations stations_along(const GradientField& field, const NeedlePose& needle, double reach,
+                             double length, double floor) {
   const cv::Rect& a = field.area;
   ShaftStations out;
   for (double s = 8; s < 170; s += 5) {
@@ -75,8 +76,8 @@ ShaftStations stations_along(const GradientField& field, const NeedlePose& needl
     }
     ++out.tried;
     const double w = needle.half_width_at(s);
-    const auto low = outer_edge(field, needle, s, -w, length, floor);
-    const auto high = low ? outer_edge(field, needle, s, w, length, floor) : std::nullopt;
+    const auto low = outer_edge(field, needle, s, -w, reach, length, floor);
+    const auto high = low ? outer_edge(field, needle, s, w, reach, length, floor) : std::nullopt;
     if (high && *high - *low > 0.5 * w) {
       out.along.push_back(s);
       out.middle.push_back(0.5 * (*low + *high));
@@ -149,13 +150,13 @@ std::optional<ShaftProfile> shaft_profile(const GradientField& field, const Need
 }
 
 // As fit_walls, with edges averaged over `length` px.
-double fit_walls_averaged(const GradientField& field, double noise, double radius, double length,
-                          NeedlePose& needle) {
+double fit_walls_averaged(const GradientField& field, double noise, double radius, double reach,
+                          double length, NeedlePose& needle) {
   // Along a wall the smoothing joins about so much.
   const double joined = 2 * std::sqrt(std::numbers::pi) * field.sigma;
   const double floor =
       4 * field.noise_of_gradient(noise) * (length > kPlain_px ? std::sqrt(joined / (joined + length)) : 1);
-  const ShaftStations stations = stations_along(field, needle, length, floor);
+  const ShaftStations stations = stations_along(field, needle, reach, length, floor);
   const std::size_t n = stations.along.size();
   constexpr double kStations_px = 5;
   if (static_cast<double>(n) < std::max(4.0, 2.5 * length / kStations_px)) {  // fewer are not independent
@@ -200,8 +201,8 @@ double fit_walls_averaged(const GradientField& field, double noise, double radiu
 }  // namespace
 
 // The shortest average that shows the walls: a long one takes bends for straight.
-double fit_walls(const GradientField& field, double noise, double radius, NeedlePose& needle,
-                 double longest) {
+double fit_walls(const GradientField& field, double noise, double radius, NeedlePose& needle, double longest,
+                 double reach) {
   constexpr double kMostly = 0.8;
   const NeedlePose before = needle;
   double best = 0;
@@ -210,7 +211,7 @@ double fit_walls(const GradientField& field, double noise, double radius, Needle
       break;
     }
     NeedlePose fitted = before;
-    const double straight = fit_walls_averaged(field, noise, radius, length, fitted);
+    const double straight = fit_walls_averaged(field, noise, radius, reach, length, fitted);
     if (straight > best) {
       best = straight;
       needle = fitted;

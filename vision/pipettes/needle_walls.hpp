@@ -11,9 +11,10 @@ namespace punctum::vision {
 // Fits middle, axis, half-width and taper of the pose to the outer edges of the walls, which are looked for
 // near where the pose has them. noise: grey levels. radius: expected at the tip, px. Returns the share of the
 // stations along the shaft whose edges lie on the two straight lines; 0 when there are too few. The edges are
-// averaged over no more than `longest` px of a wall.
+// averaged over no more than `longest` px of a wall, and looked for within `reach` px.
+inline constexpr double kWallReach_px = 3, kWallReachAtStart_px = 7;
 [[nodiscard]] double fit_walls(const GradientField& field, double noise, double radius, NeedlePose& needle,
-                               double longest);
+                               double longest, double reach = kWallReach_px);
 
 // Distance ahead of the tip (< 0: behind it) at which the cross profile of walls and lumen ends; sub-pixel.
 // Searched from `back` px behind the tip to `ahead` px ahead of it. Empty when it does not end there.

@@ -18,6 +18,7 @@
 #include "vision/membrane/snakes.hpp"
 #include "vision/pipettes/holding_pipette.hpp"
 #include "vision/pipettes/injection_pipette.hpp"
+#include "vision/pipettes/tip_by_stage.hpp"
 #include "vision/pipettes/wide_tube.hpp"
 #include "vision/stopwatch.hpp"
 #include "vision/surface/membrane_net.hpp"
@@ -27,7 +28,7 @@ namespace punctum::vision {
 namespace {
 
 constexpr int kHolderEvery = 8;           // frames between two searches for a tube that was not found
-constexpr int kNeedleEvery = 8;           // likewise for the needle
+constexpr int kNeedleAtOnce = 6, kNeedleEvery = 8;  // likewise for the needle, after so many tries
 constexpr double kNeedleMargin_px = 2.5;  // the blur reaches so far beyond the needle's edges
 constexpr double kUntouched_px = 12;      // further outside, nothing touches the tip
 constexpr double kLeastDimple_px = 0.7;   // depth from which the width of a dimple can be measured
@@ -62,6 +63,10 @@ struct Tracker::Impl {
   int holder_tries = 0;
   InjectionPipette needle;
   int needle_tries = 0;
+  TipByStage by_stage;
+  NeedlePose membrane_needle;  // its tip where the membrane on it is seen
+  NeedlePose seen_needle;  // as the picture alone tells it
+  double wall_px = 0;      // from the tip to the middle of the membrane that it pushes, as far as seen
   TipOnMembrane tip_on_membrane;
   TipMotion tip;
 
@@ -91,19 +96,20 @@ struct Tracker::Impl {
     }
   }
 
-  const Result& process(const hal::Frame& frame);
+  const Result& process(const hal::Frame& frame, const std::optional<Point>& stage);
 
   // A needle that was seen before and is not seen now may be anywhere: it tells neither contact nor its end.
   [[nodiscard]] bool needle_hidden() const { return needle.started() && !result.needle.ok; }
   [[nodiscard]] bool must_start() const;
   [[nodiscard]] cv::Rect area_to_search(bool starting) const;
   void locate_needle();
+  void learn_needle();
   void locate_holder();
   [[nodiscard]] Point end_of_holder() const;
   void clear_picture(double needle_margin);
   [[nodiscard]] bool start();
   void follow_membranes(Stopwatch& watch);
-  [[nodiscard]] Surroundings surroundings() const;
+  [[nodiscard]] Surroundings surroundings();
   void measure();
   [[nodiscard]] int fit_undeformed_membrane();
   void measure_gap(int fitted_points);
@@ -128,9 +134,11 @@ void Tracker::holder_template(const cv::Mat& pattern) {
   impl_->holder.use_template(pattern);
   impl_->template_given = true;
 }
-const Result& Tracker::process(const hal::Frame& frame) { return impl_->process(frame); }
+const Result& Tracker::process(const hal::Frame& frame, const std::optional<Point>& stage) {
+  return impl_->process(frame, stage);
+}
 
-const Result& Tracker::Impl::process(const hal::Frame& frame) {
+const Result& Tracker::Impl::process(const hal::Frame& frame, const std::optional<Point>& stage) {
   Stopwatch total, watch;
   const rt::Phase last_phase = result.phase;
   result = {};
@@ -143,6 +151,7 @@ const Result& Tracker::Impl::process(const hal::Frame& frame) {
   }
   result.usable = true;
   result.noise = picture.noise;
+  by_stage.begin(stage);
   const bool starting = must_start();
   picture.compute_gradient(area_to_search(starting));
   result.us.prepare = watch.lap_us();
@@ -170,25 +179,18 @@ const Result& Tracker::Impl::process(const hal::Frame& frame) {
     follow_membranes(watch);
     measure();
     result.us.measure = watch.lap_us();
-    const bool untouched = result.gap_px && *result.gap_px > kUntouched_px;
     if (config.method == Method::paper) {
       events_of_the_paper();
       result.us.contact = watch.lap_us();
     } else {
       std::optional<double> membrane_behind_tip;
-      if (result.needle.ok && result.outer.ok && !untouched) {
+      if (result.needle.ok && result.outer.ok && !(result.gap_px && *result.gap_px > kUntouched_px)) {
         membrane_behind_tip = look_for_contact();
         result.us.contact = watch.lap_us();
       }
       classify_contact(membrane_behind_tip);
     }
-    if (result.needle.ok && !result.contact && (untouched || !result.gap_px)) {
-      needle.learn(picture.field, result.needle, picture.noise);
-    }
-    if (result.needle.ok && !result.contact && result.gap_px &&
-        *result.gap_px > TipOnMembrane::kClearAhead_px) {
-      tip_on_membrane.learn(picture.field, result.needle);
-    }
+    learn_needle();
     if (config.surface) {
       (void)watch.lap_us();
       reconstruct_surfaces();
@@ -223,16 +225,46 @@ cv::Rect Tracker::Impl::area_to_search(bool starting) const {
 }
 
 void Tracker::Impl::locate_needle() {
-  if (!needle.started() && needle_tries++ % kNeedleEvery == 0) {
+  if (const int n = needle_tries++;
+      !needle.started() && (n < kNeedleAtOnce || n % kNeedleEvery == 0)) {
     // A membrane at the tip of a faint needle looks like its end.
     (void)needle.start(picture.field, picture.noise, [this](const Point& end) {
       return !outer.known || cv::norm(end - outer.centre) > median_of(outer.r) + kUntouched_px;
     });
   }
   NeedlePose& n = result.needle;
-  n = needle.find(picture.field, picture.noise);
+  n = needle.find(picture.field, picture.noise, by_stage.moved());
   if (config.method == Method::tracker && n.ok && was_contact && !punctured && outer.known) {
     n.tip += tip_on_membrane.ahead(picture.field, picture.noise, n).value_or(0) * n.axis;
+  }
+  seen_needle = n;
+  wall_px = 0;
+  if (const auto tip_told = by_stage.tip(); tip_told && !n.ok) {
+    n = needle.by_shaft(picture.field, picture.noise, *tip_told).value_or(n);
+  } else if (tip_told) {
+    n.tip = by_stage.most_likely(n, punctured     ? TipSeen::inside
+                                    : was_contact ? TipSeen::at_membrane
+                                                  : TipSeen::clear);
+    needle.put(n.tip);
+    // In contact the picture shows where the membrane is, on the tip.
+    if (was_contact && !punctured) {
+      constexpr double kThick_px = 1;
+      wall_px = std::clamp((seen_needle.tip - n.tip).dot(n.axis), -kThick_px, kThick_px);
+    }
+  }
+}
+
+// What is learnt of the needle while nothing touches its tip.
+void Tracker::Impl::learn_needle() {
+  if (!seen_needle.ok || result.contact) {
+    return;
+  }
+  if (!result.gap_px || *result.gap_px > kUntouched_px) {
+    needle.learn(picture.field, seen_needle, picture.noise);
+    by_stage.learn(seen_needle);
+  }
+  if (result.gap_px && *result.gap_px > TipOnMembrane::kClearAhead_px) {
+    tip_on_membrane.learn(picture.field, result.needle);
   }
 }
 
@@ -321,8 +353,10 @@ bool Tracker::Impl::start() {
   return true;
 }
 
-Surroundings Tracker::Impl::surroundings() const {
-  return {.needle = result.needle,
+Surroundings Tracker::Impl::surroundings() {
+  membrane_needle = result.needle;
+  membrane_needle.tip += wall_px * result.needle.axis;
+  return {.needle = membrane_needle,
           .last_tip = tip.last,
           .punctured = punctured,
           .dents_seen = result.needle.ok || !config.needle,
@@ -494,7 +528,7 @@ void Tracker::Impl::measure_depth(double membrane_px) {
     return;
   }
   // Until the puncture the membrane lies on the tip. Afterwards its contour tells the rest of the dimple.
-  const double depth = result.punctured ? membrane_px : -*result.gap_px;
+  const double depth = result.punctured ? membrane_px : wall_px - *result.gap_px;
   result.wd_px = result.contact ? std::max(0.0, depth) : 0.0;
   if (*result.wd_px > kLeastDimple_px) {
     result.a_px = dimple_half_width(result.outer.contour, undeformed.at_rest(), *result.entry, *result.wd_px,

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "hal/devices.hpp"
 #include "vision/result.hpp"
@@ -21,9 +22,10 @@ class Tracker {
   void seed_circle(const Circle& circle);
   void holder_template(const cv::Mat& pattern);
 
-  // The result is valid until the next call. No pixels make it throw. A frame of another size or without
-  // contrast gives a verdict and changes nothing else.
-  const Result& process(const hal::Frame& frame);
+  // stage: where the encoders of the manipulator have the needle's tip at the exposure, px; it may be off by
+  // any constant, which is learnt. The result is valid until the next call. No pixels make it throw. A frame
+  // of another size or without contrast gives a verdict and changes nothing else.
+  const Result& process(const hal::Frame& frame, const std::optional<Point>& stage = std::nullopt);
 
  private:
   struct Impl;

@@ -79,7 +79,7 @@ struct Segments {
   std::optional<hal::Shared<const rt::ObservationSegment>> observation = {};  // none: the scene has no vision
   std::optional<hal::Shared<sim::Bench>> bench = {};                          // none: nothing is simulated
   std::optional<hal::Shared<sim::CameraAnswers>> camera = {};                 // likewise
-  std::optional<hal::Descriptor> bench_for_vision = {};                       // for reading
+  std::optional<hal::Descriptor> core_for_vision = {}, bench_for_vision = {};  // for reading
 };
 
 tl::expected<void, std::string> offer_to_readers(Segments& segments) {
@@ -138,6 +138,11 @@ tl::expected<Segments, std::string> create_segments(const Scene& scene) {
       return tl::unexpected(observation.error());
     }
     all.observation = std::move(*observation);
+    auto for_reading = all.core.segment().read_only_descriptor();
+    if (!for_reading) {
+      return tl::unexpected(for_reading.error());
+    }
+    all.core_for_vision = std::move(*for_reading);
   }
   if (scene.sim) {
     auto bench = hal::Shared<sim::Bench>::create(full_name(kBenchSegment));
@@ -184,6 +189,7 @@ HandedSegments for_vision(const Segments& segments) {
   HandedSegments handed;
   if (segments.observation) {
     handed.add(kObservationSegment, segments.observation->segment().descriptor());
+    handed.add(kCoreSegment, segments.core_for_vision->number());
   }
   if (segments.bench) {
     handed.add(kBenchSegment, segments.bench_for_vision->number());

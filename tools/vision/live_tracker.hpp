@@ -35,7 +35,8 @@ class LiveTracker {
   // As vision::Tracker::process. The search of a whole frame takes a slow machine seconds, in which it can
   // take no other one: that is no gap, or it would search for ever. Meanwhile the core, without sight, lets
   // the needle only withdraw.
-  const vision::Result& process(const hal::Frame& frame) {
+  const vision::Result& process(const hal::Frame& frame,
+                                const std::optional<vision::Point>& stage = std::nullopt) {
     if (last_ns_ != kNever) {
       const std::int64_t interval_ns = frame.exposure_ns - last_ns_;
       const std::int64_t waited_ns = frame.exposure_ns - std::max(last_ns_, ready_ns_);
@@ -47,7 +48,7 @@ class LiveTracker {
       shortest_ns_ = interval_ns > 0 ? std::min(shortest_ns_, interval_ns) : shortest_ns_;
     }
     last_ns_ = frame.exposure_ns;
-    const vision::Result& result = tracker_.process(frame);
+    const vision::Result& result = tracker_.process(frame, stage);
     found_ = found_ || result.needle.ok || result.outer.ok;
     ready_ns_ = clock_.now_ns();
     return result;

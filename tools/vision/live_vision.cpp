@@ -33,6 +33,7 @@
 #include "tools/shared/truth_observer.hpp"
 #include "tools/shared/vision_lies.hpp"
 #include "tools/vision/live_camera.hpp"
+#include "tools/vision/live_stage.hpp"
 #include "tools/vision/live_tracker.hpp"
 #include "tools/vision/observation_csv.hpp"
 #include "tools/vision/picture_file.hpp"
@@ -116,6 +117,7 @@ class LiveVision {
   void tell_silence(hal::Status status);
   [[nodiscard]] double time_to_play(hal::Frame& frame);
   void tell_unusable(const hal::Frame& frame, double t_s);
+  [[nodiscard]] std::optional<vision::Point> stage_at(std::int64_t exposure_ns) const;
   [[nodiscard]] Seen look_at(const hal::Frame& frame);
   void publish(const hal::Frame& frame, const Seen& seen);
   void record(const hal::Frame& frame, const Seen& seen);
@@ -126,6 +128,7 @@ class LiveVision {
   bool simulated_ = false;   // the camera
   bool truth_only_ = false;  // no picture is drawn or looked at
   std::optional<hal::Shared<rt::ObservationSegment>> station_;
+  std::optional<hal::Shared<const rt::CoreSegment>> core_;  // where a stage moves what the camera sees
   std::optional<hal::Shared<const sim::Bench>> bench_;
   std::optional<hal::Shared<sim::CameraAnswers>> answers_;
   rt::MonotonicClock monotonic_;
@@ -195,6 +198,14 @@ Opened LiveVision::join_station() {
   station_ = std::move(*observations);
   if (!stop_signal::watch_parent((*station_)->header.owner_pid)) {
     return tl::unexpected(std::string("the program that started vision has died"));
+  }
+  if (const int core = segments->descriptor(kCoreSegment);
+      core >= 0 && !scene_->devices.stage.empty() && !scene_->recorded) {
+    auto attached = hal::Shared<const rt::CoreSegment>::attach(kCoreSegment, core);
+    if (!attached) {
+      return tl::unexpected(attached.error());
+    }
+    core_ = std::move(*attached);
   }
   const int bench = segments->descriptor(kBenchSegment);
   if (!simulated_ && bench < 0) {
@@ -428,6 +439,12 @@ void LiveVision::tell_unusable(const hal::Frame& frame, double t_s) {
   camera().release(frame);
 }
 
+// In pixels, but for what the two frames are apart.
+std::optional<vision::Point> LiveVision::stage_at(std::int64_t exposure_ns) const {
+  const auto tip_m = core_ ? stage_tip_at(**core_, exposure_ns) : std::nullopt;
+  return tip_m ? std::optional<vision::Point>(*tip_m / scene_->vision->pixel_m) : std::nullopt;
+}
+
 LiveVision::Seen LiveVision::look_at(const hal::Frame& frame) {
   Seen seen;
   if (truth_only_) {
@@ -436,7 +453,7 @@ LiveVision::Seen LiveVision::look_at(const hal::Frame& frame) {
     return seen;
   }
   const int restarts = tracker_->restarts();
-  seen.result = &tracker_->process(frame);
+  seen.result = &tracker_->process(frame, stage_at(frame.exposure_ns));
   if (tracker_->restarts() != restarts) {
     complain(fmt::format("frame {}: the first one for more than {:.1f} s, started anew", frame.sequence,
                          static_cast<double>(LiveTracker::kLongestGap_ns) * 1e-9));

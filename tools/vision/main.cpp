@@ -64,6 +64,10 @@ int run(int argc, char** argv) {
       ->delimiter(',')
       ->expected(3)
       ->type_name("X,Y,R");
+  track
+      ->add_option("--poses", t.poses,
+                   "table of where the manipulator had the tip (samples.csv of a run: t_s, tip_x_m, tip_y_m)")
+      ->type_name("FILE");
   track->add_option("--template", t.holder_template, "picture of the holding pipette")->type_name("FILE");
 
   tools::LiveOptions l;

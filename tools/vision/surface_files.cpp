@@ -1,5 +1,6 @@
 #include "tools/vision/surface_files.hpp"
 
+#include <Eigen/Geometry>
 #include <fmt/format.h>
 
 #include <array>

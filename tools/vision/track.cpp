@@ -17,6 +17,7 @@
 #include "tools/shared/say.hpp"
 #include "tools/vision/observation_csv.hpp"
 #include "tools/vision/picture_file.hpp"
+#include "tools/vision/stage_poses.hpp"
 #include "tools/vision/surface_files.hpp"
 #include "vision/events/scene_change.hpp"
 #include "vision/overlay.hpp"
@@ -105,6 +106,17 @@ struct Input {
   cv::Rect roi;
   std::optional<vision::Circle> seed;
   cv::Mat holder_template;
+  std::optional<StagePoses> poses;
+
+  // px of the region.
+  [[nodiscard]] std::optional<vision::Point> stage_at(double t_s) const {
+    const auto tip_m = poses ? poses->at(t_s) : std::nullopt;
+    if (!tip_m) {
+      return std::nullopt;
+    }
+    const vision::Point middle((camera.width() - 1) / 2.0 - roi.x, (camera.height() - 1) / 2.0 - roi.y);
+    return middle + *tip_m / config.pixel_m;
+  }
 
   [[nodiscard]] vision::Tracker new_tracker() const {
     vision::Tracker tracker(config, roi.width, roi.height);
@@ -139,7 +151,15 @@ Or<Input> open_input(const TrackOptions& options) {
   if (!holder_template) {
     return wrong(holder_template.error());
   }
-  return Input{std::move(*config), std::move(*camera), *roi, *seed, *holder_template};
+  std::optional<StagePoses> poses;
+  if (!options.poses.empty()) {
+    auto read = StagePoses::read(options.poses);
+    if (!read) {
+      return wrong(read.error());
+    }
+    poses = std::move(*read);
+  }
+  return Input{std::move(*config), std::move(*camera), *roi, *seed, *holder_template, std::move(poses)};
 }
 
 struct Output {
@@ -248,7 +268,7 @@ Counts track_all(Input& input, Output& output) {
       complain(fmt::format("{}: another scene, started afresh", input.camera.name()));
     }
     grey.copyTo(before);
-    const vision::Result& result = tracker.process(part);
+    const vision::Result& result = tracker.process(part, input.stage_at(t_s));
     output.observations.row(result, input.config, t_s, input.roi.tl());
     counts.outer += result.outer.ok;
     counts.inner += result.inner.ok;

@@ -19,11 +19,12 @@ struct TrackOptions {
   double fps = 25;
   std::optional<std::array<int, 4>> roi;             // x, y, width, height
   std::optional<std::array<double, 3>> seed_circle;  // x, y, r in the whole picture
+  std::string poses;                                 // table of the manipulator's poses; empty: none
   std::string holder_template;                       // picture file; empty: cut from the first frame
 };
 
 // Exit code. 0: done. 1: a table could not be written completely. 2, with one line on stderr: a bad scene,
-// first frame, region, seed circle or template, or an output that cannot be opened.
+// first frame, region, seed circle, poses or template, or an output that cannot be opened.
 [[nodiscard]] int track(const TrackOptions& options);
 
 }  // namespace punctum::tools

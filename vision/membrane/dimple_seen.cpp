@@ -17,11 +17,11 @@ namespace {
 constexpr double kDimpleReach = 6;   // half-widths of the needle to either side
 constexpr double kAbove_px = 4;      // above the outline at rest
 constexpr double kPast_px = 1;       // past the tip
-constexpr double kDepthStep_px = 1;  // the blur is wider
+constexpr double kStepOfDepth_px = 1;  // the blur is wider
 constexpr int kLeastReach = 8;       // rays to either side: a thin needle hides two or three
 constexpr int kLeastRays = 6;        // fewer tell nothing
 constexpr double kModel = 0.08;      // variance of an edge that looks unusual, in squared usual edges
-constexpr double kJoined_px = 3.5;   // along the membrane, by the smoothing
+constexpr double kOneSample_px = 3.5;   // along the membrane, by the smoothing
 // A membrane that has let go of the tip is further from it: px, and share of its depth.
 constexpr double kOnTip_px = 3, kOnTip = 0.25;
 constexpr double kTip_px = 1.6;    // to which the tip is known: shapes are learnt from dimples that end there
@@ -30,7 +30,7 @@ constexpr double kSinking = 4;     // log odds against each px of it
 constexpr double kThrough = 12;    // log odds that a membrane is not on the tip that went through it
 constexpr double kStays = 3;       // log odds that it stays on the tip, or off it, for a frame
 constexpr double kSteepest = 1.8;  // slope of a wall that ends at its width; the needle hides a steeper one
-constexpr double kFreeHalf_px = 7;    // half-width of the band
+constexpr double kBandHalf_px = 7;    // half-width of the band
 constexpr double kWithinHalf_px = 4;  // of an inner membrane's: granules are near
 
 // A flat bottom with a logarithmic wall is what a stretched membrane has; the others end at their width.
@@ -137,7 +137,7 @@ std::optional<double> Dimples::evidence(const Shape& shape, double depth) const 
     return std::nullopt;
   }
   const double noise = s_.picture.gradient_noise / s_.m.level;
-  return sum * std::min(1.0, spacing_ / kJoined_px) / (kModel + noise * noise);
+  return sum * std::min(1.0, spacing_ / kOneSample_px) / (kModel + noise * noise);
 }
 
 }  // namespace
@@ -165,7 +165,7 @@ std::optional<SeenDimple> likeliest_dimple(const MembraneSearch& search) {
   std::array<double, kDimpleShapes> best;
   best.fill(-1e9);
   for (std::size_t k = 0; k < kDimpleShapes; ++k) {
-    for (double depth = -kAbove_px; depth <= deepest + kPast_px; depth += kDepthStep_px) {
+    for (double depth = -kAbove_px; depth <= deepest + kPast_px; depth += kStepOfDepth_px) {
       // What the needle does not push does not sink.
       const double sunk = m.held ? 0 : std::max(0.0, depth - m.dimple_px);
       if (sunk > kSinks_px && (punctured || depth <= on_tip_from)) {
@@ -212,7 +212,7 @@ EdgeBand band_along(const MembraneSearch& search, const SeenDimple& dimple) {
     const double weight = std::clamp((1.1 - search.from_needle(i)) / 0.3, 0.0, 1.0);
     out.middle[k] += weight * (r[k] - out.middle[k]);
   }
-  out.half_width = std::min(out.half_width, search.surroundings.outermost ? kFreeHalf_px : kWithinHalf_px);
+  out.half_width = std::min(out.half_width, search.surroundings.outermost ? kBandHalf_px : kWithinHalf_px);
   return out;
 }
 

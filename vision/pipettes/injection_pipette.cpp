@@ -188,9 +188,28 @@ bool InjectionPipette::start(const GradientField& field, double noise, const Cle
 }
 
 // The end that is followed is one that looks the same in every frame; the tip is the outermost glass.
-NeedlePose InjectionPipette::find(const GradientField& field, double noise) {
+NeedlePose InjectionPipette::find(const GradientField& field, double noise,
+                                  const std::optional<Point>& moved) {
+  velocity_ = moved.value_or(velocity_);
   NeedlePose needle = follow(field, noise);
   needle.tip += glass_ahead_ * needle.axis;
+  return needle;
+}
+
+void InjectionPipette::put(const Point& tip) { last_.tip = tip - glass_ahead_ * last_.axis; }
+
+std::optional<NeedlePose> InjectionPipette::by_shaft(const GradientField& field, double noise,
+                                                     const Point& tip) {
+  NeedlePose needle = last_;
+  needle.tip = tip;
+  if (fit_walls(field, noise, radius_px_, needle, kLongest_px) < kStraight) {
+    return std::nullopt;
+  }
+  needle.ok = true;
+  needle.reason.clear();
+  last_ = needle;
+  put(needle.tip);
+  lost_ = 0;
   return needle;
 }
 

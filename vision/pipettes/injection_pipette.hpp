@@ -25,7 +25,13 @@ class InjectionPipette {
   // else lies near.
   using Clear = std::function<bool(const Point& tip)>;
   [[nodiscard]] bool start(const GradientField& field, double noise, const Clear& clear_at);
-  [[nodiscard]] NeedlePose find(const GradientField& field, double noise);
+  // moved: what the manipulator has moved it by since the last frame, px, where that is known.
+  [[nodiscard]] NeedlePose find(const GradientField& field, double noise, const std::optional<Point>& moved);
+  // It is known to be elsewhere along its axis than the picture shows.
+  void put(const Point& tip);
+  // Its shaft is seen behind a tip that is known otherwise; its axis and width are then as seen.
+  [[nodiscard]] std::optional<NeedlePose> by_shaft(const GradientField& field, double noise,
+                                                   const Point& tip);
   // Lets the template of the tip follow slow changes of focus and light. Only while nothing touches the tip.
   void learn(const GradientField& field, const NeedlePose& needle, double noise);
 
@@ -59,7 +65,7 @@ class InjectionPipette {
   Point learnt_at_;         // the tip in the last frame that the shape was learnt from
   Point shape_origin_;      // where the shape was seen in the last frame
   NeedlePose last_;
-  Point velocity_;  // px per frame
+  Point velocity_;  // px per frame: what it is expected to move by
   int lost_ = 0;    // frames in a row without the tip
   int jumps_ = 0;   // frames in a row in which the end lay somewhere else
 

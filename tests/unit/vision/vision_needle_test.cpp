@@ -100,7 +100,7 @@ class Needle : public testing::Test {
   NeedlePose look(Drawing& d) {
     ++d.frame;
     const GradientField field = draw(d);
-    const NeedlePose seen = needle_.find(field, kNoise);
+    const NeedlePose seen = needle_.find(field, kNoise, std::nullopt);
     if (learns_) {
       needle_.learn(field, seen, kNoise);
     }

@@ -1,0 +1,35 @@
+// The tip as the encoders of the manipulator tell it, once it is known how far off the picture they are.
+#pragma once
+
+#include <optional>
+
+#include "vision/pipettes/needle_pose.hpp"
+
+namespace punctum::vision {
+
+// What the picture tells of the tip along the axis, by what is near it.
+enum class TipSeen { clear, at_membrane, inside };
+
+class TipByStage {
+ public:
+  // Once per frame, before anything else. stage: px, of any constant offset; empty: not known.
+  void begin(const std::optional<Point>& stage);
+
+  [[nodiscard]] std::optional<Point> moved() const { return moved_; }  // since the last frame
+  // The tip without the picture. Empty where the stage is not known, or how far off it is.
+  [[nodiscard]] std::optional<Point> tip() const;
+  // The most likely tip along the axis, of what picture and stage tell; across it the picture is better.
+  [[nodiscard]] Point most_likely(const NeedlePose& seen, TipSeen how);
+  // Takes in how far off the stage is. Only while nothing touches the tip.
+  void learn(const NeedlePose& seen);
+
+ private:
+  std::optional<Point> stage_, moved_;
+  Point off_;             // of the stage: tip in the picture minus stage, px
+  double variance_ = 0;   // of off_ along the axis, px^2
+  double scatter_ = 0;    // variance of the stage from frame to frame, px^2
+  int frames_ = 0;        // that it was learnt from
+  int disagreements_ = 0;  // frames in a row
+};
+
+}  // namespace punctum::vision

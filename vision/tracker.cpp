@@ -261,7 +261,9 @@ void Tracker::Impl::learn_needle() {
   }
   if (!result.gap_px || *result.gap_px > kUntouched_px) {
     needle.learn(picture.field, seen_needle, picture.noise);
-    by_stage.learn(seen_needle);
+    by_stage.learn(seen_needle, TipSeen::clear);
+  } else if (*result.gap_px > TipOnMembrane::kClearAhead_px) {
+    by_stage.learn(seen_needle, TipSeen::near_membrane);
   }
   if (result.gap_px && *result.gap_px > TipOnMembrane::kClearAhead_px) {
     tip_on_membrane.learn(picture.field, result.needle);

@@ -137,9 +137,11 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
   ASSERT_EQ(truth.size(), kFrames);
   VisionConfig config;
   config.pixel_m = kPixel_um * 1e-6;
-  std::optional<Tracker> tracker;
+  std::optional<Tracker> tracker, with_pose;
+  const Point off(2.6, -1.9);  // of the pose, px
   std::map<std::string, Score> outer, inner;
   std::vector<double> tip_px, depth_px;  // seen minus true: along the axis before contact, in contact
+  std::vector<double> told_px, told_depth_px;  // likewise in all phases, and in contact, with the pose
   for (int k = 0; k < kFrames; ++k) {
     char name[32];
     std::snprintf(name, sizeof name, "frame_%04d.png", k);
@@ -147,6 +149,7 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
     ASSERT_FALSE(picture.empty()) << name;
     if (!tracker) {
       tracker.emplace(config, picture.cols, picture.rows);
+      with_pose.emplace(config, picture.cols, picture.rows);
     }
     hal::Frame frame;
     frame.pixels = picture.data;
@@ -161,8 +164,15 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
     const std::string part = phase == "contact" || phase == "puncture" ? phase : "at rest";
     outer[part].add(contour_of(t["outer"]), seen.outer);
     inner[part].add(contour_of(t["inner"]), seen.inner);
+    const Point tip(t["tip"][0].get<double>(), t["tip"][1].get<double>());
+    const Result& told = with_pose->process(frame, tip + off);
+    if (told.needle.ok) {
+      told_px.push_back((told.needle.tip - tip).dot(told.needle.axis));
+    }
+    if (phase == "contact" && told.wd_px) {
+      told_depth_px.push_back(*told.wd_px - t["wd_px"].get<double>());
+    }
     if (phase == "approach" && seen.needle.ok) {
-      const Point tip(t["tip"][0].get<double>(), t["tip"][1].get<double>());
       tip_px.push_back((seen.needle.tip - tip).dot(seen.needle.axis));
     } else if (phase == "contact" && seen.wd_px) {
       depth_px.push_back(*seen.wd_px - t["wd_px"].get<double>());
@@ -196,6 +206,8 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
   if (GetParam().noise <= 5 && GetParam().halo == 0) {  // a halo draws the tip that touches it a pixel ahead
     expect_near_truth("tip", tip_px, 0.4);
     expect_near_truth("depth of the dimple", depth_px, 0.3);
+    expect_near_truth("tip with the pose", told_px, 0.25);
+    expect_near_truth("depth of the dimple with the pose", told_depth_px, 0.25);
   }
 }
 

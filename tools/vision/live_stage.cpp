@@ -26,7 +26,7 @@ std::optional<cv::Point2d> stage_tip_at(const rt::CoreSegment& core, std::int64_
   }
   if (low < 2 || core.telemetry.read(low - 1, last) != hal::Read::ok ||
       core.telemetry.read(low - 2, sample) != hal::Read::ok || !(last.t_s > sample.t_s) ||
-      !(t_s - last.t_s < kOldest_s)) {
+      !(last.t_s < before_s) || !(t_s - last.t_s < kOldest_s)) {
     return std::nullopt;
   }
   const double on = (t_s - last.t_s) / (last.t_s - sample.t_s);

@@ -7,8 +7,8 @@
 
 namespace punctum::vision {
 
-// What the picture tells of the tip along the axis, by what is near it.
-enum class TipSeen { clear, at_membrane, inside };
+// How the picture shows the tip: with nothing near it, with a membrane less than half a dozen px away, on it.
+enum class TipSeen { clear, near_membrane, at_membrane, inside };
 
 class TipByStage {
  public:
@@ -20,8 +20,9 @@ class TipByStage {
   [[nodiscard]] std::optional<Point> tip() const;
   // The most likely tip along the axis, of what picture and stage tell; across it the picture is better.
   [[nodiscard]] Point most_likely(const NeedlePose& seen, TipSeen how);
-  // Takes in how far off the stage is. Only while nothing touches the tip.
-  void learn(const NeedlePose& seen);
+  // Takes in how far off the stage is. Only while nothing touches the tip; how: clear or near a
+  // membrane.
+  void learn(const NeedlePose& seen, TipSeen how);
 
  private:
   std::optional<Point> stage_, moved_;

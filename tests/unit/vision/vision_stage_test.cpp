@@ -1,0 +1,191 @@
+// Where the manipulator has the needle's tip: what the tracker makes of it, and where it comes from.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <random>
+#include <string>
+
+#include "rt/station/station.hpp"
+#include "tools/vision/live_stage.hpp"
+#include "tools/vision/stage_poses.hpp"
+#include "vision/pipettes/tip_by_stage.hpp"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace punctum;
+using vision::NeedlePose;
+using vision::Point;
+using vision::TipByStage;
+using vision::TipSeen;
+
+NeedlePose seen_at(const Point& tip) {
+  NeedlePose pose;
+  pose.ok = true;
+  pose.tip = tip;
+  pose.axis = {-1, 0};
+  return pose;
+}
+
+// A needle that comes 1 px per frame and is seen with 0.2 px of noise; the stage is off by (40, -3) px.
+class StageTip : public testing::Test {
+ protected:
+  void approach(int frames, double scatter_px = 0) {
+    std::normal_distribution<double> noise(0, 0.2), scatter(0, scatter_px > 0 ? scatter_px : 1);
+    for (int k = 0; k < frames; ++k) {
+      x_ -= 1;
+      told_.begin(Point(x_ - 40 + (scatter_px > 0 ? scatter(random_) : 0), 103));
+      told_.learn(seen_at({x_ + noise(random_), 100}), TipSeen::clear);
+    }
+  }
+  TipByStage told_;
+  double x_ = 500;
+  std::mt19937 random_{3};
+};
+
+TEST_F(StageTip, is_off_by_what_nothing_but_clear_frames_tell) {
+  EXPECT_FALSE(told_.tip());
+  approach(20);
+  ASSERT_TRUE(told_.tip());
+  EXPECT_NEAR(told_.tip()->x, x_, 0.15);
+  EXPECT_NEAR(told_.tip()->y, 100, 0.15);
+  ASSERT_TRUE(told_.moved());
+  EXPECT_NEAR(told_.moved()->x, -1, 1e-12);
+}
+
+TEST_F(StageTip, holds_against_a_picture_that_is_drawn_aside) {
+  approach(20);
+  for (int k = 0; k < 200; ++k) {
+    told_.begin(Point(x_ - 40, 103));
+    EXPECT_NEAR(told_.most_likely(seen_at({x_ + 3, 100}), TipSeen::inside).x, x_, 0.35) << k;
+  }
+}
+
+// 1.5 px from frame to frame: the picture is better where it is clear.
+TEST_F(StageTip, counts_little_where_it_scatters) {
+  approach(60, 1.5);
+  told_.begin(Point(x_ - 40 + 3, 103));
+  EXPECT_NEAR(told_.most_likely(seen_at({x_, 100}), TipSeen::clear).x, x_, 0.4);
+}
+
+TEST_F(StageTip, is_given_up_where_the_needle_has_slipped) {
+  approach(20);
+  Point last;
+  for (int k = 0; k < 12; ++k) {
+    told_.begin(Point(x_ - 40, 103));
+    last = told_.most_likely(seen_at({x_ + 8, 100}), TipSeen::inside);
+  }
+  EXPECT_NEAR(last.x, x_ + 8, 1e-12);
+  EXPECT_FALSE(told_.tip());
+}
+
+TEST_F(StageTip, is_not_known_in_a_frame_without_one) {
+  approach(20);
+  told_.begin(std::nullopt);
+  EXPECT_FALSE(told_.tip());
+  EXPECT_FALSE(told_.moved());
+  EXPECT_EQ(told_.most_likely(seen_at({300, 100}), TipSeen::inside).x, 300);
+}
+
+// ---- from a table ----
+
+class Poses : public testing::Test {
+ protected:
+  void TearDown() override { fs::remove(file_); }
+  tl::expected<tools::StagePoses, std::string> read(const std::string& text) const {
+    std::ofstream(file_) << text;
+    return tools::StagePoses::read(file_);
+  }
+  std::string file_ = testing::TempDir() + "poses_" + std::to_string(getpid()) + ".csv";
+};
+
+TEST_F(Poses, lie_between_the_rows_of_a_table) {
+  const auto poses = read("t_s,phase,tip_x_m,tip_y_m,tip_z_m\n0,free,1e-6,0,0\n0.1,free,3e-6,-1e-6,0\n1,free,0,0,0\n");
+  ASSERT_TRUE(poses) << poses.error();
+  ASSERT_TRUE(poses->at(0.025));
+  EXPECT_NEAR(poses->at(0.025)->x, 1.5e-6, 1e-15);
+  EXPECT_NEAR(poses->at(0.025)->y, -0.25e-6, 1e-15);
+  EXPECT_NEAR(poses->at(0.1)->x, 3e-6, 1e-15);
+  EXPECT_FALSE(poses->at(-0.01));
+  EXPECT_FALSE(poses->at(0.5)) << "the rows round it are too far apart";
+  EXPECT_FALSE(poses->at(1.01));
+}
+
+TEST_F(Poses, that_cannot_be_are_refused_in_one_line) {
+  for (const auto& [text, why] : {std::pair{"", "no column t_s"}, std::pair{"t_s,tip_x_m\n0,0\n", "no column tip_y_m"},
+                                  std::pair{"t_s,tip_x_m,tip_y_m\n0,0,0\n0,0,0\n", ":3: t_s does not rise"},
+                                  std::pair{"t_s,tip_x_m,tip_y_m\n0,nan,0\n", ":2: "},
+                                  std::pair{"t_s,tip_x_m,tip_y_m\n0,0\n", ":2: "},
+                                  std::pair{"t_s,tip_x_m,tip_y_m\n0,0,2\n", "at most"},
+                                  std::pair{"t_s,tip_x_m,tip_y_m\ninf,0,0\n", ":2: "}}) {
+    const auto poses = read(text);
+    ASSERT_FALSE(poses) << text;
+    EXPECT_NE(poses.error().find(why), std::string::npos) << poses.error();
+    EXPECT_EQ(poses.error().find('\n'), std::string::npos);
+  }
+  EXPECT_FALSE(tools::StagePoses::read("/no/such/file"));
+}
+
+// ---- from the core ----
+
+class LiveStage : public testing::Test {
+ protected:
+  void SetUp() override {
+    core_->status.started.store(1);
+    core_->status.start_ns.store(5'000'000'000);
+    core_->status.period_ns.store(1'000'000);
+  }
+  // Ticks from..to - 1, in which the tip comes 100 um/s.
+  void ticks(int from, int to) {
+    for (int k = from; k < to; ++k) {
+      rt::TelemetrySample s;
+      s.tick = static_cast<std::uint64_t>(k);
+      s.t_s = k * 1e-3;
+      s.tip_m[0] = 1e-3 - 1e-7 * k;
+      s.tip_m[1] = 2e-3;
+      core_->telemetry.push(s);
+    }
+  }
+  [[nodiscard]] std::optional<cv::Point2d> at_tick(int k) const {
+    return tools::stage_tip_at(*core_, 5'000'000'000 + k * 1'000'000LL);
+  }
+  std::unique_ptr<rt::CoreSegment> core_ = std::make_unique<rt::CoreSegment>();
+};
+
+TEST_F(LiveStage, is_the_same_whether_the_tick_of_the_exposure_is_written_or_not) {
+  ticks(0, 500);
+  const auto before = at_tick(500);
+  ticks(500, 520);
+  const auto after = at_tick(500);
+  ASSERT_TRUE(before && after);
+  EXPECT_EQ(before->x, after->x);
+  EXPECT_NEAR(before->x, 1e-3 - 5e-5, 1e-12);
+  EXPECT_NEAR(before->y, 2e-3, 1e-12);
+}
+
+TEST_F(LiveStage, is_not_told_from_samples_that_are_not_near) {
+  EXPECT_FALSE(at_tick(0)) << "none";
+  ticks(0, 2);
+  EXPECT_FALSE(at_tick(1)) << "one before it is not enough";
+  ticks(2, 500);
+  EXPECT_FALSE(at_tick(600)) << "the core has stopped";
+  ticks(500, 20'000);
+  EXPECT_FALSE(at_tick(500)) << "overwritten";
+  EXPECT_TRUE(at_tick(19'000));
+  core_->status.started.store(0);
+  EXPECT_FALSE(at_tick(19'000));
+}
+
+TEST_F(LiveStage, is_not_told_from_what_no_stage_can_be) {
+  ticks(0, 10);
+  rt::TelemetrySample s;
+  s.t_s = 0.010;
+  s.tip_m[0] = std::nan("");
+  core_->telemetry.push(s);
+  EXPECT_FALSE(at_tick(11));
+}
+
+}  // namespace

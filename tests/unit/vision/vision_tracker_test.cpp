@@ -28,6 +28,11 @@ double dent(double t, double w, double half_rad = 0.42) {
   return w * std::exp(-0.5 * u * u);
 }
 
+struct Speck {
+  Point at;
+  double r = 3, grey = -40;
+};
+
 struct Drawing {
   double tip = 500;  // x of the needle's end face; its axis is y = kCentre.y
   double dent = 0;   // px
@@ -38,6 +43,7 @@ struct Drawing {
   double inner_dent = -1;  // px; < 0: 0.9 of the outer membrane's
   bool granules = false;   // in the ooplasm, where a dimple's sides may be
   double ooplasm = 34;     // grey levels darker than the space round it
+  std::vector<Speck> specks = {};
 };
 
 cv::Mat draw(const Drawing& d) {
@@ -82,6 +88,11 @@ cv::Mat draw(const Drawing& d) {
       }
       m.at<float>(y, x) = sum;
     }
+  }
+  for (const Speck& speck : d.specks) {
+    cv::Mat round = cv::Mat::zeros(m.size(), CV_8U);
+    cv::circle(round, speck.at, static_cast<int>(speck.r), cv::Scalar(1), cv::FILLED);
+    cv::add(m, cv::Scalar(speck.grey), m, round);
   }
   cv::GaussianBlur(m, m, cv::Size(0, 0), 1.2);
   std::mt19937 random(d.seed);
@@ -380,6 +391,70 @@ TEST(Tracker, finds_an_inner_membrane_that_only_all_rays_together_show) {
     } else {
       EXPECT_EQ(claimed, 0);
     }
+  }
+}
+
+TEST(Tracker, finds_a_needle_on_and_beside_which_specks_lie) {
+  int found = 0, looked = 0;
+  for (unsigned seed = 1; seed <= 30; ++seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> along(15, kW - 1 - 420), aside(-22, 22), radius(2, 5), dark(-60, -15);
+    Drawing drawn{.tip = 420, .noise = seed % 2 == 0 ? 5.0 : 2.0, .seed = seed};
+    for (int k = 0; k < 5; ++k) {
+      const double s = along(random);
+      drawn.specks.push_back({{drawn.tip + s, kCentre.y + aside(random)}, radius(random), dark(random)});
+    }
+    Tracker tracker({}, kW, kH);
+    const Result& r = tracker.process(frame_of(draw(drawn)));
+    ++looked;
+    const bool right = r.needle.ok && std::abs(r.needle.tip.x - drawn.tip) < 1.2 &&
+                       std::abs(r.needle.tip.y - kCentre.y) < 0.7;
+    found += right ? 1 : 0;
+    if (!right) {
+      std::printf("seed %u: %s tip (%.2f, %.2f)\n", seed, r.needle.ok ? "seen" : r.needle.reason.c_str(),
+                  r.needle.tip.x - drawn.tip, r.needle.tip.y - kCentre.y);
+    }
+  }
+  EXPECT_GE(found, looked - 1);
+}
+
+// What is learnt of the needle in a few frames, before it comes near the cell, must not move its tip.
+TEST(Tracker, sees_a_tip_where_it_is_in_every_frame_of_a_short_approach) {
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    Tracker tracker({}, kW, kH);
+    std::uint64_t n = 0;
+    for (double depth = -16; depth <= -3; ++depth) {
+      const Drawing drawn{.tip = kCentre.x + kR - depth, .seed = 100 * seed + static_cast<unsigned>(n)};
+      const Result& r = tracker.process(frame_of(draw(drawn), n++));
+      ASSERT_TRUE(r.needle.ok) << depth << r.verdict;
+      EXPECT_NEAR(r.needle.tip.x, drawn.tip, 0.8) << "seed " << seed << ", " << depth;
+    }
+  }
+}
+
+// Granules hide the end; the shaft and the manipulator tell where it is. Without a shaft there is none.
+TEST(Tracker, follows_a_needle_whose_end_is_hidden_by_the_pose_of_the_manipulator) {
+  Tracker tracker({}, kW, kH);
+  const Point off(31, -12);
+  std::uint64_t n = 0;
+  double tip = 430;
+  const auto look = [&](std::vector<Speck> specks, bool needle) -> const Result& {
+    Drawing drawn{.tip = tip, .seed = static_cast<unsigned>(n) + 1, .needle = needle};
+    drawn.specks = std::move(specks);
+    return tracker.process(frame_of(draw(drawn), n++), Point(tip, kCentre.y) + off);
+  };
+  for (; tip > 400; tip -= 3) {
+    ASSERT_TRUE(look({}, true).needle.ok);
+  }
+  for (int k = 0; k < 6; ++k, tip -= 3) {
+    const std::vector<Speck> over_the_end{{{tip - 4, kCentre.y}, 13, -55}, {{tip + 6, kCentre.y + 3}, 12, -50}};
+    const Result& r = look(over_the_end, true);
+    ASSERT_TRUE(r.needle.ok) << r.needle.reason;
+    EXPECT_NEAR(r.needle.tip.x, tip, 0.7) << k;
+    EXPECT_NEAR(r.needle.tip.y, kCentre.y, 0.7) << k;
+  }
+  for (int k = 0; k < 3; ++k, tip -= 3) {
+    EXPECT_FALSE(look({}, false).needle.ok);
   }
 }
 

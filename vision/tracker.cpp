@@ -34,7 +34,7 @@ constexpr double kUntouched_px = 12;      // further outside, nothing touches th
 constexpr double kLeastDimple_px = 0.7;   // depth from which the width of a dimple can be measured
 constexpr double kNear_px = 8;            // nearer, the needle may touch the membrane
 constexpr double kClear_px = 3;           // further away, it does not: its blur ends before
-constexpr double kTipNoise_px = 0.1;
+constexpr double kAtMembrane_px = 0.6, kInside_px = 1.5;  // to which the picture alone shows the tip there
 // The paper keeps the large variations of the gradient only. Of the usual edge of a membrane: with 0.4 needle
 // and cell merge when they are still 4 px apart, with 0.75 they part again over a deep dimple.
 constexpr double kLargeGradient = 0.6;
@@ -237,14 +237,15 @@ void Tracker::Impl::locate_needle() {
   if (config.method == Method::tracker && n.ok && was_contact && !punctured && outer.known) {
     n.tip += tip_on_membrane.ahead(picture.field, picture.noise, n).value_or(0) * n.axis;
   }
+  // A membrane on the tip draws its end aside, granules round it by several pixels.
+  n.sd = math::hypot(n.sd, punctured ? kInside_px : was_contact ? kAtMembrane_px : 0);
   seen_needle = n;
   wall_px = 0;
   if (const auto tip_told = by_stage.tip(); tip_told && !n.ok) {
     n = needle.by_shaft(picture.field, picture.noise, *tip_told).value_or(n);
+    n.sd = by_stage.sd();
   } else if (tip_told) {
-    n.tip = by_stage.most_likely(n, punctured     ? TipSeen::inside
-                                    : was_contact ? TipSeen::at_membrane
-                                                  : TipSeen::clear);
+    n = by_stage.most_likely(n);
     needle.put(n.tip);
     // In contact the picture shows where the membrane is, on the tip.
     if (was_contact && !punctured) {
@@ -261,9 +262,9 @@ void Tracker::Impl::learn_needle() {
   }
   if (!result.gap_px || *result.gap_px > kUntouched_px) {
     needle.learn(picture.field, seen_needle, picture.noise);
-    by_stage.learn(seen_needle, TipSeen::clear);
-  } else if (*result.gap_px > TipOnMembrane::kClearAhead_px) {
-    by_stage.learn(seen_needle, TipSeen::near_membrane);
+  }
+  if (!result.gap_px || *result.gap_px > TipOnMembrane::kClearAhead_px) {
+    by_stage.learn(seen_needle);
   }
   if (result.gap_px && *result.gap_px > TipOnMembrane::kClearAhead_px) {
     tip_on_membrane.learn(picture.field, result.needle);
@@ -466,7 +467,7 @@ void Tracker::Impl::measure_gap(int fitted_points) {
     return;
   }
   result.gap_px = (*result.entry - n.tip).dot(n.axis);
-  result.gap_noise_px = math::hypot(kTipNoise_px, 3 * result.outer.residual_px / std::sqrt(fitted_points));
+  result.gap_noise_px = math::hypot(n.sd, 3 * result.outer.residual_px / std::sqrt(fitted_points));
 }
 
 // Whether needle and cell touch. Returns how far behind the tip the membrane lies on the needle.

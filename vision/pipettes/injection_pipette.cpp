@@ -156,7 +156,7 @@ bool InjectionPipette::start(const GradientField& field, double noise, const Cle
   if (walls_agree_) {
     last_.tip = end_by_walls;
   }
-  glass_ahead_ = 0;
+  glass_ahead_ = glass_scatter_ = glass_blur_ = 0;
   glass_frames_ = 0;
   learn_glass(field, noise, last_, kStartReach_px);
   NeedlePose plain = last_;
@@ -193,7 +193,18 @@ NeedlePose InjectionPipette::find(const GradientField& field, double noise,
   velocity_ = moved.value_or(velocity_);
   NeedlePose needle = follow(field, noise);
   needle.tip += glass_ahead_ * needle.axis;
+  needle.sd = tip_sd();
   return needle;
+}
+
+// With nothing near it. Out of focus the lumen closes, and which of the shapes it is, is not certain.
+double InjectionPipette::tip_sd() const {
+  constexpr double kUsual_px = 0.15, kUsualFrames = 3;  // before it is known
+  constexpr double kSharp_px = 2.1, kPerBlur = 0.8;
+  const double of_frame = (kUsualFrames * kUsual_px * kUsual_px + glass_frames_ * glass_scatter_) /
+                          (kUsualFrames + glass_frames_);
+  const double unsharp = kPerBlur * std::max(0.0, glass_blur_ - kSharp_px);
+  return std::sqrt(of_frame * (1 + 1.0 / std::max(glass_frames_, 1)) + unsharp * unsharp);
 }
 
 void InjectionPipette::put(const Point& tip) { last_.tip = tip - glass_ahead_ * last_.axis; }
@@ -363,7 +374,12 @@ void InjectionPipette::learn_glass(const GradientField& field, double noise, Nee
   followed.tip += glass_ahead_ * followed.axis;
   const auto end = end_of_glass(field, noise, followed, reach, reach);
   if (end && end->sd < kCertain_px) {
-    glass_ahead_ += end->ahead / ++glass_frames_;
+    const double before = end->ahead, part = 1.0 / ++glass_frames_;
+    glass_ahead_ += part * before;
+    // With the deviation that its likelihood has.
+    const double squares = glass_frames_ > 1 ? before * (1 - part) * before : end->sd * end->sd;
+    glass_scatter_ += part * (squares - glass_scatter_);
+    glass_blur_ += part * (end->blur - glass_blur_);
   }
 }
 

@@ -48,6 +48,7 @@ class InjectionPipette {
   void calibrate_walls(const GradientField& field, const NeedlePose& walls, double noise);
   void learn_shape_anew(const GradientField& field);
   void learn_glass(const GradientField& field, double noise, NeedlePose followed, double reach);
+  [[nodiscard]] double tip_sd() const;
   [[nodiscard]] NeedlePose follow(const GradientField& field, double noise);
   [[nodiscard]] NeedlePose not_recognised(const GradientField& field, double noise, NeedlePose needle);
 
@@ -74,6 +75,8 @@ class InjectionPipette {
   int offset_frames_ = 0;     // that walls_offset_ was learnt from
   double glass_ahead_ = 0;    // of the end that is followed: the outermost glass, px
   int glass_frames_ = 0;      // that it was learnt from
+  double glass_scatter_ = 0;  // variance of where the end that is followed seems to be from it, px^2
+  double glass_blur_ = 0;     // px
   double step_sign_ = 0;      // +1: it is brighter ahead of the walls, -1: darker, 0: not known yet
   bool walls_agree_ = false;  // with the shape, in the last frame
 };

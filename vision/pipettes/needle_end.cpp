@@ -234,6 +234,7 @@ struct Ends {
   std::vector<double> at;
   std::size_t best = 0;
   bool plain = false;
+  double blur = 0;  // px
   [[nodiscard]] double top() const { return at[best]; }
   [[nodiscard]] double behind() const {
     return first + (static_cast<double>(best) + 2 * vertex_offset(at[best - 2], top(), at[best + 2])) *
@@ -267,6 +268,7 @@ std::optional<Ends> best_end(const Rows& rows, double half_width, double from, d
     if (found.at.empty() || g.top() > found.top()) {
       g.plain = model.fit(first + static_cast<int>(g.best)).plain && blur < kBlurs_px.back();
       g.first = rows.first_s + first * EndModel::kFine_px;
+      g.blur = blur;
       found = std::move(g);
     }
   }
@@ -305,7 +307,8 @@ std::optional<GlassEnd> end_of_glass(const GradientField& field, double noise, c
   if (!found || !found->plain) {
     return std::nullopt;
   }
-  return GlassEnd{-found->behind(), std::sqrt(2 * unit / std::max(found->curvature(), 1e-9))};
+  return GlassEnd{-found->behind(), std::sqrt(2 * unit / std::max(found->curvature(), 1e-9)),
+                  found->blur};
 }
 
 }  // namespace punctum::vision

@@ -13,6 +13,7 @@ namespace punctum::vision {
 struct GlassEnd {
   double ahead = 0;  // of the tip of the pose, px; sub-pixel
   double sd = 0;     // of it, px
+  double blur = 0;   // of walls and line, px
 };
 
 // From `back` px behind the tip of the pose to `ahead` px ahead of it. noise: grey levels. Empty where the

@@ -11,6 +11,7 @@ namespace punctum::vision {
 struct NeedlePose {
   bool ok = false;
   Point tip;              // sub-pixel: the middle of the end face
+  double sd = 0;          // standard deviation of the tip along the axis, px
   Point axis{-1, 0};      // unit, pointing out of the tip
   double half_width = 0;  // at the tip, px
   double taper = 0;       // growth of the half-width per px away from the tip

@@ -7,9 +7,6 @@
 
 namespace punctum::vision {
 
-// How the picture shows the tip: with nothing near it, with a membrane less than half a dozen px away, on it.
-enum class TipSeen { clear, near_membrane, at_membrane, inside };
-
 class TipByStage {
  public:
   // Once per frame, before anything else. stage: px, of any constant offset; empty: not known.
@@ -18,11 +15,11 @@ class TipByStage {
   [[nodiscard]] std::optional<Point> moved() const { return moved_; }  // since the last frame
   // The tip without the picture. Empty where the stage is not known, or how far off it is.
   [[nodiscard]] std::optional<Point> tip() const;
-  // The most likely tip along the axis, of what picture and stage tell; across it the picture is better.
-  [[nodiscard]] Point most_likely(const NeedlePose& seen, TipSeen how);
-  // Takes in how far off the stage is. Only while nothing touches the tip; how: clear or near a
-  // membrane.
-  void learn(const NeedlePose& seen, TipSeen how);
+  // With the most likely tip along the axis, of what picture and stage tell; across it the picture is better.
+  [[nodiscard]] NeedlePose most_likely(const NeedlePose& seen);
+  // Takes in how far off the stage is. Only while nothing touches the tip.
+  void learn(const NeedlePose& seen);
+  [[nodiscard]] double sd() const;  // of tip() along the axis, px
 
  private:
   std::optional<Point> stage_, moved_;

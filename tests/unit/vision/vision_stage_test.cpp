@@ -20,12 +20,12 @@ using namespace punctum;
 using vision::NeedlePose;
 using vision::Point;
 using vision::TipByStage;
-using vision::TipSeen;
 
-NeedlePose seen_at(const Point& tip) {
+NeedlePose seen_at(const Point& tip, double sd) {
   NeedlePose pose;
   pose.ok = true;
   pose.tip = tip;
+  pose.sd = sd;
   pose.axis = {-1, 0};
   return pose;
 }
@@ -38,7 +38,7 @@ class StageTip : public testing::Test {
     for (int k = 0; k < frames; ++k) {
       x_ -= 1;
       told_.begin(Point(x_ - 40 + (scatter_px > 0 ? scatter(random_) : 0), 103));
-      told_.learn(seen_at({x_ + noise(random_), 100}), TipSeen::clear);
+      told_.learn(seen_at({x_ + noise(random_), 100}, 0.25));
     }
   }
   TipByStage told_;
@@ -60,7 +60,7 @@ TEST_F(StageTip, holds_against_a_picture_that_is_drawn_aside) {
   approach(20);
   for (int k = 0; k < 200; ++k) {
     told_.begin(Point(x_ - 40, 103));
-    EXPECT_NEAR(told_.most_likely(seen_at({x_ + 3, 100}), TipSeen::inside).x, x_, 0.35) << k;
+    EXPECT_NEAR(told_.most_likely(seen_at({x_ + 3, 100}, 2)).tip.x, x_, 0.35) << k;
   }
 }
 
@@ -68,7 +68,7 @@ TEST_F(StageTip, holds_against_a_picture_that_is_drawn_aside) {
 TEST_F(StageTip, counts_little_where_it_scatters) {
   approach(60, 1.5);
   told_.begin(Point(x_ - 40 + 3, 103));
-  EXPECT_NEAR(told_.most_likely(seen_at({x_, 100}), TipSeen::clear).x, x_, 0.4);
+  EXPECT_NEAR(told_.most_likely(seen_at({x_, 100}, 0.25)).tip.x, x_, 0.4);
 }
 
 TEST_F(StageTip, is_given_up_where_the_needle_has_slipped) {
@@ -76,7 +76,7 @@ TEST_F(StageTip, is_given_up_where_the_needle_has_slipped) {
   Point last;
   for (int k = 0; k < 12; ++k) {
     told_.begin(Point(x_ - 40, 103));
-    last = told_.most_likely(seen_at({x_ + 8, 100}), TipSeen::inside);
+    last = told_.most_likely(seen_at({x_ + 8, 100}, 2)).tip;
   }
   EXPECT_NEAR(last.x, x_ + 8, 1e-12);
   EXPECT_FALSE(told_.tip());
@@ -87,7 +87,7 @@ TEST_F(StageTip, is_not_known_in_a_frame_without_one) {
   told_.begin(std::nullopt);
   EXPECT_FALSE(told_.tip());
   EXPECT_FALSE(told_.moved());
-  EXPECT_EQ(told_.most_likely(seen_at({300, 100}), TipSeen::inside).x, 300);
+  EXPECT_EQ(told_.most_likely(seen_at({300, 100}, 2)).tip.x, 300);
 }
 
 // ---- from a table ----

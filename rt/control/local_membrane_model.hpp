@@ -22,7 +22,7 @@ namespace punctum::rt {
 // The membrane between two frames, and what happens when vision falls silent.
 struct LocalModelParams {
   double disagree_m = 8e-6;  // stage and picture may move apart by this before the picture is not believed
-  double gain = 0.3;         // of one observation
+  double gain = 0.3;         // of one observation at most; of a doubtful one less
   double max_rate_m_s = 100e-6;  // bounded correction of the membrane's position
   double stale_after_s = 0.30;   // age from which the rendered force fades
   double fade_s = 0.15;
@@ -136,6 +136,7 @@ class LocalMembraneModel {
  private:
   static constexpr std::size_t kFirstFrames = 5;  // one of them may be mistaken, or two alike
 
+  [[nodiscard]] double gain_of(const Observation& seen) NONBLOCKING;
   [[nodiscard]] Membrane3D claimed_by(const Observation& seen, const TipPose& pose) NONBLOCKING;
   [[nodiscard]] bool in_order(const Observation& seen) NONBLOCKING;
   void remember_first(const Membrane3D& claim) NONBLOCKING;
@@ -152,6 +153,7 @@ class LocalMembraneModel {
   Membrane3D membrane_;
   hal::Vec3 entry_correction_m_ = hal::Vec3::Zero();  // still to be applied
   double R_correction_m_ = 0;
+  double variance_m2_ = 0;  // of the entry along the axis
   double scale_correction_ = 0;
   double dimple_scale_;
   std::array<Membrane3D, kFirstFrames> first_claims_{};

@@ -31,6 +31,8 @@ constexpr double kFollowed_px = 24;                   // and later, of a faint o
 // Standard deviation of the end of a faint needle. A tip that is less certain does more harm than one that is
 // not claimed: membranes are then taken for pushed that are free.
 constexpr double kEndKnown_px = 0.7;
+// Further out of focus the lumen closes, and the end is somewhere in 3 px.
+constexpr double kSharp_px = 2.3;
 // In a needle with a smaller half-width no lumen is left between the walls, and a line across it looks like
 // them.
 constexpr double kLumen_px = 4.5;
@@ -164,7 +166,7 @@ bool InjectionPipette::start(const GradientField& field, double noise, const Cle
   longest_ = faint ? kFollowed_px : kShortest_px;
   if (faint) {
     const auto end = end_of_glass(field, noise, last_, kStartReach_px, kStartReach_px);
-    if (!end || end->sd > kEndKnown_px || !clear_at(last_.tip)) {
+    if (!end || end->sd > kEndKnown_px || end->blur > kSharp_px || !clear_at(last_.tip)) {
       reason_ = "the end of the needle is not clear";
       return false;
     }
@@ -193,15 +195,16 @@ NeedlePose InjectionPipette::find(const GradientField& field, double noise,
   velocity_ = moved.value_or(velocity_);
   NeedlePose needle = follow(field, noise);
   needle.tip += glass_ahead_ * needle.axis;
-  needle.sd = tip_sd();
+  needle.sd = tip_sd(noise);
   return needle;
 }
 
 // With nothing near it. Out of focus the lumen closes, and which of the shapes it is, is not certain.
-double InjectionPipette::tip_sd() const {
-  constexpr double kUsual_px = 0.15, kUsualFrames = 3;  // before it is known
-  constexpr double kSharp_px = 2.1, kPerBlur = 0.8;
-  const double of_frame = (kUsualFrames * kUsual_px * kUsual_px + glass_frames_ * glass_scatter_) /
+double InjectionPipette::tip_sd(double noise) const {
+  constexpr double kUsualFrames = 3;
+  const double usual = 0.1 + 0.04 * noise;  // px, before it is known: of walls of usual contrast
+  constexpr double kPerBlur = 0.8;
+  const double of_frame = (kUsualFrames * usual * usual + glass_frames_ * glass_scatter_) /
                           (kUsualFrames + glass_frames_);
   const double unsharp = kPerBlur * std::max(0.0, glass_blur_ - kSharp_px);
   return std::sqrt(of_frame * (1 + 1.0 / std::max(glass_frames_, 1)) + unsharp * unsharp);

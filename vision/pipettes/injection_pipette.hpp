@@ -48,7 +48,7 @@ class InjectionPipette {
   void calibrate_walls(const GradientField& field, const NeedlePose& walls, double noise);
   void learn_shape_anew(const GradientField& field);
   void learn_glass(const GradientField& field, double noise, NeedlePose followed, double reach);
-  [[nodiscard]] double tip_sd() const;
+  [[nodiscard]] double tip_sd(double noise) const;
   [[nodiscard]] NeedlePose follow(const GradientField& field, double noise);
   [[nodiscard]] NeedlePose not_recognised(const GradientField& field, double noise, NeedlePose needle);
 

@@ -56,6 +56,7 @@ struct ModelInWorld {
   Vec3 tip{60e-6, 5e-6, 0};
   int latency = 80;
   bool seeing = true;
+  double noise_m = 0, error_m = 0;  // of an observation: what it says, and what it has
   std::array<Vec3, 1024> past{};
   std::uint64_t tick = 0;
   bool used = false;
@@ -66,7 +67,10 @@ struct ModelInWorld {
     model.push_pose({now, tip + world.registration, world.axis});
     used = false;
     if (seeing && tick % 40 == 0 && tick > static_cast<std::uint64_t>(latency)) {
-      used = model.observe(world.see(past[(tick - latency) % 1024], now - latency * kTick_ns), false);
+      Observation o = world.see(past[(tick - latency) % 1024], now - latency * kTick_ns);
+      o.noise_m = noise_m;
+      o.gap_m += error_m;
+      used = model.observe(o, false);
     }
     model.step(now, world.axis, kTick_s);
     ++tick;
@@ -89,6 +93,60 @@ TEST(LocalMembraneModel, follows_a_moving_needle_between_late_frames) {
   EXPECT_NEAR(
       (b.model.membrane().entry_m - b.world.registration - (b.world.centre + Vec3(60e-6, 0, 0))).norm(), 0,
       30e-9);
+}
+
+// One frame of five shows the gap a micrometre wrong, and says so.
+TEST(LocalMembraneModel, is_corrected_less_by_a_doubtful_observation) {
+  double worst[2] = {};
+  for (const bool says_so : {false, true}) {
+    ModelInWorld b;
+    for (int k = 0; k < 4000; ++k) {
+      const bool doubtful = k / 40 % 5 == 4;
+      b.error_m = doubtful ? 1e-6 : 0;
+      b.noise_m = doubtful && says_so ? 1e-6 : 0.1e-6;
+      b.step();
+      if (k > 1000) {
+        worst[says_so ? 1 : 0] = std::max(worst[says_so ? 1 : 0], std::abs(b.error()));
+      }
+    }
+  }
+  EXPECT_GT(worst[0], 0.2e-6);
+  EXPECT_LT(worst[1], 0.05e-6);
+}
+
+// The less they tell, the longer it takes; but they are all there is.
+TEST(LocalMembraneModel, follows_doubtful_observations_where_there_are_no_others) {
+  ModelInWorld b;
+  b.noise_m = 1e-6;
+  for (int k = 0; k < 500; ++k) {
+    b.step();
+  }
+  b.world.centre += Vec3(4e-6, 0, 0);
+  for (int k = 0; k < 400; ++k) {
+    b.step();
+  }
+  EXPECT_GT(std::abs(b.error()), 1e-6);
+  for (int k = 0; k < 4000; ++k) {
+    b.step();
+  }
+  EXPECT_LT(std::abs(b.error()), 0.2e-6);
+}
+
+TEST(LocalMembraneModel, refuses_a_deviation_that_is_none) {
+  ModelInWorld b;
+  for (int k = 0; k < 500; ++k) {
+    b.step();
+  }
+  for (const double noise_m : {std::numeric_limits<double>::quiet_NaN(), -1e-7}) {
+    b.noise_m = noise_m;
+    const Vec3 entry = b.model.membrane().entry_m;
+    b.error_m = 2e-6;
+    for (int k = 0; k < 200; ++k) {
+      b.step();
+      EXPECT_FALSE(b.used);
+    }
+    EXPECT_EQ(b.model.membrane().entry_m, entry);
+  }
 }
 
 TEST(LocalMembraneModel, corrects_itself_at_a_bounded_rate) {

@@ -27,13 +27,13 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr int kHolderEvery = 8;           // frames between two searches for a tube that was not found
+constexpr int kHolderEvery = 8;  // frames between two searches for a tube that was not found
 constexpr int kNeedleAtOnce = 6, kNeedleEvery = 8;  // likewise for the needle, after so many tries
-constexpr double kNeedleMargin_px = 2.5;  // the blur reaches so far beyond the needle's edges
-constexpr double kUntouched_px = 12;      // further outside, nothing touches the tip
-constexpr double kLeastDimple_px = 0.7;   // depth from which the width of a dimple can be measured
-constexpr double kNear_px = 8;            // nearer, the needle may touch the membrane
-constexpr double kClear_px = 3;           // further away, it does not: its blur ends before
+constexpr double kNeedleMargin_px = 2.5;            // the blur reaches so far beyond the needle's edges
+constexpr double kUntouched_px = 12;                // further outside, nothing touches the tip
+constexpr double kLeastDimple_px = 0.7;             // depth from which the width of a dimple can be measured
+constexpr double kNear_px = 8;                      // nearer, the needle may touch the membrane
+constexpr double kClear_px = 3;                     // further away, it does not: its blur ends before
 constexpr double kAtMembrane_px = 0.6, kInside_px = 1.5;  // to which the picture alone shows the tip there
 // The paper keeps the large variations of the gradient only. Of the usual edge of a membrane: with 0.4 needle
 // and cell merge when they are still 4 px apart, with 0.75 they part again over a deep dimple.
@@ -65,8 +65,8 @@ struct Tracker::Impl {
   int needle_tries = 0;
   TipByStage by_stage;
   NeedlePose membrane_needle;  // its tip where the membrane on it is seen
-  NeedlePose seen_needle;  // as the picture alone tells it
-  double wall_px = 0;      // from the tip to the middle of the membrane that it pushes, as far as seen
+  NeedlePose seen_needle;      // as the picture alone tells it
+  double wall_px = 0;          // from the tip to the middle of the membrane that it pushes, as far as seen
   TipOnMembrane tip_on_membrane;
   TipMotion tip;
 
@@ -225,8 +225,7 @@ cv::Rect Tracker::Impl::area_to_search(bool starting) const {
 }
 
 void Tracker::Impl::locate_needle() {
-  if (const int n = needle_tries++;
-      !needle.started() && (n < kNeedleAtOnce || n % kNeedleEvery == 0)) {
+  if (const int n = needle_tries++; !needle.started() && (n < kNeedleAtOnce || n % kNeedleEvery == 0)) {
     // A membrane at the tip of a faint needle looks like its end.
     (void)needle.start(picture.field, picture.noise, [this](const Point& end) {
       return !outer.known || cv::norm(end - outer.centre) > median_of(outer.r) + kUntouched_px;

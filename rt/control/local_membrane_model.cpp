@@ -102,7 +102,8 @@ bool LocalMembraneModel::observe(const Observation& seen, bool inside) NONBLOCKI
   }
   const bool shows_needle = seen.has(Observation::tip_ok) && plausible(seen.tip_m);
   const bool shows_cell = shows_needle && seen.has(Observation::outer_ok) && plausible(seen.centre_m) &&
-                          seen.R_m > c_m_ && seen.R_m < kLargestCell_m && std::abs(seen.gap_m) < kFarthest_m && seen.noise_m >= 0;
+                          seen.R_m > c_m_ && seen.R_m < kLargestCell_m &&
+                          std::abs(seen.gap_m) < kFarthest_m && seen.noise_m >= 0;
   if (!shows_cell && !(inside && shows_needle && membrane_.known)) {
     return false;
   }

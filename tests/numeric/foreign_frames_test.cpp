@@ -142,7 +142,7 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
   std::optional<Tracker> tracker, with_pose;
   const Point off(2.6, -1.9);  // of the pose, px
   std::map<std::string, Score> outer, inner;
-  std::vector<double> tip_px, depth_px;  // seen minus true: along the axis before contact, in contact
+  std::vector<double> tip_px, depth_px;        // seen minus true: along the axis before contact, in contact
   std::vector<double> told_px, told_depth_px;  // likewise in all phases, and in contact, with the pose
   for (int k = 0; k < frames; ++k) {
     char name[32];

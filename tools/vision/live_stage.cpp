@@ -8,11 +8,13 @@ namespace punctum::tools {
 std::optional<cv::Point2d> stage_tip_at(const rt::CoreSegment& core, std::int64_t exposure_ns) {
   constexpr double kOldest_s = 0.02;  // further carried on, a needle that turns round is elsewhere
   constexpr double kFarthest_m = 1;
-  constexpr std::uint64_t kKept = rt::TelemetryRing::kSize - rt::TelemetryRing::kSize / 8;  // not overwritten now
+  constexpr std::uint64_t kKept =
+      rt::TelemetryRing::kSize - rt::TelemetryRing::kSize / 8;  // not overwritten now
   if (core.status.started.load() == 0) {
     return std::nullopt;
   }
-  const double t_s = static_cast<double>(exposure_ns - static_cast<std::int64_t>(core.status.start_ns.load())) * 1e-9;
+  const double t_s =
+      static_cast<double>(exposure_ns - static_cast<std::int64_t>(core.status.start_ns.load())) * 1e-9;
   const double before_s = t_s - 0.5e-9 * static_cast<double>(core.status.period_ns.load());
   rt::TelemetrySample sample, last;
   // The last sample before the exposure's own.

@@ -1,8 +1,8 @@
 #include "tools/vision/surface_files.hpp"
 
-#include <Eigen/Geometry>
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
 #include <cstring>

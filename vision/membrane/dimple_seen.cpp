@@ -14,14 +14,14 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr double kDimpleReach = 6;   // half-widths of the needle to either side
-constexpr double kAbove_px = 4;      // above the outline at rest
-constexpr double kPast_px = 1;       // past the tip
+constexpr double kDimpleReach = 6;     // half-widths of the needle to either side
+constexpr double kAbove_px = 4;        // above the outline at rest
+constexpr double kPast_px = 1;         // past the tip
 constexpr double kStepOfDepth_px = 1;  // the blur is wider
-constexpr int kLeastReach = 8;       // rays to either side: a thin needle hides two or three
-constexpr int kLeastRays = 6;        // fewer tell nothing
-constexpr double kModel = 0.08;      // variance of an edge that looks unusual, in squared usual edges
-constexpr double kOneSample_px = 3.5;   // along the membrane, by the smoothing
+constexpr int kLeastReach = 8;         // rays to either side: a thin needle hides two or three
+constexpr int kLeastRays = 6;          // fewer tell nothing
+constexpr double kModel = 0.08;        // variance of an edge that looks unusual, in squared usual edges
+constexpr double kOneSample_px = 3.5;  // along the membrane, by the smoothing
 // A membrane that has let go of the tip is further from it: px, and share of its depth.
 constexpr double kOnTip_px = 3, kOnTip = 0.25;
 constexpr double kTip_px = 1.6;    // to which the tip is known: shapes are learnt from dimples that end there

@@ -204,8 +204,8 @@ double InjectionPipette::tip_sd(double noise) const {
   constexpr double kUsualFrames = 3;
   const double usual = 0.1 + 0.04 * noise;  // px, before it is known: of walls of usual contrast
   constexpr double kPerBlur = 0.8;
-  const double of_frame = (kUsualFrames * usual * usual + glass_frames_ * glass_scatter_) /
-                          (kUsualFrames + glass_frames_);
+  const double of_frame =
+      (kUsualFrames * usual * usual + glass_frames_ * glass_scatter_) / (kUsualFrames + glass_frames_);
   const double unsharp = kPerBlur * std::max(0.0, glass_blur_ - kSharp_px);
   return std::sqrt(of_frame * (1 + 1.0 / std::max(glass_frames_, 1)) + unsharp * unsharp);
 }

@@ -307,8 +307,7 @@ std::optional<GlassEnd> end_of_glass(const GradientField& field, double noise, c
   if (!found || !found->plain) {
     return std::nullopt;
   }
-  return GlassEnd{-found->behind(), std::sqrt(2 * unit / std::max(found->curvature(), 1e-9)),
-                  found->blur};
+  return GlassEnd{-found->behind(), std::sqrt(2 * unit / std::max(found->curvature(), 1e-9)), found->blur};
 }
 
 }  // namespace punctum::vision

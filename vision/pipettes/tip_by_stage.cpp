@@ -7,11 +7,11 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr double kScatter_px = 0.15;  // of the stage, before it is known
-constexpr double kStageDrift_px = 0.03;    // per frame, of the picture against the stage
-constexpr double kMost_px = 5;        // of disagreement, unless the needle has slipped or bent
-constexpr int kDisagreements = 10;    // frames in a row; then how far off the stage is, is not known
-constexpr int kStageMemory = 30;           // frames
+constexpr double kScatter_px = 0.15;     // of the stage, before it is known
+constexpr double kStageDrift_px = 0.03;  // per frame, of the picture against the stage
+constexpr double kMost_px = 5;           // of disagreement, unless the needle has slipped or bent
+constexpr int kDisagreements = 10;       // frames in a row; then how far off the stage is, is not known
+constexpr int kStageMemory = 30;         // frames
 
 double squared(double x) { return x * x; }
 

@@ -23,10 +23,10 @@ class TipByStage {
 
  private:
   std::optional<Point> stage_, moved_;
-  Point off_;             // of the stage: tip in the picture minus stage, px
-  double variance_ = 0;   // of off_ along the axis, px^2
-  double scatter_ = 0;    // variance of the stage from frame to frame, px^2
-  int frames_ = 0;        // that it was learnt from
+  Point off_;              // of the stage: tip in the picture minus stage, px
+  double variance_ = 0;    // of off_ along the axis, px^2
+  double scatter_ = 0;     // variance of the stage from frame to frame, px^2
+  int frames_ = 0;         // that it was learnt from
   int disagreements_ = 0;  // frames in a row
 };
 

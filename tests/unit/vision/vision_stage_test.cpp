@@ -103,7 +103,8 @@ class Poses : public testing::Test {
 };
 
 TEST_F(Poses, lie_between_the_rows_of_a_table) {
-  const auto poses = read("t_s,phase,tip_x_m,tip_y_m,tip_z_m\n0,free,1e-6,0,0\n0.1,free,3e-6,-1e-6,0\n1,free,0,0,0\n");
+  const auto poses =
+      read("t_s,phase,tip_x_m,tip_y_m,tip_z_m\n0,free,1e-6,0,0\n0.1,free,3e-6,-1e-6,0\n1,free,0,0,0\n");
   ASSERT_TRUE(poses) << poses.error();
   ASSERT_TRUE(poses->at(0.025));
   EXPECT_NEAR(poses->at(0.025)->x, 1.5e-6, 1e-15);
@@ -115,12 +116,12 @@ TEST_F(Poses, lie_between_the_rows_of_a_table) {
 }
 
 TEST_F(Poses, that_cannot_be_are_refused_in_one_line) {
-  for (const auto& [text, why] : {std::pair{"", "no column t_s"}, std::pair{"t_s,tip_x_m\n0,0\n", "no column tip_y_m"},
-                                  std::pair{"t_s,tip_x_m,tip_y_m\n0,0,0\n0,0,0\n", ":3: t_s does not rise"},
-                                  std::pair{"t_s,tip_x_m,tip_y_m\n0,nan,0\n", ":2: "},
-                                  std::pair{"t_s,tip_x_m,tip_y_m\n0,0\n", ":2: "},
-                                  std::pair{"t_s,tip_x_m,tip_y_m\n0,0,2\n", "at most"},
-                                  std::pair{"t_s,tip_x_m,tip_y_m\ninf,0,0\n", ":2: "}}) {
+  for (const auto& [text, why] :
+       {std::pair{"", "no column t_s"}, std::pair{"t_s,tip_x_m\n0,0\n", "no column tip_y_m"},
+        std::pair{"t_s,tip_x_m,tip_y_m\n0,0,0\n0,0,0\n", ":3: t_s does not rise"},
+        std::pair{"t_s,tip_x_m,tip_y_m\n0,nan,0\n", ":2: "}, std::pair{"t_s,tip_x_m,tip_y_m\n0,0\n", ":2: "},
+        std::pair{"t_s,tip_x_m,tip_y_m\n0,0,2\n", "at most"},
+        std::pair{"t_s,tip_x_m,tip_y_m\ninf,0,0\n", ":2: "}}) {
     const auto poses = read(text);
     ASSERT_FALSE(poses) << text;
     EXPECT_NE(poses.error().find(why), std::string::npos) << poses.error();

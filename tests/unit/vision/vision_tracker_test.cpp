@@ -398,7 +398,8 @@ TEST(Tracker, finds_a_needle_on_and_beside_which_specks_lie) {
   int found = 0, looked = 0;
   for (unsigned seed = 1; seed <= 30; ++seed) {
     std::mt19937 random(seed);
-    std::uniform_real_distribution<double> along(15, kW - 1 - 420), aside(-22, 22), radius(2, 5), dark(-60, -15);
+    std::uniform_real_distribution<double> along(15, kW - 1 - 420), aside(-22, 22), radius(2, 5),
+        dark(-60, -15);
     Drawing drawn{.tip = 420, .noise = seed % 2 == 0 ? 5.0 : 2.0, .seed = seed};
     for (int k = 0; k < 5; ++k) {
       const double s = along(random);
@@ -466,7 +467,8 @@ TEST(Tracker, follows_a_needle_whose_end_is_hidden_by_the_pose_of_the_manipulato
     ASSERT_TRUE(look({}, true).needle.ok);
   }
   for (int k = 0; k < 6; ++k, tip -= 3) {
-    const std::vector<Speck> over_the_end{{{tip - 4, kCentre.y}, 13, -55}, {{tip + 6, kCentre.y + 3}, 12, -50}};
+    const std::vector<Speck> over_the_end{{{tip - 4, kCentre.y}, 13, -55},
+                                          {{tip + 6, kCentre.y + 3}, 12, -50}};
     const Result& r = look(over_the_end, true);
     ASSERT_TRUE(r.needle.ok) << r.needle.reason;
     EXPECT_NEAR(r.needle.tip.x, tip, 0.7) << k;

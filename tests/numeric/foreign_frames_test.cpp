@@ -218,7 +218,7 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
 INSTANTIATE_TEST_SUITE_P(Seeds, ForeignFrames,
                          testing::Values(Sequence{7, 2, 0.08, 0.3}, Sequence{106, 2, 0.08, 0.3},
                                          Sequence{107, 5, 0.13, 0.35}, Sequence{108, 10, 0.2, 0.4},
-                                         Sequence{109, 5, 0.2, 0.35, 25}, Sequence{1, 2, 0.08, 0.3, 0, 70}),
+                                         Sequence{109, 5, 0.2, 0.35, 25}, Sequence{1, 2, 0.08, 0.3, 0, 80}),
                          [](const auto& of) {
                            return "seed_" + std::to_string(of.param.seed) + "_noise_" +
                                   std::to_string(of.param.noise) + (of.param.halo > 0 ? "_halo" : "");

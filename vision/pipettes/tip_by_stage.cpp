@@ -9,9 +9,11 @@ namespace {
 
 constexpr double kScatter_px = 0.15;     // of the stage, before it is known
 constexpr double kStageDrift_px = 0.03;  // per frame, of the picture against the stage
-constexpr double kMost_px = 5;           // of disagreement, unless the needle has slipped or bent
-constexpr int kDisagreements = 10;       // frames in a row; then how far off the stage is, is not known
-constexpr int kStageMemory = 30;         // frames
+constexpr double kMost_px = 8;           // of disagreement, unless the needle has slipped or bent
+constexpr double kFastest_px = 25;       // in a frame; faster, it was placed anew
+constexpr double kFarthest_px = 1e7;
+constexpr int kDisagreements = 10;  // frames in a row; then how far off the stage is, is not known
+constexpr int kStageMemory = 30;    // frames
 
 double squared(double x) { return x * x; }
 
@@ -19,10 +21,15 @@ double squared(double x) { return x * x; }
 
 void TipByStage::begin(const std::optional<Point>& stage) {
   moved_.reset();
-  if (stage && stage_) {
+  const bool told = stage && std::abs(stage->x) < kFarthest_px && std::abs(stage->y) < kFarthest_px;
+  if (told && stage_) {
     moved_ = *stage - *stage_;
+    if (cv::norm(*moved_) > kFastest_px) {  // it was placed anew
+      moved_.reset();
+      frames_ = 0;
+    }
   }
-  stage_ = stage;
+  stage_ = told ? stage : std::nullopt;
   variance_ += squared(kStageDrift_px);
 }
 
@@ -41,6 +48,8 @@ NeedlePose TipByStage::most_likely(const NeedlePose& seen) {
   disagreements_ = std::abs(apart) > kMost_px ? disagreements_ + 1 : 0;
   if (disagreements_ > kDisagreements) {
     frames_ = disagreements_ = 0;
+  }
+  if (std::abs(apart) > kMost_px) {
     return seen;
   }
   const double of_picture = squared(seen.sd), of_stage = variance_ + scatter_;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <memory>
 #include <random>
 #include <string>
@@ -76,10 +77,26 @@ TEST_F(StageTip, is_given_up_where_the_needle_has_slipped) {
   Point last;
   for (int k = 0; k < 12; ++k) {
     told_.begin(Point(x_ - 40, 103));
-    last = told_.most_likely(seen_at({x_ + 8, 100}, 2)).tip;
+    last = told_.most_likely(seen_at({x_ + 12, 100}, 2)).tip;
   }
-  EXPECT_NEAR(last.x, x_ + 8, 1e-12);
+  EXPECT_NEAR(last.x, x_ + 12, 1e-12);
   EXPECT_FALSE(told_.tip());
+}
+
+TEST_F(StageTip, is_learnt_anew_where_the_stage_jumps) {
+  approach(20);
+  told_.begin(Point(x_ - 40 - 300, 103));
+  EXPECT_FALSE(told_.moved());
+  EXPECT_FALSE(told_.tip());
+}
+
+TEST_F(StageTip, is_not_known_from_what_is_no_place) {
+  approach(20);
+  for (const double x : {std::nan(""), 1e300, -std::numeric_limits<double>::infinity()}) {
+    told_.begin(Point(x, 103));
+    EXPECT_FALSE(told_.tip());
+    EXPECT_FALSE(told_.moved());
+  }
 }
 
 TEST_F(StageTip, is_not_known_in_a_frame_without_one) {

@@ -394,6 +394,24 @@ TEST(Tracker, finds_an_inner_membrane_that_only_all_rays_together_show) {
   }
 }
 
+// Whatever the manipulator tells, the picture goes on.
+TEST(Tracker, outlives_a_pose_that_jumps) {
+  Tracker tracker({}, kW, kH);
+  double tip = 430;
+  std::uint64_t n = 0;
+  const double jumps[] = {0, 0, 0, 50, 250, 0, -400, 1e4, 0, 1e6, 1e12, 0, std::nan(""), 0, 0, 0};
+  for (const double jump : jumps) {
+    tip -= 2;
+    const Drawing drawn{.tip = tip, .seed = static_cast<unsigned>(n) + 1};
+    const Result& r = tracker.process(frame_of(draw(drawn), n++), Point(tip + jump, kCentre.y));
+    if (r.needle.ok) {
+      EXPECT_NEAR(r.needle.tip.x, tip, 1.5) << jump;
+    }
+  }
+  const Drawing drawn{.tip = tip, .seed = 99};
+  EXPECT_TRUE(tracker.process(frame_of(draw(drawn), n), Point(tip, kCentre.y)).needle.ok);
+}
+
 TEST(Tracker, finds_a_needle_on_and_beside_which_specks_lie) {
   int found = 0, looked = 0;
   for (unsigned seed = 1; seed <= 30; ++seed) {

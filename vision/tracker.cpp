@@ -151,7 +151,7 @@ const Result& Tracker::Impl::process(const hal::Frame& frame, const std::optiona
   }
   result.usable = true;
   result.noise = picture.noise;
-  by_stage.begin(stage);
+  by_stage.begin(config.method == Method::tracker ? stage : std::nullopt);
   const bool starting = must_start();
   picture.compute_gradient(area_to_search(starting));
   result.us.prepare = watch.lap_us();

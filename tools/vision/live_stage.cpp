@@ -1,6 +1,5 @@
 #include "tools/vision/live_stage.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 namespace punctum::tools {

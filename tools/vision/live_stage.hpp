@@ -1,7 +1,6 @@
 // Where the manipulator's encoders had the needle's tip when a picture was taken, from the core's telemetry.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <opencv2/core.hpp>
 #include <optional>

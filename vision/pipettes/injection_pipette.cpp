@@ -192,16 +192,8 @@ bool InjectionPipette::start(const GradientField& field, double noise, const Cle
 // The end that is followed is one that looks the same in every frame; the tip is the outermost glass.
 NeedlePose InjectionPipette::find(const GradientField& field, double noise,
                                   const std::optional<Point>& moved) {
-  const Point before = velocity_;
-  const int lost = lost_, jumps = jumps_;
   velocity_ = moved.value_or(velocity_);
   NeedlePose needle = follow(field, noise);
-  if (!needle.ok && moved && started_) {  // the manipulator may be wrong
-    velocity_ = before;
-    lost_ = lost;
-    jumps_ = jumps;
-    needle = follow(field, noise);
-  }
   needle.tip += glass_ahead_ * needle.axis;
   needle.sd = tip_sd(noise);
   return needle;

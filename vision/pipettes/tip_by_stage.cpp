@@ -11,9 +11,9 @@ constexpr double kScatter_px = 0.15;     // of the stage, before it is known
 constexpr double kStageDrift_px = 0.03;  // per frame, of the picture against the stage
 constexpr double kMost_px = 8;           // of disagreement, unless the needle has slipped or bent
 constexpr double kFastest_px = 25;       // in a frame; faster, it was placed anew
-constexpr double kFarthest_px = 1e7;
-constexpr int kDisagreements = 10;  // frames in a row; then how far off the stage is, is not known
-constexpr int kStageMemory = 30;    // frames
+constexpr double kFarthest_px = 1e7;     // a number beyond it is no place
+constexpr int kDisagreements = 10;       // frames in a row; then how far off the stage is, is not known
+constexpr int kStageMemory = 30;         // frames
 
 double squared(double x) { return x * x; }
 

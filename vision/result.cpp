@@ -46,6 +46,7 @@ rt::Observation to_observation(const Result& r, const VisionConfig& config, int 
   if (r.undeformed) {
     place(r.undeformed->centre, o.centre_m);
     o.R_m = r.undeformed->r * k;
+    o.R_sd_m = r.undeformed->r_sd * k;
   }
   o.R_inner_m = r.inner_radius_px.value_or(0) * k;
   if (r.entry) {
@@ -60,7 +61,9 @@ rt::Observation to_observation(const Result& r, const VisionConfig& config, int 
       place(*r.points.point[i], o.contact_point_m[i]);
     }
   }
-  o.noise_m = r.gap_noise_px * k;
+  o.noise_m = r.gap_sd_px * k;
+  o.wd_sd_m = r.wd_sd_px * k;
+  o.a_sd_m = r.a_sd_px * k;
   o.total_us = static_cast<std::uint64_t>(std::max(0.0, r.us.total));
   return o;
 }

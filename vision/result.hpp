@@ -43,7 +43,8 @@ struct Result {
   std::optional<Circle> undeformed;       // of the outer membrane
   std::optional<double> inner_radius_px;  // mean of the inner one
 
-  bool merged = false;  // the paper's test of contact: dilation and labelling
+  // The paper's test of contact: dilation and labelling. The tracker makes it where the gap does not decide.
+  bool merged = false;
   bool contact = false;
   bool punctured = false;        // the outer membrane
   bool inner_punctured = false;  // and the inner one
@@ -51,7 +52,7 @@ struct Result {
   std::optional<Point> entry;                 // where the needle's axis meets the undeformed outer membrane
   std::optional<double> gap_px, wd_px, a_px;  // without a dimple a is empty and w_d is 0
   double membrane_velocity_px_s = 0;          // of the contact points, > 0 into the cell
-  double gap_noise_px = 0;
+  double gap_sd_px = 0, wd_sd_px = 0, a_sd_px = 0;  // standard deviations, where the values are known
   std::optional<MembraneNet> outer_net, inner_net;
   rt::Phase phase = rt::Phase::free;
   int impurities = 0;

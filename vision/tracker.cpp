@@ -34,12 +34,21 @@ constexpr double kUntouched_px = 12;                // further outside, nothing 
 constexpr double kLeastDimple_px = 0.7;             // depth from which the width of a dimple can be measured
 constexpr double kNear_px = 8;                      // nearer, the needle may touch the membrane
 constexpr double kClear_px = 3;                     // further away, it does not: its blur ends before
+constexpr double kContactPoint_px = 0.7;            // standard deviation of a membrane on the needle's side
 constexpr double kAtMembrane_px = 0.6, kInside_px = 1.5;  // to which the picture alone shows the tip there
 // The paper keeps the large variations of the gradient only. Of the usual edge of a membrane: with 0.4 needle
 // and cell merge when they are still 4 px apart, with 0.75 they part again over a deep dimple.
 constexpr double kLargeGradient = 0.6;
 
 Side opposite(Side side) { return side == Side::right ? Side::left : Side::right; }
+
+double rms(const std::vector<double>& values) {
+  double square = 0;
+  for (const double v : values) {
+    square += v * v / static_cast<double>(values.size());
+  }
+  return std::sqrt(square);
+}
 
 cv::Rect2d square_round(const Point& p, double half) { return {p.x - half, p.y - half, 2 * half, 2 * half}; }
 
@@ -62,15 +71,20 @@ struct Tracker::Impl {
   bool template_given = false;
   int holder_tries = 0;
   InjectionPipette needle;
-  int needle_tries = 0;
+  InjectionPipette::Start needle_search = InjectionPipette::Start::failed;
+  int needle_frames = 0, needle_tries = 0;  // that failed
   TipByStage by_stage;
   NeedlePose membrane_needle;  // its tip where the membrane on it is seen
   NeedlePose seen_needle;      // as the picture alone tells it
-  double wall_px = 0;          // from the tip to the middle of the membrane that it pushes, as far as seen
+  double seen_tip_sd_px = 0;   // of its place in the picture, whatever hides the glass there
+  double entry_sd_px = 0;
+  double wall_px = 0;  // from the tip to the middle of the membrane that it pushes, as far as seen
   TipOnMembrane tip_on_membrane;
   TipMotion tip;
 
   FollowedMembrane outer, inner;
+  std::optional<CellSearch> cell_search;  // while there is more to do
+  bool first_picture = true;    // of it everything is searched at once; later each frame bears a part
   LearntUndeformed undeformed;  // of the outer one
   bool was_contact = false;
   Puncture puncture;
@@ -102,11 +116,13 @@ struct Tracker::Impl {
   [[nodiscard]] bool needle_hidden() const { return needle.started() && !result.needle.ok; }
   [[nodiscard]] bool must_start() const;
   [[nodiscard]] cv::Rect area_to_search(bool starting) const;
+  void search_needle();
   void locate_needle();
   void learn_needle();
   void locate_holder();
   [[nodiscard]] Point end_of_holder() const;
   void clear_picture(double needle_margin);
+  [[nodiscard]] std::optional<StartedMembranes> search_cell();
   [[nodiscard]] bool start();
   void follow_membranes(Stopwatch& watch);
   [[nodiscard]] Surroundings surroundings();
@@ -200,6 +216,7 @@ const Result& Tracker::Impl::process(const hal::Frame& frame, const std::optiona
     events_without_the_cell();
   }
   decide_phase();
+  first_picture = false;
   result.verdict = verdict_on(result, config);
   result.us.total = total.lap_us();
   return result;
@@ -214,7 +231,7 @@ cv::Rect Tracker::Impl::area_to_search(bool starting) const {
     return whole;
   }
   const FollowedMembrane& cell = outer.known ? outer : inner;
-  cv::Rect2d box = square_round(cell.centre, 1.15 * *std::max_element(cell.r.begin(), cell.r.end()) + 30);
+  cv::Rect2d box = square_round(cell.centre, 1.1 * *std::max_element(cell.r.begin(), cell.r.end()) + 22);
   if (config.needle) {
     constexpr double kShaft_px = 180;  // of the shaft tell its direction
     box |= square_round(*tip.last, 40);
@@ -224,18 +241,30 @@ cv::Rect Tracker::Impl::area_to_search(bool starting) const {
                           static_cast<int>(box.height));
 }
 
-void Tracker::Impl::locate_needle() {
-  if (const int n = needle_tries++; !needle.started() && (n < kNeedleAtOnce || n % kNeedleEvery == 0)) {
-    // A membrane at the tip of a faint needle looks like its end.
-    (void)needle.start(picture.field, picture.noise, [this](const Point& end) {
-      return !outer.known || cv::norm(end - outer.centre) > median_of(outer.r) + kUntouched_px;
-    });
+// Of a faint needle not every frame shows the end: the first tries follow each other.
+void Tracker::Impl::search_needle() {
+  const bool at_once = needle_tries < kNeedleAtOnce, due = needle_frames++ % kNeedleEvery == 0;
+  if (needle.started() || !(at_once || due || needle_search == InjectionPipette::Start::more_to_do)) {
+    return;
   }
+  // A membrane at the tip of a faint needle looks like its end.
+  const auto clear_at = [this](const Point& end) {
+    return !outer.known || cv::norm(end - outer.centre) > median_of(outer.r) + kUntouched_px;
+  };
+  do {
+    needle_search = needle.advance_start(picture.field, picture.noise, clear_at, at_once);
+  } while (first_picture && needle_search == InjectionPipette::Start::more_to_do);
+  needle_tries += needle_search == InjectionPipette::Start::failed ? 1 : 0;
+}
+
+void Tracker::Impl::locate_needle() {
+  search_needle();
   NeedlePose& n = result.needle;
   n = needle.find(picture.field, picture.noise, by_stage.moved());
   if (config.method == Method::tracker && n.ok && was_contact && !punctured && outer.known) {
     n.tip += tip_on_membrane.ahead(picture.field, picture.noise, n).value_or(0) * n.axis;
   }
+  seen_tip_sd_px = n.sd;
   // A membrane on the tip draws its end aside, granules round it by several pixels.
   n.sd = math::hypot(n.sd, punctured ? kInside_px : was_contact ? kAtMembrane_px : 0);
   seen_needle = n;
@@ -264,6 +293,13 @@ void Tracker::Impl::learn_needle() {
   }
   if (!result.gap_px || *result.gap_px > TipOnMembrane::kClearAhead_px) {
     by_stage.learn(seen_needle);
+    if (by_stage.picture_stays()) {
+      by_stage = {};
+      tip_on_membrane = {};
+      needle = {config.needle_from, config.px(config.c_m)};
+      needle_tries = 0;
+      return;
+    }
   }
   if (result.gap_px && *result.gap_px > TipOnMembrane::kClearAhead_px) {
     tip_on_membrane.learn(picture.field, result.needle);
@@ -331,13 +367,36 @@ void Tracker::Impl::clear_picture(double needle_margin) {
   result.impurities = picture.cover_impurities(membranes, strong, 0.45 * cell_r);
 }
 
+// Of the cell; empty while there is more to do.
+std::optional<StartedMembranes> Tracker::Impl::search_cell() {
+  if (config.method == Method::paper) {
+    return start_snakes(picture, config, seed);
+  }
+  if (!cell_search) {
+    const FollowedMembrane& lost = outer.known ? outer : inner;
+    cell_search.emplace(seed,
+                        lost.known ? std::optional(Circle{lost.centre, median_of(lost.r)}) : std::nullopt);
+  }
+  auto begun = cell_search->advance(picture, config);
+  while (!begun && first_picture) {
+    begun = cell_search->advance(picture, config);
+  }
+  if (begun) {
+    cell_search.reset();
+  }
+  return begun;
+}
+
 bool Tracker::Impl::start() {
+  auto begun = search_cell();
+  if (!begun) {
+    result.outer.reason = "not found yet";
+    return false;
+  }
   const RestOutline outer_rest = std::move(outer.rest), inner_rest = std::move(inner.rest);
-  StartedMembranes begun = config.method == Method::paper ? start_snakes(picture, config, seed)
-                                                          : start_membranes(picture, config, seed);
-  outer = std::move(begun.outer);
-  inner = std::move(begun.inner);
-  result.outer.reason = begun.reason;
+  outer = std::move(begun->outer);
+  inner = std::move(begun->inner);
+  result.outer.reason = begun->reason;
   if (!outer.known && !inner.known) {
     return false;
   }
@@ -456,6 +515,8 @@ int Tracker::Impl::fit_undeformed_membrane() {
     inner.rest = outline_within(outer.rest, inner.centre, inner.r, *entry);
   }
   result.undeformed = undeformed.shape()->circle;
+  double& r_sd = result.undeformed->r_sd;
+  r_sd = math::hypot(r_sd, rms(result.outer.sd_px) / std::sqrt(Circle::kPieces));
   return static_cast<int>(std::count_if(weights.begin(), weights.end(), [](double w) { return w > 0; }));
 }
 
@@ -466,14 +527,16 @@ void Tracker::Impl::measure_gap(int fitted_points) {
     return;
   }
   result.gap_px = (*result.entry - n.tip).dot(n.axis);
-  result.gap_noise_px = math::hypot(n.sd, 3 * result.outer.residual_px / std::sqrt(fitted_points));
+  entry_sd_px = 3 * result.outer.residual_px / std::sqrt(fitted_points);
+  result.gap_sd_px = math::hypot(n.sd, entry_sd_px);
 }
 
 // Whether needle and cell touch. Returns how far behind the tip the membrane lies on the needle.
 std::optional<double> Tracker::Impl::look_for_contact() {
   // The paper's test: needle and cell are two classes until they touch.
   const Contour& contour = result.outer.contour;
-  result.merged = needle_merges_with_cell(picture, result.needle, contour, config.dilation_px + 1);
+  result.merged = merging_decides(result.gap_px) &&
+                  needle_merges_with_cell(picture, result.needle, contour, config.dilation_px + 1);
   result.contact = touches(result.gap_px, result.merged, was_contact);
   const MembraneOnNeedle on_needle =
       membrane_on_needle(picture, result.needle, contour, outer.polarity, outer.level);
@@ -532,9 +595,16 @@ void Tracker::Impl::measure_depth(double membrane_px) {
   // Until the puncture the membrane lies on the tip. Afterwards its contour tells the rest of the dimple.
   const double depth = result.punctured ? membrane_px : wall_px - *result.gap_px;
   result.wd_px = result.contact ? std::max(0.0, depth) : 0.0;
+  if (result.contact) {
+    result.wd_sd_px = math::hypot(result.punctured ? kContactPoint_px : seen_tip_sd_px, entry_sd_px);
+  }
   if (*result.wd_px > kLeastDimple_px) {
-    result.a_px = dimple_half_width(result.outer.contour, undeformed.at_rest(), *result.entry, *result.wd_px,
-                                    result.needle.half_width);
+    const auto half = dimple_half_width(result.outer.contour, undeformed.at_rest(), *result.entry,
+                                        *result.wd_px, result.needle.half_width, rms(result.outer.sd_px));
+    if (half) {
+      result.a_px = half->a;
+      result.a_sd_px = half->sd;
+    }
   }
 }
 

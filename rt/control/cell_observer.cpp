@@ -135,6 +135,10 @@ void CellObserver::copy_from(const LocalMembraneModel& model) NONBLOCKING {
   facts_.inner_puncture_seen = model.inner_puncture_seen();
   facts_.observation_age_s = model.age_s();
   facts_.observed_gap_m = model.seen_gap_m();
+  facts_.depth_sd_m = model.depth_sd_m();
+  facts_.R_sd_m = model.R_sd_m();
+  facts_.observed_a_m = model.seen_a_m();
+  facts_.observed_a_sd_m = model.seen_a_sd_m();
 }
 
 }  // namespace punctum::rt

@@ -37,6 +37,10 @@ struct CellFacts {
   bool inner_puncture_seen = false;  // likewise of the inner one
   double observation_age_s = -1;     // -1: nothing seen yet
   double observed_gap_m = 0;
+  double depth_sd_m = 0;  // standard deviations: of depth_m, and of what the newest observation says
+  double R_sd_m = 0;
+  double observed_a_m = 0;
+  double observed_a_sd_m = 0;
   std::uint64_t observations = 0;
   std::uint64_t stale_ticks = 0;
   std::uint32_t alarms = 0;

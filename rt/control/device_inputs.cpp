@@ -33,7 +33,6 @@ constexpr double kPressureMax_Pa = 2e5;  // no pump below ambient reaches more t
 
 constexpr double kContactSilent_s = 0.1;  // of the injector
 
-constexpr double kSensorTau_s = 0.005;  // low-pass of the force sensor
 constexpr double kSensorSilent_s = 0.1;
 constexpr double kSensorRange_N = 1;  // no sensor that tells a micronewton measures more
 // What a sample counts at most, in hard limits: one bad sample stops nothing and hides nothing for longer

@@ -66,6 +66,8 @@ struct Readings {
   [[nodiscard]] bool at_standstill() const NONBLOCKING { return !has_stage || stage.at_standstill; }
 };
 
+inline constexpr double kSensorTau_s = 0.005;  // of sensor_filtered_N
+
 // What the last tick did: the readings of this tick are judged by it.
 struct LastOutput {
   hal::Vec3 hand_force_N = hal::Vec3::Zero();  // device frame

@@ -103,7 +103,9 @@ bool LocalMembraneModel::observe(const Observation& seen, bool inside) NONBLOCKI
   const bool shows_needle = seen.has(Observation::tip_ok) && plausible(seen.tip_m);
   const bool shows_cell = shows_needle && seen.has(Observation::outer_ok) && plausible(seen.centre_m) &&
                           seen.R_m > c_m_ && seen.R_m < kLargestCell_m &&
-                          std::abs(seen.gap_m) < kFarthest_m && seen.noise_m >= 0;
+                          std::abs(seen.gap_m) < kFarthest_m && seen.noise_m >= 0 && seen.R_sd_m >= 0 &&
+                          std::isfinite(seen.R_sd_m) && seen.a_sd_m >= 0 && std::isfinite(seen.a_sd_m) &&
+                          std::isfinite(seen.a_m);
   if (!shows_cell && !(inside && shows_needle && membrane_.known)) {
     return false;
   }
@@ -131,6 +133,9 @@ bool LocalMembraneModel::observe(const Observation& seen, bool inside) NONBLOCKI
     return true;
   }
   seen_gap_m_ = seen.gap_m;
+  R_sd_m_ = seen.R_sd_m;
+  seen_a_m_ = seen.a_m;
+  seen_a_sd_m_ = seen.a_sd_m;
   remember_first(now);
 
   if (!membrane_.known) {
@@ -165,6 +170,10 @@ double LocalMembraneModel::gain_of(const Observation& seen) NONBLOCKING {
   const double gain = std::min(params_.gain, variance_m2_ / (variance_m2_ + noise_m2));
   variance_m2_ *= 1 - gain;
   return gain;
+}
+
+double LocalMembraneModel::depth_sd_m() const NONBLOCKING {
+  return membrane_.known ? std::sqrt(variance_m2_ + kWander_m2_s * std::max(age_s_, 0.0)) : 0;
 }
 
 // Where this frame puts the entry, in the stage's frame: by the difference from the tip it shows.
@@ -313,6 +322,7 @@ void LocalMembraneModel::restart(std::int64_t now_ns) NONBLOCKING {
   membrane_.R_m = R_default_m_;
   entry_correction_m_.setZero();
   R_correction_m_ = 0;
+  R_sd_m_ = seen_a_m_ = seen_a_sd_m_ = 0;
   scale_correction_ = 0;
   dimple_scale_ = params_.dimple_scale;
   not_before_ns_ = now_ns;

@@ -131,6 +131,11 @@ class LocalMembraneModel {
   // This cell as the first frames showed it: what later ones are held against.
   [[nodiscard]] const Membrane3D& first_seen() const NONBLOCKING { return first_; }
   [[nodiscard]] double seen_gap_m() const NONBLOCKING { return seen_gap_m_; }
+  // Standard deviation of depth_m, the way of the membrane since the newest observation included.
+  [[nodiscard]] double depth_sd_m() const NONBLOCKING;
+  [[nodiscard]] double R_sd_m() const NONBLOCKING { return R_sd_m_; }
+  [[nodiscard]] double seen_a_m() const NONBLOCKING { return seen_a_m_; }
+  [[nodiscard]] double seen_a_sd_m() const NONBLOCKING { return seen_a_sd_m_; }
   [[nodiscard]] std::uint64_t used() const NONBLOCKING { return used_; }
 
  private:
@@ -183,6 +188,7 @@ class LocalMembraneModel {
   ConfirmedFlag punctured_;
   ConfirmedFlag inner_punctured_;
   double seen_gap_m_ = 0;
+  double R_sd_m_ = 0, seen_a_m_ = 0, seen_a_sd_m_ = 0;  // of the newest observation
   std::uint64_t used_ = 0;
 };
 

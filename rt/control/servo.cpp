@@ -17,7 +17,11 @@ Servo::Servo(const ServoConfig& config, const Devices& devices, Station& station
       force_limits_(config.limits, config.rate_Hz),
       safety_(config.estop),
       outputs_(config, devices),
-      telemetry_(station) {}
+      telemetry_(station) {
+  if (config.force_sensor && config.membrane && config.vision) {
+    modulus_fit_.emplace(config.membrane->E_Pa);
+  }
+}
 
 // One tick of the servo. Each part takes values and returns values; a value of the last tick has `last` in
 // its name.
@@ -30,6 +34,7 @@ void Servo::tick(const TickInfo& now) NONBLOCKING {
   const hal::Vec3& velocity_m_s = velocity_.step(readings, time.dt_s);
   const TaskFacts& task = advance_phase(time, readings, cell);
   const EffectSum& effects = sum_force_effects(time, readings, requested, cell, velocity_m_s, task);
+  const ModulusEstimate modulus = fit_modulus(time, readings, cell, task);
   const hal::Vec3 passive_N = rendering_.keep_passive(effects, readings, time.elapsed_s);
   const LimitedForces limited =
       force_limits_.step(passive_N, rendering_.tip_force_N(), readings, last_.output.hand_force_N, time.dt_s,
@@ -43,7 +48,7 @@ void Servo::tick(const TickInfo& now) NONBLOCKING {
   rendering_.wrote(safety.hand_force_N);
   const std::uint32_t alarms = time.alarms | readings.alarms | hand_alarms | cell.alarms | task.alarms |
                                rendering_.alarms() | limited.alarms | stage_alarms;
-  telemetry_.publish({now, alarms, readings, requested, velocity_m_s, cell, task, rendering_, safety,
+  telemetry_.publish({now, alarms, readings, requested, velocity_m_s, cell, task, rendering_, modulus, safety,
                       stage_set_point_.set_point()});
   remember(safety, task, gate_open, written);
 }
@@ -112,6 +117,23 @@ const EffectSum& Servo::sum_force_effects(const TickTime& time, const Readings& 
                                  .commanded_scale = requested.force_scale,
                                  .effect_gain = requested.effect_gain},
                                 readings, cell, task);
+}
+
+ModulusEstimate Servo::fit_modulus(const TickTime& time, const Readings& readings, const CellFacts& cell,
+                                   const TaskFacts& task) NONBLOCKING {
+  if (!modulus_fit_) {
+    return {};
+  }
+  constexpr double kClear_m = 10e-6;  // further from the membrane than it may be mistaken by
+  const bool pressing = task.phase == Phase::contact || task.phase == Phase::indentation;
+  return modulus_fit_->step({.dt_s = time.dt_s,
+                             .sensor_N = readings.sensor_filtered_N,
+                             .sensor_fresh = readings.sensor_fresh,
+                             .clear = task.outside() && cell.depth_m < -kClear_m,
+                             .pressing = pressing && cell.membrane.known && cell.vision_fresh,
+                             .new_cell = task.new_cell,
+                             .law = rendering_.membrane()->state(),
+                             .depth_sd_m = cell.depth_sd_m});
 }
 
 SafetyOutput Servo::latch(const TickTime& time, const Readings& readings, const Requested& requested,

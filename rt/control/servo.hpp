@@ -16,6 +16,7 @@
 #include "rt/control/force_limits.hpp"
 #include "rt/control/hand_velocity.hpp"
 #include "rt/control/injection_gate.hpp"
+#include "rt/control/modulus_fit.hpp"
 #include "rt/control/rendering.hpp"
 #include "rt/control/requests.hpp"
 #include "rt/control/safety_stop.hpp"
@@ -68,6 +69,8 @@ class Servo {
   const EffectSum& sum_force_effects(const TickTime& time, const Readings& readings,
                                      const Requested& requested, const CellFacts& cell,
                                      const hal::Vec3& velocity_m_s, const TaskFacts& task) NONBLOCKING;
+  [[nodiscard]] ModulusEstimate fit_modulus(const TickTime& time, const Readings& readings,
+                                            const CellFacts& cell, const TaskFacts& task) NONBLOCKING;
   [[nodiscard]] SafetyOutput latch(const TickTime& time, const Readings& readings, const Requested& requested,
                                    const LimitedForces& limited) NONBLOCKING;
   [[nodiscard]] std::uint32_t choose_stage_set_point(const TickTime& time, const Readings& readings,
@@ -98,6 +101,7 @@ class Servo {
   Task task_;
   InjectionGate gate_;
   Rendering rendering_;
+  std::optional<ModulusFit> modulus_fit_;  // where a scene has both a force sensor and a membrane
   ForceLimits force_limits_;
   SafetyStop safety_;
   DeviceOutputs outputs_;

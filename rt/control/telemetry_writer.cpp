@@ -42,9 +42,11 @@ void TelemetryWriter::publish(const TickRecord& tick) NONBLOCKING {
   copy(s.tip_m, readings.stage.tip_m);
   copy(s.cmd_m, tick.set_point.tip_m);
   copy(s.force_N, tick.safety.hand_force_N);
-  fill_forces(tick.rendering, tick.safety);
+  fill_forces(tick.rendering, tick.safety, tick.cell.depth_sd_m);
   fill_cell(tick.cell);
   s.sensor_N = readings.sensor_N;
+  s.E_fit_Pa = tick.modulus.E_Pa;
+  s.E_fit_sd_Pa = tick.modulus.sd_Pa;
   s.vacuum_Pa = readings.vacuum_Pa;
   s.injector_open = readings.injector_open ? 1 : 0;
   tell_events(last, tick.requested);
@@ -92,7 +94,8 @@ void TelemetryWriter::tell(Event event) NONBLOCKING {
   station_.core.events.push(event);
 }
 
-void TelemetryWriter::fill_forces(const Rendering& rendering, const SafetyOutput& safety) NONBLOCKING {
+void TelemetryWriter::fill_forces(const Rendering& rendering, const SafetyOutput& safety, double depth_sd_m)
+    NONBLOCKING {
   TelemetrySample& s = sample_;
   const EffectSum& sum = rendering.sum();
   const double fade = safety.running && !safety.latch.cleared ? sum.force_fade : 0;
@@ -108,6 +111,7 @@ void TelemetryWriter::fill_forces(const Rendering& rendering, const SafetyOutput
   const MembraneState& state = rendering.membrane()->state();
   s.a_m = state.a_m;
   s.tip_force_N = state.force_N;
+  s.tip_force_sd_N = state.stiffness_N_m * depth_sd_m;
   s.sigma_d_Pa = state.sigma_d_Pa;
   s.pressure_Pa = state.pressure_Pa;
   const RimForces& rim = rendering.membrane()->rim();
@@ -130,6 +134,10 @@ void TelemetryWriter::fill_cell(const CellFacts& cell) NONBLOCKING {
   copy(s.axis, cell.approach_axis);
   s.obs_age_s = cell.observation_age_s;
   s.obs_gap_m = cell.observed_gap_m;
+  s.wd_sd_m = cell.depth_sd_m;
+  s.R_sd_m = cell.R_sd_m;
+  s.obs_a_m = cell.observed_a_m;
+  s.obs_a_sd_m = cell.observed_a_sd_m;
   s.observations = cell.observations;
   s.stale_ticks = cell.stale_ticks;
 }

@@ -7,6 +7,7 @@
 #include "hal/realtime.hpp"
 #include "rt/control/cell_observer.hpp"
 #include "rt/control/device_inputs.hpp"
+#include "rt/control/modulus_fit.hpp"
 #include "rt/control/rendering.hpp"
 #include "rt/control/requests.hpp"
 #include "rt/control/safety_stop.hpp"
@@ -25,6 +26,7 @@ struct TickRecord {
   const CellFacts& cell;
   const TaskFacts& task;
   const Rendering& rendering;
+  const ModulusEstimate& modulus;
   const SafetyOutput& safety;
   const hal::StageCommand& set_point;
 };
@@ -45,7 +47,7 @@ class TelemetryWriter {
   };
   void tell_events(const Seen& last, const Requested& requested) NONBLOCKING;
   void tell(Event event) NONBLOCKING;
-  void fill_forces(const Rendering& rendering, const SafetyOutput& safety) NONBLOCKING;
+  void fill_forces(const Rendering& rendering, const SafetyOutput& safety, double depth_sd_m) NONBLOCKING;
   void fill_cell(const CellFacts& cell) NONBLOCKING;
 
   Station& station_;

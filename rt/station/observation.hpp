@@ -39,8 +39,12 @@ struct Observation {
   double a_m = 0;                     // half-width of the dimple where its depth is 1 % of w_d
   double membrane_velocity_m_s = 0;   // of the contact points, along the axis; < 0 = recoil
   double contact_point_m[2][3] = {};  // the two contact points on the pipette's edges
-  double noise_m = 0;                 // standard deviation of gap_m and wd_m, as vision estimates it
-  std::uint64_t total_us = 0;         // processing time; never used by the core
+  // Standard deviations, as vision estimates them; 0 where the value is not known.
+  double noise_m = 0;  // of gap_m
+  double wd_sd_m = 0;
+  double a_sd_m = 0;
+  double R_sd_m = 0;
+  std::uint64_t total_us = 0;  // processing time; never used by the core
 
   [[nodiscard]] bool has(Flag f) const NONBLOCKING { return (flags & f) != 0; }
 };

@@ -29,7 +29,7 @@ using CommandQueue = hal::CommandQueue<Command, 64>;
 struct CoreSegment {
   static constexpr bool kOneWriter = true;
   static constexpr std::uint64_t kMagic = 0x00000065726f6350ULL;  // "Pcore"
-  static constexpr std::uint64_t kVersion = 3;                    // raise when a meaning changes
+  static constexpr std::uint64_t kVersion = 4;                    // raise when a meaning changes
   static const std::uint64_t kLayout;                             // version, sizes and offsets
 
   hal::SegmentHeader header;
@@ -47,7 +47,7 @@ inline constexpr std::uint64_t CoreSegment::kLayout =
 struct ObservationSegment {
   static constexpr bool kOneWriter = true;
   static constexpr std::uint64_t kMagic = 0x6576726573626f50ULL;  // "Pobserve"
-  static constexpr std::uint64_t kVersion = 5;
+  static constexpr std::uint64_t kVersion = 6;
   static const std::uint64_t kLayout;
 
   hal::SegmentHeader header;

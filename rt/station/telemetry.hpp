@@ -55,6 +55,15 @@ struct TelemetrySample {
   std::uint64_t stale_ticks = 0;  // ticks on which the newest observation was too old
   std::uint8_t injector_open = 0;
   std::uint8_t pad[7] = {};
+
+  // Standard deviations and what only vision knows; 0 where it is not known.
+  double wd_sd_m = 0;         // of wd_m
+  double R_sd_m = 0;          // of R_m
+  double tip_force_sd_N = 0;  // of tip_force_N by that of the depth; an error of the modulus comes on top
+  double obs_a_m = 0;         // half-width of the dimple as the newest observation has it
+  double obs_a_sd_m = 0;
+  double E_fit_Pa = 0;  // elastic modulus as the force sensor tells it, rt/control/modulus_fit
+  double E_fit_sd_Pa = 0;
 };
 
 }  // namespace punctum::rt

@@ -47,6 +47,21 @@ TEST_F(Programs, an_injection_goes_through_its_phases_in_order) {
   }
 }
 
+TEST_F(Programs, a_force_sensor_tells_the_modulus_of_the_cell) {
+  for (const double E_kPa : {17.9, 42.2}) {
+    ASSERT_EQ(punctum({"run", "icsi", "--clock", "virtual", "--no-figure", "--no-frames", "--set",
+                       "force_sensor=on", "--set", "force_sensor.device=simulated", "--set",
+                       "sim.cell.spread=0", "--set", "sim.cell.zona_E_kPa=" + std::to_string(E_kPa)}),
+              0)
+        << said_;
+    const auto r = json();
+    const double sd_kPa = r["E_fit_sd_kPa"];
+    EXPECT_NEAR(r["E_fit_kPa"].get<double>(), E_kPa, 1.96 * sd_kPa);
+    EXPECT_LT(sd_kPa, 0.05 * E_kPa);
+    EXPECT_NE(said_.find("by the force sensor"), std::string::npos);
+  }
+}
+
 TEST_F(Programs, an_injection_of_nothing_is_not_done) {
   EXPECT_EQ(punctum({"run", "icsi", "--clock", "virtual", "--set", "vision.method=truth", "--set",
                      "sim.failure=[{device=\"injector\", kind=\"disconnect\", at_s=2}]"}),

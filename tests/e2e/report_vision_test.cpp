@@ -46,5 +46,26 @@ TEST(ReportVision, nothing_faster_than_the_shipped_settings_sees_better) {
   }
 }
 
+TEST(ReportVision, frames_of_another_renderer_are_seen_as_well_or_what_is_missing_is_said) {
+  const fs::path file = quick_report().folder() / "vision_foreign.csv";
+  if (!fs::exists(file)) {
+    EXPECT_NE(quick_report().said.find("Frames of another renderer: not (all) drawn: "), std::string::npos)
+        << quick_report().said;
+    return;
+  }
+  const Table lines(file);
+  int shipped = 0;
+  for (std::size_t l = 0; l < lines.rows.size(); ++l) {
+    if (lines.text(l, "shipped") == "1") {
+      ++shipped;
+      EXPECT_EQ(lines.number(l, "seen_share"), 1);
+      EXPECT_GT(lines.number(l, "outer_rms_um"), lines.number(l, "bound_um"));
+      EXPECT_LT(lines.number(l, "outer_rms_um"), 0.25);
+      EXPECT_LT(lines.number(l, "wd_rms_um"), 0.825);
+    }
+  }
+  EXPECT_EQ(shipped, 1);
+}
+
 }  // namespace
 }  // namespace punctum::e2e

@@ -431,9 +431,27 @@ class Station {
     for (const double x : s.effect_N) {
       finite(x);
     }
-    for (const double x :
-         {s.guard_N, s.wd_m, s.a_m, s.R_m, s.tip_force_N, s.sigma_d_Pa, s.pressure_Pa, s.obs_age_s,
-          s.obs_gap_m, s.sensor_N, s.vacuum_Pa, s.stored_energy_J, s.injected_energy_J, world.hand.work_J}) {
+    for (const double x : {s.guard_N,
+                           s.wd_m,
+                           s.a_m,
+                           s.R_m,
+                           s.tip_force_N,
+                           s.sigma_d_Pa,
+                           s.pressure_Pa,
+                           s.obs_age_s,
+                           s.obs_gap_m,
+                           s.sensor_N,
+                           s.vacuum_Pa,
+                           s.stored_energy_J,
+                           s.injected_energy_J,
+                           world.hand.work_J,
+                           s.wd_sd_m,
+                           s.R_sd_m,
+                           s.tip_force_sd_N,
+                           s.obs_a_m,
+                           s.obs_a_sd_m,
+                           s.E_fit_Pa,
+                           s.E_fit_sd_Pa}) {
       finite(x);
     }
 

@@ -36,17 +36,23 @@ constexpr GainReference kGains[] = {
 // 43, 1.8, 2.1 (4 kHz), 45, 11.8, 5.1 (fast, 4 kHz).
 struct ErrorReference {
   double rate_Hz;
-  Motion motion;
+  KnownMotion motion;
   double error_mm_s[4];  // finite difference, EMA 30 Hz, FOAW-16, Kalman
   double notes_mm_s[3];
 };
 constexpr ErrorReference kErrors[] = {
     {1000,
-     Motion::slow_sine,
+     KnownMotion::slow_sine,
      {11.1348714547, 1.75080929128, 1.27135514782, 1.84363010537},
      {10.8, 1.65, 1.25}},
-    {4000, Motion::slow_sine, {43.4974105403, 1.79579397748, 2.12490930036, 1.2294495527}, {43, 1.8, 2.1}},
-    {4000, Motion::fast_sine, {44.1260375364, 11.8457307087, 5.06016532639, 1.7628347304}, {45, 11.8, 5.1}},
+    {4000,
+     KnownMotion::slow_sine,
+     {43.4974105403, 1.79579397748, 2.12490930036, 1.2294495527},
+     {43, 1.8, 2.1}},
+    {4000,
+     KnownMotion::fast_sine,
+     {44.1260375364, 11.8457307087, 5.06016532639, 1.7628347304},
+     {45, 11.8, 5.1}},
 };
 
 VelocityParams params(double jerk_m_s3_rtHz, double d_m) {
@@ -119,7 +125,7 @@ TEST(Velocity, has_the_errors_of_an_independent_computation_and_of_the_notes) {
 
 TEST(Velocity, of_a_resting_hand_is_as_noisy_as_the_filters_impulse_response_says) {
   for (const GainReference& g : kGains) {
-    const EncoderRecord r = record(Motion::hold, {1 / g.T_s, g.d_m, false});
+    const EncoderRecord r = record(KnownMotion::hold, {1 / g.T_s, g.d_m, false});
     const double noise = error_m_s(rt::Kalman(params(g.jerk_m_s3_rtHz, g.d_m), g.T_s), r);
     EXPECT_NEAR(noise, g.flicker_m_s, 0.1 * g.flicker_m_s);
   }
@@ -129,7 +135,7 @@ TEST(Velocity, of_a_resting_hand_is_as_noisy_as_the_filters_impulse_response_say
 
 TEST(Velocity, in_float_is_as_good_as_in_double) {
   for (const double rate : {1000.0, 8000.0}) {
-    const EncoderRecord r = record(Motion::work, {rate, 0.03e-3, true});
+    const EncoderRecord r = record(KnownMotion::work, {rate, 0.03e-3, true});
     rt::Kalman kalman(VelocityParams{}, 1 / rate);
     rt::BasicKalman<float> kalman_float(VelocityParams{}, 1 / rate);
     rt::BasicFoaw<float> foaw_float{VelocityParams{}};
@@ -152,7 +158,7 @@ TEST(Velocity, in_float_is_as_good_as_in_double) {
 TEST(DefaultVelocity, is_on_the_front_of_error_against_time) {
   for (const double rate : {1000.0, 4000.0, 8000.0}) {
     for (const double d : {0.03e-3, 0.055e-3}) {
-      const EncoderRecord r = record(Motion::work, {rate, d, true});
+      const EncoderRecord r = record(KnownMotion::work, {rate, d, true});
       VelocityParams p;
       p.d_m = d;
       ASSERT_EQ(p.method, VelocityParams::Method::kalman);
@@ -179,7 +185,7 @@ TEST(DefaultVelocity, is_on_the_front_of_error_against_time) {
 }
 
 TEST(DefaultVelocity, costs_a_fraction_of_foaw) {
-  const EncoderRecord r = record(Motion::work, {1000, 0.03e-3, true});
+  const EncoderRecord r = record(KnownMotion::work, {1000, 0.03e-3, true});
   const auto pass_ns = [&r](auto method) {
     const auto begin = std::chrono::steady_clock::now();
     Vec3 sum = Vec3::Zero();

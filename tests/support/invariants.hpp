@@ -441,7 +441,8 @@ class Invariants {
       }
     }
     for (const double x : {t.guard_N, t.obs_age_s, t.sensor_N, t.vacuum_Pa, t.stored_energy_J,
-                           t.injected_energy_J, t.obs_gap_m}) {
+                           t.injected_energy_J, t.obs_gap_m, t.wd_sd_m, t.R_sd_m, t.tip_force_sd_N, t.obs_a_m,
+                           t.obs_a_sd_m, t.E_fit_Pa, t.E_fit_sd_Pa}) {
       finite = finite && std::isfinite(x);
     }
     must(I::finite_telemetry, finite);

@@ -112,6 +112,10 @@ void Measures::close_cell() {
   keep(now_.lateral_contact_m, lateral_contact_m);
   keep(now_.beyond_puncture_m, beyond_puncture_m);
   keep(now_.withdrawal_s, withdrawal_s);
+  if (now_.E_fit_Pa > 0) {
+    E_fit_Pa.add(now_.E_fit_Pa);
+    E_fit_sd_Pa.add(now_.E_fit_sd_Pa);
+  }
   if (cells.size() < kKept) {
     cells.push_back(now_);
   }
@@ -182,6 +186,11 @@ void Measures::tick(const rt::TelemetrySample& s, const sim::Snapshot* world) {
   const double hand_N = norm(s.force_N);
   now_.peak_hand_N = std::max(now_.peak_hand_N, hand_N);
   peak_hand_N = std::max(peak_hand_N, hand_N);
+
+  if (s.E_fit_Pa > 0) {
+    now_.E_fit_Pa = s.E_fit_Pa;
+    now_.E_fit_sd_Pa = s.E_fit_sd_Pa;
+  }
 
   if (world != nullptr) {
     measure_tremor(s, *world);

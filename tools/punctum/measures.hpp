@@ -67,6 +67,7 @@ struct CellMeasures {
   double peak_force_N = 0;  // true, along the needle
   double max_depth_m = 0;   // true, past the undeformed outer membrane
   double peak_hand_N = 0;
+  double E_fit_Pa = 0, E_fit_sd_Pa = 0;  // modulus by the force sensor, the last that was told; 0: none
   // The dose, as the time for which the injector is fully open with the tip in the cell. Asked: how long the
   // button was down there. Given: in truth where the cell is simulated, otherwise as the injector reports.
   double asked_s = 0;
@@ -132,6 +133,7 @@ class Measures {
   Spread contact_delay_s, puncture_delay_s, inner_delay_s, lateral_error_m, lateral_contact_m,
       beyond_puncture_m, withdrawal_s;
   double peak_force_N = 0, max_depth_m = 0, peak_hand_N = 0;
+  Spread E_fit_Pa, E_fit_sd_Pa;
 
   // Estimated less true needle force, from contact until the outer membrane gives way.
   double force_error2 = 0, force_error_sum = 0, true_force2 = 0;

@@ -31,7 +31,7 @@ std::string command_line() {
 }  // namespace
 
 nlohmann::ordered_json provenance(const Scene& scene) {
-  const Machine machine = this_machine();
+  const MachineDescription machine = this_machine();
   const std::time_t now = std::time(nullptr);
   return {{"begun_at", fmt::format("{:%Y-%m-%dT%H:%M:%S%z}", fmt::localtime(now))},
           {"program", version_line("punctum")},

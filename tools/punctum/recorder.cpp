@@ -39,7 +39,8 @@ std::string columns() {
       "obs_gap_m,stored_energy_J,injected_energy_J,injector_open,sensor_N,vacuum_Pa,true_tip_x_m,true_tip_y_"
       "m,"
       "true_tip_z_m,true_force_N,true_gap_m,true_wd_m,true_a_m,true_contact,true_punctured,true_lost," +
-      effect_columns(kFirstEffects, rt::effect_count);
+      effect_columns(kFirstEffects, rt::effect_count) +
+      "wd_sd_m,R_sd_m,tip_force_sd_N,obs_a_m,obs_a_sd_m,E_fit_Pa,E_fit_sd_Pa,";
   all.back() = '\n';
   return all;
 }
@@ -278,6 +279,10 @@ void Recorder::row(Table& table, const rt::TelemetrySample& s, const sim::Snapsh
   }
   for (std::size_t i = kFirstEffects; i < rt::effect_count; ++i) {
     put(s.effect_N[i]);
+  }
+  for (const double v :
+       {s.wd_sd_m, s.R_sd_m, s.tip_force_sd_N, s.obs_a_m, s.obs_a_sd_m, s.E_fit_Pa, s.E_fit_sd_Pa}) {
+    put(v);
   }
   out.data()[out.size() - 1] = '\n';  // in place of the last comma
   table.file.append({out.data(), out.size()});

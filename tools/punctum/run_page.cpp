@@ -302,6 +302,9 @@ std::string measures_html(const Json& facts) {
                                                                  shown(n("force_error_rms_N"), "uN", 1e6),
                                                                  shown(n("true_force_rms_N"), "uN", 1e6))
                                                    : std::string());
+    f.row("modulus", n("E_fit_kPa") ? fmt::format("{}, standard deviation {}", shown(n("E_fit_kPa"), "kPa"),
+                                                  shown(n("E_fit_sd_kPa"), "kPa"))
+                                    : std::string());
     f.row("deepest", shown(n("max_depth_um"), "um") + ", beyond the puncture " +
                          known(n("depth_beyond_puncture_um"), "um"));
     f.row("withdrawal", shown(n("withdrawal_s"), "s"));

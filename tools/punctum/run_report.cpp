@@ -219,6 +219,8 @@ nlohmann::ordered_json report_facts(const Scene& scene, const RunResult& result,
       m.force_ticks > 0 ? Json(m.force_error_sum / static_cast<double>(m.force_ticks)) : Json(nullptr);
   j["true_force_rms_N"] =
       m.force_ticks > 0 ? Json(std::sqrt(m.true_force2 / static_cast<double>(m.force_ticks))) : Json(nullptr);
+  j["E_fit_kPa"] = mean(m.E_fit_Pa, 1e-3);
+  j["E_fit_sd_kPa"] = mean(m.E_fit_sd_Pa, 1e-3);
   j["contour_error_um"] = contour ? Json{{"rms", contour->rms_um}, {"p95", contour->p95_um}} : Json(nullptr);
   j["lateral_error_um"] = mean(m.lateral_error_m, 1e6);
   j["lateral_error_contact_um"] = mean(m.lateral_contact_m, 1e6);
@@ -253,6 +255,8 @@ nlohmann::ordered_json report_facts(const Scene& scene, const RunResult& result,
                               {"lateral_error_contact_um", number(c.lateral_contact_m, 1e6)},
                               {"peak_force_N", c.peak_force_N},
                               {"max_depth_um", c.max_depth_m * 1e6},
+                              {"E_fit_kPa", c.E_fit_Pa > 0 ? Json(c.E_fit_Pa * 1e-3) : Json(nullptr)},
+                              {"E_fit_sd_kPa", c.E_fit_Pa > 0 ? Json(c.E_fit_sd_Pa * 1e-3) : Json(nullptr)},
                               {"depth_beyond_puncture_um", number(c.beyond_puncture_m, 1e6)},
                               {"withdrawal_s", number(c.withdrawal_s)},
                               {"injected_s", number(c.injected_s)},
@@ -378,6 +382,11 @@ std::string summary(const Scene& scene, const RunResult& result, const Measures&
       line("force estimate",
            fmt::format("error {:.2f} uN rms of {:.2f} uN rms true force", *e * 1e6,
                        std::sqrt(m.true_force2 / static_cast<double>(m.force_ticks)) * 1e6));
+    }
+    if (m.E_fit_Pa.n > 0) {
+      line("modulus", fmt::format("{} by the force sensor, standard deviation {}; the scene has {:.1f} kPa",
+                                  value(m.E_fit_Pa, 1e-3, "kPa"), value(m.E_fit_sd_Pa, 1e-3, "kPa"),
+                                  scene.servo.membrane ? scene.servo.membrane->E_Pa * 1e-3 : 0.0));
     }
   }
   for (const auto& [what, least_m] :

@@ -19,7 +19,7 @@ std::string without_commas(std::string s) {
 }  // namespace
 
 Provenance provenance() {
-  const tools::Machine machine = tools::this_machine();
+  const tools::MachineDescription machine = tools::this_machine();
 #if defined(__clang__)
   const std::string compiler =
       fmt::format("clang {}.{}.{}", __clang_major__, __clang_minor__, __clang_patchlevel__);

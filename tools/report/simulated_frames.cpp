@@ -15,7 +15,7 @@ constexpr double kTooLong_s = 30;
 
 }  // namespace
 
-hal::Frame SimulatedInjection::frame(std::size_t i) const {
+hal::Frame DrawnInjection::frame(std::size_t i) const {
   hal::Frame f;
   f.pixels = pixels[i].data();
   f.width = lens.width;
@@ -26,7 +26,7 @@ hal::Frame SimulatedInjection::frame(std::size_t i) const {
   return f;
 }
 
-vision::VisionConfig SimulatedInjection::config() const {
+vision::VisionConfig DrawnInjection::config() const {
   vision::VisionConfig config;
   config.pixel_m = lens.pixel_m;
   return config;

@@ -1,4 +1,5 @@
-// An injection into the simulated cell, as the simulated microscope shows it, with the truth of every frame.
+// Injections whose every frame comes with its truth: into the simulated cell, as the simulated microscope
+// shows it.
 #pragma once
 
 #include <cstdint>
@@ -15,10 +16,10 @@ inline constexpr int kStretches = 4;
 
 struct FrameTruth {
   Stretch stretch = Stretch::approach;
-  vision::Contour outer, inner;  // px; the edges before blur, with the arcs that pipettes hide
-  vision::Point tip, axis;       // px, unit
-  vision::Point centre;          // of the cell, px
-  double wd_m = 0, a_m = 0, R_m = 0;
+  vision::Contour outer, inner;       // px; the edges before blur, with the arcs that pipettes hide
+  vision::Point tip, axis;            // px, unit
+  vision::Point centre;               // of the cell, px
+  double wd_m = 0, a_m = 0, R_m = 0;  // NaN: not told
 };
 
 struct InjectionPlan {
@@ -32,15 +33,18 @@ struct InjectionPlan {
   double inside_s = 0.6;  // after the recoil
 };
 
-struct SimulatedInjection {
-  sim::MicroscopeParams lens;
-  sim::CellParams cell;
+struct DrawnInjection {
+  sim::MicroscopeParams lens;  // of whatever draws: its pixels, blur and contrast
   sim::NeedleParams needle;
   std::vector<std::vector<std::uint8_t>> pixels;  // of each frame, row by row
   std::vector<FrameTruth> truth;
 
   [[nodiscard]] hal::Frame frame(std::size_t i) const;
   [[nodiscard]] vision::VisionConfig config() const;  // the shipped settings for this picture
+};
+
+struct SimulatedInjection : DrawnInjection {
+  sim::CellParams cell;
 };
 
 // 25 frames a second, with both pipettes and both membranes.

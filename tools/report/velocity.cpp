@@ -181,7 +181,7 @@ Lag lag(const Candidate& c, const EncoderSampling& sampling, double frequency_Hz
 struct Measured {
   std::vector<double> errors_m_s;  // in the order of kMotions
   Lag slow, tremor;
-  [[nodiscard]] double of(Motion m) const {
+  [[nodiscard]] double of(KnownMotion m) const {
     for (std::size_t i = 0; i < kMotions.size(); ++i) {
       if (kMotions[i].motion == m) {
         return errors_m_s[i];
@@ -226,7 +226,7 @@ Row measured_cells(const Measured& m) {
   for (const double e : m.errors_m_s) {
     row.emplace_back(kMm * e);
   }
-  row.emplace_back(kMm * kDamping_Ns_m * m.of(Motion::hold));
+  row.emplace_back(kMm * kDamping_Ns_m * m.of(KnownMotion::hold));
   row.emplace_back(1e3 * m.slow.lag_s);
   row.emplace_back(1e3 * m.tremor.lag_s);
   row.emplace_back(m.tremor.gain);
@@ -258,7 +258,7 @@ Panel noise_against_lag(std::span<const Candidate> all, std::span<const Measured
     if (s == p.series.end()) {
       s = p.series.insert(p.series.end(), Series{.name = all[i].method, .style = Style::line_points});
     }
-    const double x = 1e3 * measured[i].tremor.lag_s, y = kMm * measured[i].of(Motion::hold);
+    const double x = 1e3 * measured[i].tremor.lag_s, y = kMm * measured[i].of(KnownMotion::hold);
     s->x.push_back(x);
     s->y.push_back(y);
     if (all[i].shipped) {
@@ -280,7 +280,7 @@ AtRate measure_at(double rate_Hz, const std::vector<Candidate>& all, const Job& 
   job.progress.start(fmt::format("{:g} Hz", rate_Hz), static_cast<std::int64_t>(all.size()) + 1);
   AtRate out;
   std::vector<Timed> timed;
-  const auto work = std::make_shared<const EncoderRecord>(record(Motion::work, sampling));
+  const auto work = std::make_shared<const EncoderRecord>(record(KnownMotion::work, sampling));
   for (const Candidate& c : all) {
     out.measured.push_back(measure(c, sampling, records));
     timed.push_back(c.timed(sampling, work));
@@ -291,7 +291,7 @@ AtRate measure_at(double rate_Hz, const std::vector<Candidate>& all, const Job& 
   job.progress.step();
   for (std::size_t i = 0; i < all.size(); ++i) {
     out.works.push_back(
-        {all[i].method, all[i].knob, kMm * out.measured[i].of(Motion::work), times[i], all[i].shipped});
+        {all[i].method, all[i].knob, kMm * out.measured[i].of(KnownMotion::work), times[i], all[i].shipped});
   }
   return out;
 }
@@ -373,7 +373,7 @@ SamplingSweep sweep_sampling(const std::vector<const Candidate*>& chosen, const 
           out.table.add(std::move(row));
           if (uneven && step_m == kEncoderStep_m) {
             out.panel.series[i].x.push_back(rate_Hz);
-            out.panel.series[i].y.push_back(kMm * m.of(Motion::work));
+            out.panel.series[i].y.push_back(kMm * m.of(KnownMotion::work));
           }
         }
         job.progress.step();
@@ -404,7 +404,7 @@ std::string reading(const std::vector<Candidate>& all, const AtRate& at_1_kHz) {
       front_sentence(at_1_kHz.works), ratio([&](std::size_t i) { return at_1_kHz.works[i].error; }),
       ratio([&](std::size_t i) { return at_1_kHz.works[i].time.median_ns; }),
       1e3 * at_1_kHz.measured[foaw].tremor.lag_s, 1e3 * at_1_kHz.measured[shipped].tremor.lag_s,
-      ratio([&](std::size_t i) { return at_1_kHz.measured[i].of(Motion::hold); }));
+      ratio([&](std::size_t i) { return at_1_kHz.measured[i].of(KnownMotion::hold); }));
 }
 
 }  // namespace

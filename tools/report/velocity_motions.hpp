@@ -14,7 +14,7 @@
 
 namespace punctum::report {
 
-enum class Motion : std::uint8_t {
+enum class KnownMotion : std::uint8_t {
   approach,   // minimum-jerk strokes with peaks of 0.2, 1, 5, 20 and 50 mm/s, and rests between
   tremor,     // eight lines in 8 .. 12 Hz, 0.25 mm rms
   work,       // the sum of both: a hand at work
@@ -26,14 +26,14 @@ enum class Motion : std::uint8_t {
   fast_sine,  // 5 mm at 4 Hz
 };
 struct NamedMotion {
-  Motion motion;
+  KnownMotion motion;
   std::string_view name;
 };
 inline constexpr std::array kMotions{
-    NamedMotion{Motion::approach, "approach"}, NamedMotion{Motion::tremor, "tremor"},
-    NamedMotion{Motion::work, "work"},         NamedMotion{Motion::hold, "hold"},
-    NamedMotion{Motion::reach, "reach"},       NamedMotion{Motion::impact, "impact"},
-    NamedMotion{Motion::grip, "grip"}};
+    NamedMotion{KnownMotion::approach, "approach"}, NamedMotion{KnownMotion::tremor, "tremor"},
+    NamedMotion{KnownMotion::work, "work"},         NamedMotion{KnownMotion::hold, "hold"},
+    NamedMotion{KnownMotion::reach, "reach"},       NamedMotion{KnownMotion::impact, "impact"},
+    NamedMotion{KnownMotion::grip, "grip"}};
 
 struct HandTruth {
   double position_m = 0, velocity_m_s = 0, force_N = 0;
@@ -42,7 +42,7 @@ struct HandTruth {
 class HandMotion {
  public:
   // One axis. Another seed gives another hand.
-  HandMotion(Motion motion, std::uint64_t seed) : motion_(motion) {
+  HandMotion(KnownMotion motion, std::uint64_t seed) : motion_(motion) {
     std::mt19937_64 random(seed);
     const auto uniform = [&random] { return static_cast<double>(random() >> 11) * 0x1p-53; };
     start_m_ = 0.02 * (uniform() - 0.5);
@@ -54,12 +54,12 @@ class HandMotion {
 
   [[nodiscard]] double seconds() const {
     switch (motion_) {
-      case Motion::approach:
-      case Motion::work:
+      case KnownMotion::approach:
+      case KnownMotion::work:
         return 8;
-      case Motion::reach:
+      case KnownMotion::reach:
         return 0.8;
-      case Motion::impact:
+      case KnownMotion::impact:
         return 0.3;
       default:
         return 4;
@@ -68,25 +68,25 @@ class HandMotion {
 
   [[nodiscard]] HandTruth at(double t) const {
     switch (motion_) {
-      case Motion::approach:
+      case KnownMotion::approach:
         return strokes(t);
-      case Motion::tremor:
+      case KnownMotion::tremor:
         return trembling(t);
-      case Motion::work: {
+      case KnownMotion::work: {
         const HandTruth a = strokes(t), b = trembling(t);
         return {a.position_m + b.position_m, a.velocity_m_s + b.velocity_m_s, 0};
       }
-      case Motion::hold:
+      case KnownMotion::hold:
         return {start_m_, 0, 0};
-      case Motion::reach:
+      case KnownMotion::reach:
         return stroke(t - start_s_, 0.1, 0.3);
-      case Motion::impact:
+      case KnownMotion::impact:
         return bounce(t - start_s_);
-      case Motion::grip:
+      case KnownMotion::grip:
         return {start_m_, 0, std::fmod(t, 0.5) < 0.25 ? 0.0 : 1.0};
-      case Motion::slow_sine:
+      case KnownMotion::slow_sine:
         return sine(t, 1);
-      case Motion::fast_sine:
+      case KnownMotion::fast_sine:
         return sine(t, 4);
     }
     return {};
@@ -149,7 +149,7 @@ class HandMotion {
     return {5e-3 * std::sin(omega * t), 5e-3 * omega * std::cos(omega * t), 0};
   }
 
-  Motion motion_;
+  KnownMotion motion_;
   double start_m_ = 0, start_s_ = 0;
   std::array<Line, kLines> tremor_{};
 };
@@ -167,7 +167,7 @@ struct EncoderRecord {
 };
 
 // Three axes with three different hands.
-inline EncoderRecord record(Motion motion, const EncoderSampling& sampling, std::uint64_t seed = 1) {
+inline EncoderRecord record(KnownMotion motion, const EncoderSampling& sampling, std::uint64_t seed = 1) {
   const std::array hands{HandMotion(motion, 3 * seed), HandMotion(motion, 3 * seed + 1),
                          HandMotion(motion, 3 * seed + 2)};
   std::mt19937_64 random(seed + 1000);
@@ -187,7 +187,7 @@ inline EncoderRecord record(Motion motion, const EncoderSampling& sampling, std:
       HandTruth truth = hands[static_cast<std::size_t>(i)].at(t);
       v[i] = truth.velocity_m_s;
       f[i] = truth.force_N;
-      if (motion == Motion::hold) {
+      if (motion == KnownMotion::hold) {
         truth.position_m = (std::floor(truth.position_m / d) + 0.5 + 0.05 * gaussian(random)) * d;
       }
       x[i] = d * std::floor(truth.position_m / d + 0.5);

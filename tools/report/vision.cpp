@@ -1,6 +1,7 @@
 // Topic vision: what it costs to see the contours, the tip and the dimple, and how well they are seen, on
 // simulated frames whose truth is known.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <chrono>
@@ -9,6 +10,7 @@
 #include <numbers>
 #include <utility>
 
+#include "tools/report/foreign_frames.hpp"
 #include "tools/report/real_frames.hpp"
 #include "tools/report/simulated_frames.hpp"
 #include "tools/report/topic.hpp"
@@ -70,27 +72,38 @@ std::vector<InjectionPlan> plans(bool quick) {
   return all;
 }
 
-Table main_table() {
-  Table t{.name = "vision", .columns = {"method",
-                                        "knob",
-                                        "noise_grey",
-                                        "frames",
-                                        "outer_rms_um",
-                                        "outer_p95_um",
-                                        "inner_rms_um",
-                                        "inner_p95_um",
-                                        "tip_rms_um",
-                                        "wd_rms_um",
-                                        "a_rms_um",
-                                        "R_rms_um",
-                                        "force_rms_rel",
-                                        "seen_share",
-                                        "within_2px_share",
-                                        "approach_rms_um",
-                                        "indentation_rms_um",
-                                        "recoil_rms_um",
-                                        "inside_rms_um",
-                                        "bound_um"}};
+std::vector<ForeignPlan> foreign_plans(bool quick) {
+  constexpr int kFirst = 100;  // the renderer's seeds below are there to tune with
+  std::vector<ForeignPlan> all;
+  for (const double noise : quick ? std::vector<double>{5} : std::vector<double>{2, 5, 10}) {
+    for (int seed = kFirst; seed < kFirst + (quick ? 1 : 3); ++seed) {
+      all.push_back({.seed = seed, .noise = noise, .frames = quick ? 40 : 80});
+    }
+  }
+  return all;
+}
+
+Table main_table(const std::string& name) {
+  Table t{.name = name, .columns = {"method",
+                                    "knob",
+                                    "noise_grey",
+                                    "frames",
+                                    "outer_rms_um",
+                                    "outer_p95_um",
+                                    "inner_rms_um",
+                                    "inner_p95_um",
+                                    "tip_rms_um",
+                                    "wd_rms_um",
+                                    "a_rms_um",
+                                    "R_rms_um",
+                                    "force_rms_rel",
+                                    "seen_share",
+                                    "within_2px_share",
+                                    "approach_rms_um",
+                                    "indentation_rms_um",
+                                    "recoil_rms_um",
+                                    "inside_rms_um",
+                                    "bound_um"}};
   for (const auto& c : time_columns()) {
     t.columns.push_back(c);
   }
@@ -111,27 +124,33 @@ struct Measurement {
   double first_us = std::nan("");  // the shipped tracker's first frame of the last injection
 };
 
-Measurement prepare_trials(const std::vector<InjectionPlan>& injections, bool quick) {
-  Measurement m{.methods = vision_methods(), .overhead_us = clock_overhead_us()};
-  for (const InjectionPlan& plan : injections) {
-    if (!m.trials.empty() && m.trials.back().front().noise == plan.noise) {
-      continue;
-    }
-    m.trials.emplace_back();
-    for (const VisionMethod& method : m.methods) {
-      for (double value : quick ? method.quick_values : method.values) {
-        m.trials.back().push_back({.method = &method, .value = value, .noise = plan.noise});
-      }
+// Those of a noise level, new if there are none.
+std::vector<Trial>& trials_of(Measurement& m, double noise, bool quick) {
+  const auto found = std::find_if(m.trials.begin(), m.trials.end(),
+                                  [noise](const std::vector<Trial>& t) { return t.front().noise == noise; });
+  if (found != m.trials.end()) {
+    return *found;
+  }
+  m.trials.emplace_back();
+  for (const VisionMethod& method : m.methods) {
+    for (double value : quick ? method.quick_values : method.values) {
+      m.trials.back().push_back({.method = &method, .value = value, .noise = noise});
     }
   }
-  return m;
+  return m.trials.back();
+}
+
+double length_px(const vision::Contour& closed) {
+  double sum = 0;
+  for (std::size_t i = 0; i < closed.size(); ++i) {
+    sum += cv::norm(closed[(i + 1) % closed.size()] - closed[i]);
+  }
+  return sum;
 }
 
 // All methods see the frames of one injection.
-void observe(const InjectionPlan& plan, Measurement& m) {
-  const SimulatedInjection injection = simulate_injection(plan);
-  const auto of_noise = [&plan](const std::vector<Trial>& t) { return t.front().noise == plan.noise; };
-  std::vector<Trial>& trials = *std::find_if(m.trials.begin(), m.trials.end(), of_noise);
+void observe(const DrawnInjection& injection, bool quick, Measurement& m) {
+  std::vector<Trial>& trials = trials_of(m, injection.lens.noise, quick);
   std::vector<Observer> observers;
   for (Trial& t : trials) {
     t.newest.clear();
@@ -154,7 +173,7 @@ void observe(const InjectionPlan& plan, Measurement& m) {
       if (f > 0 || trial.method->every > 1) {
         trial.us.add(spent);  // the first frame is a start
       }
-      trial.length_px = 2 * std::numbers::pi * truth.R_m / injection.lens.pixel_m;
+      trial.length_px = length_px(truth.outer);
       trial.score(seen, truth, lines, injection.lens.pixel_m, injection.needle.radius_m);
       if (trial.shipped()) {
         m.stages.add(seen.us);
@@ -225,7 +244,6 @@ Row row_of(const Trial& t, double bound_um) {
 }
 
 struct Output {
-  Table table = main_table();
   Figure figure{.name = "vision", .panels = {}};
   Panel over_noise{.title = "shipped settings over noise",
                    .x_label = "noise of the picture [grey levels]",
@@ -233,10 +251,13 @@ struct Output {
                    .log_x = true,
                    .log_y = true};
 
-  void add_noise_level(const std::vector<Trial>& trials, const Measurement& m,
-                       const sim::MicroscopeParams& lens);
+  // A row per trial into `table`, and a panel per noise level. whose: the frames; empty: the simulated
+  // station's.
+  void add(const Measurement& m, const std::string& whose, Table& table);
 
  private:
+  void add_noise_level(const std::vector<Trial>& trials, const Measurement& m, const std::string& whose,
+                       Table& table);
   void add_point(const std::string& name, double x, double y, Style style);
 };
 
@@ -250,8 +271,15 @@ void Output::add_point(const std::string& name, double x, double y, Style style)
   s->y.push_back(y);
 }
 
-void Output::add_noise_level(const std::vector<Trial>& trials, const Measurement& m,
-                             const sim::MicroscopeParams& lens) {
+void Output::add(const Measurement& m, const std::string& whose, Table& table) {
+  for (const auto& trials : m.trials) {
+    add_noise_level(trials, m, whose, table);
+  }
+}
+
+void Output::add_noise_level(const std::vector<Trial>& trials, const Measurement& m, const std::string& whose,
+                             Table& table) {
+  const sim::MicroscopeParams lens;  // either renderer's
   const std::vector<Work> works = works_of(trials, m.overhead_us), compared = comparable(trials, works);
   const double noise = trials.front().noise, pixel_um = lens.pixel_m * 1e6;
   const double bound = contour_bound_um(noise, trials.front().length_px, lens);
@@ -269,17 +297,19 @@ void Output::add_noise_level(const std::vector<Trial>& trials, const Measurement
     }
     table.add(std::move(row));
     if (t.shipped()) {
-      add_point("closed path (shipped)", noise, works[i].error, Style::line_points);
+      add_point("closed path (shipped)" + whose, noise, works[i].error, Style::line_points);
     }
     if (is_paper(t, m)) {
-      add_point("the paper's method (16 nodes)", noise, works[i].error, Style::line_points);
+      add_point("the paper's method (16 nodes)" + whose, noise, works[i].error, Style::line_points);
     }
   }
   const std::string bound_name = fmt::format("Cramer-Rao, {} modes", kModes);
-  add_point(bound_name, noise, bound, Style::limit);
-  add_point("one pixel", noise, pixel_um, Style::limit);
+  if (whose.empty()) {
+    add_point(bound_name, noise, bound, Style::limit);
+    add_point("one pixel", noise, pixel_um, Style::limit);
+  }
   const Limit limits[] = {{"one pixel", pixel_um}, {bound_name, bound}};
-  figure.panels.push_back(work_precision(fmt::format("noise {} grey levels", noise),
+  figure.panels.push_back(work_precision(fmt::format("noise {} grey levels{}", noise, whose),
                                          "outer contour, rms error [um]", compared, limits));
 }
 
@@ -294,7 +324,7 @@ Table stages_table(const StageSamples& stages) {
 }
 
 std::string reading(const Measurement& m, const Trial& shipped, const Trial& paper,
-                    const sim::MicroscopeParams& lens, const std::string& real_frames) {
+                    const sim::MicroscopeParams& lens, const std::string& others_frames) {
   const auto time_ns = [&m](const Trial& t) { return call_time(t.us, m.overhead_us).median_ns; };
   const auto& lowest_noise = m.trials.front();
   const std::vector<Work> nominal = comparable(lowest_noise, works_of(lowest_noise, m.overhead_us));
@@ -307,27 +337,56 @@ std::string reading(const Measurement& m, const Trial& shipped, const Trial& pap
       shipped.noise, shipped.outer_frames.rms(),
       shipped.outer_frames.rms() / contour_bound_um(shipped.noise, shipped.length_px, lens),
       1e-6 * time_ns(shipped), 1e-3 * m.first_us, paper.outer_frames.rms(), 1e-6 * time_ns(paper),
-      100 * shipped.force.rms(), front_sentence(nominal), real_frames);
+      100 * shipped.force.rms(), front_sentence(nominal), others_frames);
+}
+
+std::string foreign_reading(const Measurement& m, const std::string& missing) {
+  std::vector<std::string> seen;
+  for (const auto& trials : m.trials) {
+    const auto shipped =
+        std::find_if(trials.begin(), trials.end(), [](const Trial& t) { return t.shipped(); });
+    seen.push_back(fmt::format("{:.2f} um at noise {:g}", shipped->outer_frames.rms(), shipped->noise));
+  }
+  if (!missing.empty()) {
+    seen.push_back("not (all) drawn: " + missing);
+  }
+  return fmt::format("Frames of another renderer: {}. ", fmt::join(seen, ", "));
+}
+
+// Returns why the frames of another renderer were not seen; empty: they were.
+std::string observe_foreign(const Job& job, Measurement& m) {
+  const std::vector<ForeignPlan> injections = foreign_plans(job.quick);
+  job.progress.start("another renderer", static_cast<std::int64_t>(injections.size()));
+  for (const ForeignPlan& plan : injections) {
+    const auto injection = foreign_injection(plan);
+    if (!injection) {
+      return injection.error();
+    }
+    observe(*injection, job.quick, m);
+    job.progress.step();
+  }
+  return {};
 }
 
 }  // namespace
 
 Result run_vision(const Job& job) {
   const std::vector<InjectionPlan> injections = plans(job.quick);
-  Measurement m = prepare_trials(injections, job.quick);
+  Measurement m{.methods = vision_methods(), .overhead_us = clock_overhead_us()}, foreign = m;
   job.progress.start("frames", static_cast<std::int64_t>(injections.size()));
   for (const InjectionPlan& plan : injections) {
-    observe(plan, m);
+    observe(simulate_injection(plan), job.quick, m);
     job.progress.step();
   }
+  const std::string missing = observe_foreign(job, foreign);
 
   const sim::MicroscopeParams lens;
   const Trial& shipped = trial_that(m, [](const Trial& t) { return t.shipped(); });
   const Trial& paper = trial_that(m, [&m](const Trial& t) { return is_paper(t, m); });
   Output output;
-  for (const auto& trials : m.trials) {
-    output.add_noise_level(trials, m, lens);
-  }
+  Table table = main_table("vision"), foreign_table = main_table("vision_foreign");
+  output.add(m, "", table);
+  output.add(foreign, ", another renderer", foreign_table);
   Figure& figure = output.figure;
   figure.panels.push_back(std::move(output.over_noise));
   figure.note = fmt::format(
@@ -340,12 +399,15 @@ Result run_vision(const Job& job) {
       lens.psf_px, lens.contrast, kModes, shipped.length_px);
   const RealFrames real = see_real_frames(job.quick, job.progress);
   Result out;
-  out.tables = {std::move(output.table), stages_table(m.stages)};
+  out.tables = {std::move(table), stages_table(m.stages)};
+  if (!foreign_table.rows.empty()) {
+    out.tables.push_back(std::move(foreign_table));
+  }
   if (real.table) {
     out.tables.push_back(*real.table);
   }
   out.figures = {std::move(figure)};
-  out.reading = reading(m, shipped, paper, lens, real.summary);
+  out.reading = reading(m, shipped, paper, lens, foreign_reading(foreign, missing) + real.summary);
   return out;
 }
 

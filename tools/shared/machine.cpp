@@ -27,7 +27,7 @@ bool real_time(const utsname& system) {
 
 }  // namespace
 
-Machine this_machine() {
+MachineDescription this_machine() {
   utsname system{};
   uname(&system);
   return {.host = system.nodename,

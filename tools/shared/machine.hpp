@@ -5,12 +5,12 @@
 
 namespace punctum::tools {
 
-struct Machine {
+struct MachineDescription {
   std::string host, processor, architecture, kernel;
   unsigned cores = 0;
   bool real_time_kernel = false;  // built with PREEMPT_RT
 };
 
-[[nodiscard]] Machine this_machine();
+[[nodiscard]] MachineDescription this_machine();
 
 }  // namespace punctum::tools

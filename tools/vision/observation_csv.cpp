@@ -28,7 +28,8 @@ constexpr std::string_view kTruthColumns =
     ",outer_rms_um,outer_p95_um,outer_max_um,inner_rms_um,tip_error_um,tip_lateral_um,gap_error_um,wd_error_"
     "um,"
     "a_error_um";
-constexpr std::string_view kLaterColumns = ",surface_us,outer_sd_um,inner_sd_um";
+constexpr std::string_view kLaterColumns =
+    ",surface_us,outer_sd_um,inner_sd_um,wd_sd_um,a_sd_um,R_sd_um,force_sd_N";
 
 class Row {
  public:
@@ -123,6 +124,17 @@ std::optional<double> ObservationCsv::force_N(const vision::Result& r, const vis
   return rt::membrane_force(config.E_Pa, config.nu, config.h_m, config.c_m, *r.wd_px * config.pixel_m, a_m);
 }
 
+std::optional<double> ObservationCsv::force_sd_N(const vision::Result& r,
+                                                 const vision::VisionConfig& config) {
+  const auto force = force_N(r, config);
+  if (!force || *force <= 0 || !(*r.wd_px > 0)) {
+    return std::nullopt;
+  }
+  const double c_px = config.px(config.c_m);
+  const double by_a = 2 + rt::membrane_shape(c_px, *r.a_px - c_px).steepness;  // -dlnF / dln a
+  return *force * std::hypot(3 * r.wd_sd_px / *r.wd_px, by_a * r.a_sd_px / *r.a_px);
+}
+
 void ObservationCsv::row(std::uint64_t frame, double t_s, double total_us, const std::string& verdict) {
   Row row(rows_);
   row.text(std::to_string(frame));
@@ -176,7 +188,7 @@ void ObservationCsv::row(const vision::Result& r, const vision::VisionConfig& co
   row.number(r.us.total, 0);
   row.text(r.verdict);
   row.number(r.gap_px, 4, um);
-  row.number(r.gap_px ? std::optional<double>(r.gap_noise_px) : std::nullopt, 4, um);
+  row.number(r.gap_px ? std::optional<double>(r.gap_sd_px) : std::nullopt, 4, um);
   row.number(r.inner_radius_px, 4, um);
   row.point(r.undeformed ? std::optional<vision::Point>(r.undeformed->centre) : std::nullopt, offset);
   row.point(r.entry, offset);
@@ -213,6 +225,14 @@ void ObservationCsv::row(const vision::Result& r, const vision::VisionConfig& co
       square += sd * sd / static_cast<double>(m->sd_px.size());
     }
     row.number(when(square > 0, std::sqrt(square) * um), 4);
+  }
+  row.number(when(r.wd_sd_px > 0, r.wd_sd_px * um), 4);
+  row.number(when(r.a_px.has_value(), r.a_sd_px * um), 4);
+  row.number(r.undeformed ? std::optional<double>(r.undeformed->r_sd) : std::nullopt, 4, um);
+  if (const auto sd = force_sd_N(r, config)) {
+    row.text(fmt::format("{:.6e}", *sd));
+  } else {
+    row.nothing(1);
   }
 }
 

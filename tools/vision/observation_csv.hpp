@@ -38,6 +38,9 @@ class ObservationCsv {
   // Eq. 5 at the measured dimple; empty where w_d or a is not known.
   [[nodiscard]] static std::optional<double> force_N(const vision::Result& result,
                                                      const vision::VisionConfig& config);
+  // Its standard deviation by those of w_d and a.
+  [[nodiscard]] static std::optional<double> force_sd_N(const vision::Result& result,
+                                                        const vision::VisionConfig& config);
 
  private:
   RowFile rows_;

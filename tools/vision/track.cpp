@@ -75,7 +75,7 @@ Or<std::optional<vision::Circle>> seed_of(const TrackOptions& options, const cv:
     return wrong(fmt::format("--seed-circle {},{},{}: a centre in the picture and a radius of at least 4 px",
                              c[0], c[1], c[2]));
   }
-  return vision::Circle{{c[0] - roi.x, c[1] - roi.y}, c[2], 0};
+  return vision::Circle{{c[0] - roi.x, c[1] - roi.y}, c[2], 0, 0};
 }
 
 // Template of the holding pipette; empty when none is given.

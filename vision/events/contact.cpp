@@ -80,9 +80,18 @@ bool needle_merges_with_cell(const ClearedPicture& picture, const NeedlePose& ne
   return merge_classes(picture.strong, needle_pixels, cell_pixels, rows).merged;
 }
 
+namespace {
+
+constexpr double kBegin_px = 0.35, kEnd_px = 1.0;
+constexpr double kCertain_px = -1;  // so far inside they touch whatever the labels say
+
+}  // namespace
+
+bool merging_decides(const std::optional<double>& gap_px) {
+  return !gap_px || (*gap_px >= kCertain_px && *gap_px < kEnd_px);
+}
+
 bool touches(const std::optional<double>& gap_px, bool merged, bool touched_before) {
-  constexpr double kBegin_px = 0.35, kEnd_px = 1.0;
-  constexpr double kCertain_px = -1;  // so far inside they touch whatever the labels say
   if (!gap_px) {
     return merged;
   }

@@ -25,6 +25,7 @@ struct Classes {
 
 // Where the gap is known it decides, with hysteresis, and the merged classes confirm it; otherwise the merged
 // classes decide alone.
+[[nodiscard]] bool merging_decides(const std::optional<double>& gap_px);
 [[nodiscard]] bool touches(const std::optional<double>& gap_px, bool merged, bool touched_before);
 
 }  // namespace punctum::vision

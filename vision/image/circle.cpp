@@ -75,6 +75,22 @@ void refine(std::span<const Point> points, const std::vector<double>& w, const P
   }
 }
 
+// From the normal matrix of the fit and the rms distance; `part` of the points was fitted.
+double radius_sd(std::span<const Point> points, const std::vector<double>& w, const Circle& c, double part) {
+  cv::Matx33d a = cv::Matx33d::zeros();
+  double sum = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Point d = points[i] - c.centre;
+    const double l = cv::norm(d);
+    if (w[i] > 0 && l > 1e-9) {
+      const cv::Vec3d j(d.x / l, d.y / l, 1);
+      a += w[i] * (j * j.t());
+      sum += w[i];
+    }
+  }
+  return c.rms * std::sqrt(std::max(0.0, sum * a.inv()(2, 2)) / (Circle::kPieces * part));
+}
+
 }  // namespace
 
 Contour circle_contour(const Circle& circle, int points) {
@@ -132,6 +148,8 @@ std::optional<Circle> fit_circle(std::span<const Point> points, std::span<const 
       w[i] = std::abs(t) < 1 ? given[i] * std::pow(1 - t * t, 2) : 0;
     }
   }
+  const auto fitted = std::count_if(given.begin(), given.end(), [](double v) { return v > 0; });
+  out.r_sd = radius_sd(points, given, out, static_cast<double>(fitted) / static_cast<double>(points.size()));
   return out;
 }
 

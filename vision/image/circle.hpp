@@ -11,7 +11,9 @@ namespace punctum::vision {
 struct Circle {
   Point centre;
   double r = 0;
-  double rms = 0;  // distance of the fitted points from the circle
+  double rms = 0;   // distance of the fitted points from the circle
+  double r_sd = 0;  // standard deviation of r, if the distances err independently in each of kPieces
+  static constexpr int kPieces = 12;  // no cell is quite round
 };
 
 [[nodiscard]] Contour circle_contour(const Circle& circle, int points);

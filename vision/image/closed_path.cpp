@@ -18,6 +18,7 @@ namespace {
 constexpr float kForbidden = 1e6F;  // cost of a sample outside the limits
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 constexpr float kNoWay = std::numeric_limits<float>::max();
+constexpr int kAnywhere = -1;
 constexpr double kAnchorWeight = 4;  // in the smoothing; an edge weighs at most 1
 constexpr double kAnchorStiffness = 0.3;
 constexpr double kBridgeWeight = 0.01;  // of the straight bridge over an arc without edges
@@ -52,17 +53,20 @@ class BandSearch {
   [[nodiscard]] std::size_t id(int i, int j) const {
     return static_cast<std::size_t>(i) * static_cast<std::size_t>(m_) + static_cast<std::size_t>(j);
   }
-  [[nodiscard]] std::size_t angle(int i) const { return static_cast<std::size_t>(((i % n_) + n_) % n_); }
+  [[nodiscard]] std::size_t angle(int i) const {
+    return static_cast<std::size_t>(i >= 0 && i < n_ ? i : (i % n_ + n_) % n_);
+  }
   [[nodiscard]] double radius(int i, int j) const {
     return band_.middle[static_cast<std::size_t>(i)] + (j - half_) * band_.step;
   }
 
   void set_rays();
   void sample_edges();
+  [[nodiscard]] double usual_top() const;
   void set_costs(double floor, double saturation);
   void find_shortest_closed_path();
-  void cheapest_steps(const std::vector<float>& before, const std::vector<float>& bend);
-  void find_shortest_path(int from, int fixed, const std::vector<float>& bend);
+  void cheapest_steps(const float* before, const std::vector<float>& bend);
+  void find_shortest_path(int from, int count, int fixed, const std::vector<float>& bend);
   [[nodiscard]] int top_of_edge(int i) const;
   [[nodiscard]] double vertex_beside(int i, int j) const;
   void measure_edges(double floor);
@@ -75,14 +79,13 @@ class BandSearch {
   const EdgeBand& band_;
   Polarity polarity_;
   int n_, m_, half_;
-  std::vector<Point> ray_, normal_;          // per angle, unit
-  double arc_ = 0;                           // between two angles, px
-  std::vector<float> edge_, cost_;           // per sample; edge: grey levels per px
-  std::vector<std::uint8_t> shown_;          // 1: this angle is visible near the middle of the band
-  std::vector<int> path_;                    // offset per angle
-  std::vector<float> before_, best_, step_;  // of the shortest path: one angle's samples
-  std::vector<std::int8_t> back_;            // per sample: the step that led there
-  std::vector<double> weight_;               // per angle, in the smoothing
+  std::vector<Point> ray_, normal_;  // per angle, unit
+  double arc_ = 0;                   // between two angles, px
+  std::vector<float> edge_, cost_;   // per sample; edge: grey levels per px
+  std::vector<std::uint8_t> shown_;  // 1: this angle is visible near the middle of the band
+  std::vector<int> path_;            // offset per angle
+  std::vector<float> best_, total_;  // of the shortest path: one angle's samples, and all
+  std::vector<double> weight_;       // per angle, in the smoothing
   EdgePath out_;
 };
 
@@ -114,30 +117,43 @@ void BandSearch::sample_edges() {
   edge_.assign(samples, 0.0F);
   cost_.assign(samples, 1.0F);
   shown_.assign(band_.middle.size(), 0);
-  const cv::Rect& area = field_.area;
-  const double left = area.x + 1, top = area.y + 1;
-  const double right = area.x + area.width - 2, bottom = area.y + area.height - 2;
   const cv::Mat &gx = field_.gx, &gy = field_.gy, &covered = band_.covered;
-  const double sign = polarity_ == Polarity::darker_out ? -1 : 1, step = band_.step;
-  const Point centre = band_.centre;
+  const float *gx_data = gx.ptr<float>(), *gy_data = gy.ptr<float>();
+  const std::uint8_t* hides = covered.empty() ? nullptr : covered.ptr(field_.area.y) + field_.area.x;
+  const auto stride = static_cast<std::ptrdiff_t>(gx.step1());
+  const auto hides_stride = static_cast<std::ptrdiff_t>(covered.empty() ? 0 : covered.step1());
+  const auto right = static_cast<float>(gx.cols - 2), bottom = static_cast<float>(gx.rows - 2);
+  const double sign = polarity_ == Polarity::darker_out ? -1 : 1;
+  const Point centre = band_.centre - Point(field_.area.x, field_.area.y);
   const int first_near = half_ - half_ / 2, last_near = half_ + half_ / 2;
   for (std::size_t a = 0; a < band_.middle.size(); ++a) {
-    const Point ray = ray_[a], normal = sign * normal_[a];
-    const double middle = band_.middle[a];
+    const double first = band_.middle[a] - half_ * band_.step;
     const double lower = band_.lower.empty() ? -kNoLimit : band_.lower[a];
     const double upper = band_.upper.empty() ? kNoLimit : band_.upper[a];
     const bool hidden_ray = !band_.hidden.empty() && band_.hidden[a] != 0;
+    const auto along = static_cast<float>(sign * normal_[a].x),
+               down = static_cast<float>(sign * normal_[a].y);
+    const auto x0 = static_cast<float>(centre.x + first * ray_[a].x),
+               y0 = static_cast<float>(centre.y + first * ray_[a].y);
+    const auto dx = static_cast<float>(band_.step * ray_[a].x),
+               dy = static_cast<float>(band_.step * ray_[a].y);
     float *edge = edge_.data() + a * m, *cost = cost_.data() + a * m;
     bool shown_near = false;
     for (int j = 0; j < m_; ++j) {
-      const double r = middle + (j - half_) * step;
-      const Point p = centre + r * ray;
-      const bool known = p.x >= left && p.y >= top && p.x <= right && p.y <= bottom && r > 2 && !hidden_ray;
-      if (known &&
-          (covered.empty() || covered.ptr(static_cast<int>(p.y + 0.5))[static_cast<int>(p.x + 0.5)] == 0)) {
-        const Bilinear place(p.x - area.x, p.y - area.y);
-        const double e = place.of(gx) * normal.x + place.of(gy) * normal.y;
-        edge[j] = static_cast<float>(polarity_ == Polarity::any ? std::abs(e) : e);
+      const double r = first + j * band_.step;
+      const float x = x0 + static_cast<float>(j) * dx, y = y0 + static_cast<float>(j) * dy;
+      const bool known = x >= 1 && y >= 1 && x <= right && y <= bottom && r > 2 && !hidden_ray;
+      if (known && (hides == nullptr ||
+                    hides[static_cast<int>(y + 0.5F) * hides_stride + static_cast<int>(x + 0.5F)] == 0)) {
+        const int left = static_cast<int>(x), top = static_cast<int>(y);
+        const std::ptrdiff_t at = top * stride + left;
+        const float u = x - static_cast<float>(left), v = y - static_cast<float>(top);
+        const float both = u * v, only_u = u - both, only_v = v - both, none = 1 - u - only_v;
+        const auto sample = [&](const float* g) {
+          return none * g[at] + only_u * g[at + 1] + only_v * g[at + stride] + both * g[at + stride + 1];
+        };
+        const float e = along * sample(gx_data) + down * sample(gy_data);
+        edge[j] = polarity_ == Polarity::any ? std::abs(e) : e;
         cost[j] = 0;
         shown_near = shown_near || (j >= first_near && j <= last_near);
       }
@@ -149,25 +165,37 @@ void BandSearch::sample_edges() {
   }
 }
 
-void BandSearch::set_costs(double floor, double saturation) {
-  std::vector<float> strongest, all;
+// Median over the visible angles of each ray's strongest edge.
+double BandSearch::usual_top() const {
+  std::vector<float> strongest;
   for (int i = 0; i < n_; ++i) {
     float top = 0;
     for (int j = 0; j < m_; ++j) {
       if (cost_[id(i, j)] == 0.0F) {
         top = std::max(top, edge_[id(i, j)]);
-        all.push_back(std::abs(edge_[id(i, j)]));
       }
     }
     if (shown_[angle(i)] != 0) {
       strongest.push_back(top);
     }
   }
+  return median_of(std::move(strongest));
+}
+
+void BandSearch::set_costs(double floor, double saturation) {
   if (!(saturation > 0)) {
-    saturation = std::max({0.7 * median_of(std::move(strongest)), 2 * floor, 1e-6});
+    saturation = std::max({0.7 * usual_top(), 2 * floor, 1e-6});
   }
   out_.saturation = saturation;
-  out_.background = median_of(std::move(all));
+  if (band_.measures_background) {
+    std::vector<float> all;
+    for (std::size_t k = 0; k < cost_.size(); ++k) {
+      if (cost_[k] == 0.0F) {
+        all.push_back(std::abs(edge_[k]));
+      }
+    }
+    out_.background = median_of(std::move(all));
+  }
   for (std::size_t k = 0; k < cost_.size(); ++k) {
     if (cost_[k] == 0.0F) {
       cost_[k] = static_cast<float>(1 - std::clamp(static_cast<double>(edge_[k]) / saturation, -0.3, 1.0));
@@ -189,65 +217,71 @@ void BandSearch::find_shortest_closed_path() {
         static_cast<float>(band_.stiffness * std::pow(k * band_.step / arc_, 2));
   }
   path_.resize(band_.middle.size());
-  find_shortest_path(0, -1, bend);
-  // That path is open at angle 0. A second one begins and ends half a turn away, where the first was closed.
-  const int opposite = n_ / 2;
-  find_shortest_path(opposite, path_[angle(opposite)], bend);
+  // An open path tells where the path crosses an angle; the closed one begins and ends there. It needs so
+  // many times the angles in which a path crosses the band, or noise would choose; round the whole cell at
+  // most.
+  constexpr int kSettled = 12;
+  const int middle = n_ / 2, count = std::min(n_, kSettled * m_ / reach);
+  find_shortest_path(middle - count / 2, count, kAnywhere, bend);
+  find_shortest_path(middle, n_, path_[angle(middle)], bend);
 }
 
-// The cheapest step from the angle before to each sample of this one, `reach` samples inwards to `reach`
-// outwards: of two that cost the same, the one further in. `before` has `reach` samples more on either side,
-// which no path may use. Each loop runs over the samples, so that a compiler makes several of them at once.
-void BandSearch::cheapest_steps(const std::vector<float>& before, const std::vector<float>& bend) {
+// The cheapest way to each sample of an angle from the one before, `reach` samples inwards to `reach`
+// outwards. `before` has `reach` samples more on either side, which no path may use. Each loop runs over the
+// samples, so that a compiler makes several of them at once.
+void BandSearch::cheapest_steps(const float* before, const std::vector<float>& bend) {
   const std::size_t m = best_.size(), reach = bend.size() - 1;
+  float* best = best_.data();
   for (std::size_t j = 0; j < m; ++j) {
-    best_[j] = before[j] + bend[reach];
-    step_[j] = -static_cast<float>(reach);
+    best[j] = before[j] + bend[reach];
   }
   for (std::size_t k = 1; k <= 2 * reach; ++k) {
     const float bent = bend[k > reach ? k - reach : reach - k];
-    const float step = static_cast<float>(k) - static_cast<float>(reach);
-    const float* from = before.data() + k;
+    const float* from = before + k;
     for (std::size_t j = 0; j < m; ++j) {
       const float c = from[j] + bent;
-      step_[j] = c < best_[j] ? step : step_[j];
-      best_[j] = c < best_[j] ? c : best_[j];
+      best[j] = c < best[j] ? c : best[j];
     }
   }
 }
 
-// Dynamic programming from the angle `from` once round. With `fixed` >= 0 the path begins and ends there.
-void BandSearch::find_shortest_path(int from, int fixed, const std::vector<float>& bend) {
-  const std::size_t m = static_cast<std::size_t>(m_), reach = bend.size() - 1;
-  before_.assign(m + 2 * reach, kNoWay);
+// Dynamic programming over `count` angles. The path begins and ends at the sample `fixed`, or anywhere.
+void BandSearch::find_shortest_path(int from, int count, int fixed, const std::vector<float>& bend) {
+  const std::size_t m = static_cast<std::size_t>(m_), reach = bend.size() - 1, row = m + 2 * reach;
+  total_.assign(static_cast<std::size_t>(count) * row, kNoWay);
   best_.resize(m);
-  step_.resize(m);
-  back_.resize(cost_.size());
-  float* total = before_.data() + reach;
+  float* total = total_.data() + reach;
   for (int j = 0; j < m_; ++j) {
-    total[j] = fixed < 0 || j == fixed ? cost_[id(from, j)] : kForbidden * 100;
+    total[j] = fixed == kAnywhere || j == fixed ? cost_[id(from, j)] : kForbidden * 100;
   }
-  for (int i = 1; i < n_; ++i) {
-    cheapest_steps(before_, bend);
-    const float* cost = cost_.data() + id((from + i) % n_, 0);
-    std::int8_t* back = back_.data() + id(i, 0);
+  for (int i = 1; i < count; ++i) {
+    cheapest_steps(total - reach, bend);
+    total += row;
+    const float* cost = cost_.data() + angle(from + i) * m;
     for (std::size_t j = 0; j < m; ++j) {
       total[j] = best_[j] + cost[j];
-      back[j] = static_cast<std::int8_t>(step_[j]);
     }
   }
-  int end = 0;
-  float best = kNoWay;
-  for (int j = 0; j < m_; ++j) {
-    const std::size_t k = fixed < 0 ? 0 : static_cast<std::size_t>(std::abs(j - fixed));
-    if (k <= reach && total[j] + bend[k] < best) {
-      best = total[j] + bend[k];
-      end = j;
+  // Backwards: the cheapest sample of the last angle, and of each angle before the one that led on.
+  const auto cheapest = [&](int towards, bool free) {
+    int at = 0;
+    float least = kNoWay;
+    for (int j = 0; j < m_; ++j) {
+      const auto k = static_cast<std::size_t>(free ? 0 : std::abs(j - towards));
+      if (k <= reach && total[j] + bend[k] < least) {
+        least = total[j] + bend[k];
+        at = j;
+      }
     }
-  }
-  for (int i = n_ - 1; i >= 0; --i) {
-    path_[angle(from + i)] = end;
-    end += i > 0 ? back_[id(i, end)] : 0;
+    return at;
+  };
+  int here = cheapest(fixed, fixed == kAnywhere);
+  for (int i = count - 1; i >= 0; --i) {
+    path_[angle(from + i)] = here;
+    if (i > 0) {
+      total -= row;
+      here = cheapest(here, false);
+    }
   }
 }
 

@@ -30,6 +30,7 @@ struct EdgeBand {
   double stiffness = 0.25;           // cost of that change, per (px/px)^2 and angle
   std::vector<double> lower, upper;  // hard limits per angle; or empty
   std::vector<std::uint8_t> hidden;  // 1: nothing is visible along this ray; or empty
+  bool measures_background = false;  // see EdgePath::background
   // CV_8U, of the whole picture; or empty. Not 0: the pixel belongs to something else (a pipette, an
   // impurity), where there is neither an edge nor a cost.
   cv::Mat covered;
@@ -48,7 +49,7 @@ struct EdgePath {
   double residual = 0;             // robust standard deviation of raw - r over the seen angles, px
   double saturation = 0;           // the one that was used
   double level = 0;                // median edge along the path over the visible angles, grey levels per px
-  double background = 0;           // median edge over the whole visible band: texture and noise
+  double background = 0;  // median edge over the whole visible band, texture and noise; 0: not measured
 };
 
 // floor: an edge below it (grey levels per px) is noise. The strength saturates at `saturation`; if that is

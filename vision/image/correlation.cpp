@@ -1,14 +1,20 @@
 #include "vision/image/correlation.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <numeric>
 #include <opencv2/imgproc.hpp>
+#include <vector>
 
 #include "vision/image/parabola.hpp"
 
 namespace punctum::vision {
 
 namespace {
+
+constexpr int kFewPlaces = 150;  // are faster one by one than by the Fourier transform
 
 cv::Mat match(const cv::Mat& window, const cv::Mat& pattern, int method) {
   cv::Mat map;
@@ -38,11 +44,46 @@ double correlation_at(const cv::Mat& window, const cv::Mat& pattern, double powe
   return norm > 0 ? static_cast<double>(dot) / norm : 0;
 }
 
+// Of floats. Column by column, of which a compiler makes several at once, and then over the columns.
+cv::Mat centred_correlations(const cv::Mat& window, const cv::Mat& pattern, const cv::Size& places) {
+  cv::Mat map(places, CV_32F), centred;
+  cv::subtract(pattern, cv::mean(pattern), centred);
+  const double power = cv::norm(centred, cv::NORM_L2SQR), count = static_cast<double>(pattern.total());
+  const float usual = window.at<float>(0, 0);  // taken off: squares of small numbers lose fewer digits
+  const auto n = static_cast<std::size_t>(pattern.cols), all = static_cast<std::size_t>(window.cols);
+  std::vector<float> sum(all), squares(all), dot(n);
+  const auto total = [n](const std::vector<float>& v, int from) {
+    return std::accumulate(v.begin() + from, v.begin() + from + static_cast<std::ptrdiff_t>(n), 0.0);
+  };
+  for (int top = 0; top < places.height; ++top) {
+    std::fill(sum.begin(), sum.end(), 0.0F);
+    std::fill(squares.begin(), squares.end(), 0.0F);
+    for (int y = 0; y < pattern.rows; ++y) {
+      const float* row = window.ptr<float>(top + y);
+      for (std::size_t x = 0; x < all; ++x) {
+        sum[x] += row[x] - usual;
+        squares[x] += (row[x] - usual) * (row[x] - usual);
+      }
+    }
+    for (int left = 0; left < places.width; ++left) {
+      std::fill(dot.begin(), dot.end(), 0.0F);
+      for (int y = 0; y < pattern.rows; ++y) {
+        const float *m = centred.ptr<float>(y), *i = window.ptr<float>(top + y) + left;
+        for (std::size_t x = 0; x < n; ++x) {
+          dot[x] += m[x] * i[x];
+        }
+      }
+      const double here = total(sum, left), spread = total(squares, left) - here * here / count;
+      map.at<float>(top, left) =
+          spread > 0 && power > 0 ? static_cast<float>(total(dot, 0) / std::sqrt(power * spread)) : 0;
+    }
+  }
+  return map;
+}
+
 }  // namespace
 
 cv::Mat correlation_map(const cv::Mat& window, const cv::Mat& pattern) {
-  // So few places are faster one by one than by the Fourier transform.
-  constexpr int kFewPlaces = 150;
   const cv::Size places(window.cols - pattern.cols + 1, window.rows - pattern.rows + 1);
   if (!pattern.empty() && places.width > 0 && places.height > 0 && places.area() <= kFewPlaces) {
     cv::Mat map(places, CV_32F), in, of;
@@ -60,6 +101,10 @@ cv::Mat correlation_map(const cv::Mat& window, const cv::Mat& pattern) {
 }
 
 cv::Mat centred_correlation_map(const cv::Mat& window, const cv::Mat& pattern) {
+  const cv::Size places(window.cols - pattern.cols + 1, window.rows - pattern.rows + 1);
+  if (!pattern.empty() && places.width > 0 && places.height > 0 && places.area() <= kFewPlaces) {
+    return centred_correlations(window, pattern, places);
+  }
   return match(window, pattern, cv::TM_CCOEFF_NORMED);
 }
 

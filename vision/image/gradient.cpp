@@ -1,10 +1,34 @@
 #include "vision/image/gradient.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <numbers>
-#include <opencv2/imgproc.hpp>
+#include <vector>
+
+#include "vision/image/gaussian.hpp"
 
 namespace punctum::vision {
+
+namespace {
+
+// Sobel's mask in two steps, in loops of which a compiler makes several steps at once.
+void across_rows(const float* above, const float* here, const float* below, int n, float* sum,
+                 float* difference) {
+  for (int x = 0; x < n; ++x) {
+    sum[x] = 0.125F * (above[x] + 2 * here[x] + below[x]);
+    difference[x] = 0.125F * (below[x] - above[x]);
+  }
+}
+
+void along_rows(const float* sum, const float* difference, int n, float* gx, float* gy) {
+  for (int x = 0; x < n; ++x) {
+    gx[x] = sum[x + 1] - sum[x - 1];
+    gy[x] = difference[x - 1] + 2 * difference[x] + difference[x + 1];
+  }
+}
+
+}  // namespace
 
 void GradientField::compute(const cv::Mat& grey_in, cv::Rect wanted, double sigma_px) {
   picture = grey_in.size();
@@ -17,11 +41,20 @@ void GradientField::compute(const cv::Mat& grey_in, cv::Rect wanted, double sigm
     sobel.release();
     return;
   }
-  cv::Mat part;
-  grey_in(area).convertTo(part, CV_32F);
-  cv::GaussianBlur(part, smooth, cv::Size(0, 0), sigma, sigma, cv::BORDER_REPLICATE);
-  cv::Sobel(smooth, gx, CV_32F, 1, 0, 3, 1.0 / 8, 0, cv::BORDER_REPLICATE);
-  cv::Sobel(smooth, gy, CV_32F, 0, 1, 3, 1.0 / 8, 0, cv::BORDER_REPLICATE);
+  smooth_part(grey_in, area, sigma, smooth);
+  gx.create(area.size(), CV_32F);
+  gy.create(area.size(), CV_32F);
+  std::vector<float> sum(static_cast<std::size_t>(area.width) + 2), difference(sum);
+  for (int y = 0; y < area.height; ++y) {
+    const float *above = smooth.ptr<float>(std::max(y - 1, 0)), *here = smooth.ptr<float>(y),
+                *below = smooth.ptr<float>(std::min(y + 1, area.height - 1));
+    across_rows(above, here, below, area.width, sum.data() + 1, difference.data() + 1);
+    for (std::vector<float>* row : {&sum, &difference}) {
+      row->front() = (*row)[1];
+      row->back() = (*row)[row->size() - 2];
+    }
+    along_rows(sum.data() + 1, difference.data() + 1, area.width, gx.ptr<float>(y), gy.ptr<float>(y));
+  }
   cv::magnitude(gx, gy, sobel);
 }
 

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
-#include <optional>
 
 #include "hal/math/elementary.hpp"
 
@@ -13,16 +13,34 @@ namespace punctum::vision {
 
 namespace {
 
-struct Vote {
-  Point p, n;  // pixel and unit gradient
-};
+constexpr double kCell = 0.1, kCellLeast_px = 2;  // of the smallest radius
+constexpr std::size_t kVotesMax = 60000;
 
-// One vote per edge instead of one per pixel of its width: only the ridge tops of the gradient vote.
-std::vector<Vote> votes_of(const GradientField& field, const cv::Mat& blocked, double threshold) {
-  constexpr std::size_t kVotesMax = 60000;
+}  // namespace
+
+CircleSearch::CircleSearch(const cv::Rect& area, double r_min, double r_max)
+    : area_(area), r_min_(r_min), cell_(std::max(kCellLeast_px, kCell * r_min)) {
+  if (area.empty() || !(r_min >= 2) || !(r_max > r_min)) {
+    return;
+  }
+  const int w = static_cast<int>(area.width / cell_) + 1, h = static_cast<int>(area.height / cell_) + 1;
+  const int layers = static_cast<int>((r_max - r_min) / cell_) + 1;
+  for (int k = 0; k < layers; ++k) {
+    layers_.emplace_back(cv::Mat::zeros(h, w, CV_32F));
+  }
+}
+
+// One vote per edge instead of one per pixel of its width: only the ridge tops of the gradient vote. Where
+// there are too many, each part of the rows gives its share of them.
+void CircleSearch::vote(const GradientField& field, const cv::Mat& blocked, double threshold,
+                        const cv::Range& rows) {
+  if (layers_.empty()) {
+    return;
+  }
   const cv::Rect a = field.area;
   std::vector<Vote> votes;
-  for (int y = 1; y + 1 < a.height; ++y) {
+  const int first = std::max(rows.start, 1), end = std::min(rows.end, a.height - 1);
+  for (int y = first; y < end; ++y) {
     const float *gx = field.gx.ptr<float>(y), *gy = field.gy.ptr<float>(y), *m = field.sobel.ptr<float>(y);
     for (int x = 1; x + 1 < a.width; ++x) {
       const double g = static_cast<double>(m[x]);
@@ -38,60 +56,40 @@ std::vector<Vote> votes_of(const GradientField& field, const cv::Mat& blocked, d
       votes.push_back({Point(x + a.x, y + a.y), Point(nx, ny)});
     }
   }
-  if (votes.size() <= kVotesMax) {
-    return votes;
+  const double most = kVotesMax * std::max(end - first, 0) / static_cast<double>(a.height);
+  const double stride = std::max(1.0, static_cast<double>(votes.size()) / most);
+  for (double i = 0; i < static_cast<double>(votes.size()); i += stride) {
+    votes_.push_back(votes[static_cast<std::size_t>(i)]);
+    count(votes_.back());
   }
-  std::vector<Vote> fewer;
-  const double stride = static_cast<double>(votes.size()) / kVotesMax;
-  for (std::size_t i = 0; i < kVotesMax; ++i) {
-    fewer.push_back(votes[static_cast<std::size_t>(static_cast<double>(i) * stride)]);
-  }
-  return fewer;
 }
 
-// Accumulator over centre and radius; its cells are cubes.
-class Accumulator {
- public:
-  Accumulator(const cv::Rect& area, double r_min, double r_max)
-      : area_(area), r_min_(r_min), cell_(std::max(2.0, r_min / 14)) {
-    const int w = static_cast<int>(area.width / cell_) + 1, h = static_cast<int>(area.height / cell_) + 1;
-    const int layers = static_cast<int>((r_max - r_min) / cell_) + 1;
-    for (int k = 0; k < layers; ++k) {
-      layers_.emplace_back(cv::Mat::zeros(h, w, CV_32F));
-    }
-  }
-  void add(const std::vector<Vote>& votes);
-  void smooth();
-  // The highest cell as a circle; it and what is near it are set to 0. Empty when nothing is left.
-  [[nodiscard]] std::optional<Circle> take_highest();
-
- private:
-  [[nodiscard]] double radius(std::size_t layer) const {
-    return r_min_ + (static_cast<double>(layer) + 0.5) * cell_;
-  }
-  cv::Rect area_;
-  double r_min_, cell_;
-  std::vector<cv::Mat> layers_;  // one per radius
-};
-
-void Accumulator::add(const std::vector<Vote>& votes) {
-  for (const Vote& v : votes) {
-    for (std::size_t k = 0; k < layers_.size(); ++k) {
-      const double r = radius(k);
-      for (const double s : {r, -r}) {
-        const double cx = v.p.x - area_.x + s * v.n.x, cy = v.p.y - area_.y + s * v.n.y;
-        const int x = static_cast<int>(cx / cell_), y = static_cast<int>(cy / cell_);
-        if (cx >= 0 && cy >= 0 && x < layers_[k].cols && y < layers_[k].rows) {
-          layers_[k].at<float>(y, x) += static_cast<float>(1 / r);
-        }
+// A layer's radius is greater by one cell than that of the layer before.
+void CircleSearch::count(const Vote& v) {
+  constexpr double kOne = 65536;  // a cell; whole numbers are faster
+  const std::int64_t w = layers_[0].cols, h = layers_[0].rows;
+  const auto whole = [](double cells) { return static_cast<std::int64_t>(std::floor(cells * kOne)); };
+  for (const double side : {1.0, -1.0}) {
+    const Point step = side * v.n, from = (v.p - Point(area_.x, area_.y) + radius(0) * step) / cell_;
+    std::int64_t x = whole(from.x), y = whole(from.y);
+    const std::int64_t dx = whole(step.x), dy = whole(step.y);
+    for (cv::Mat& layer : layers_) {
+      const std::int64_t column = x >> 16, row = y >> 16;
+      if (column >= 0 && column < w && row >= 0 && row < h) {
+        layer.ptr<float>(static_cast<int>(row))[column] += 1.0F;
       }
+      x += dx;
+      y += dy;
     }
   }
 }
 
-// Neighbouring layers are added up, since a membrane is not a perfect circle.
-void Accumulator::smooth() {
+// In shares of the circumference. Neighbouring layers are added up, since a membrane is not a perfect circle.
+void CircleSearch::smooth() {
   std::vector<cv::Mat> smoothed(layers_.size());
+  for (std::size_t k = 0; k < layers_.size(); ++k) {
+    layers_[k] *= 1 / radius(k);
+  }
   for (std::size_t k = 0; k < layers_.size(); ++k) {
     cv::Mat sum = layers_[k].clone();
     if (k > 0) {
@@ -105,30 +103,28 @@ void Accumulator::smooth() {
   layers_ = std::move(smoothed);
 }
 
-std::optional<Circle> Accumulator::take_highest() {
-  double highest = 0;
-  std::size_t layer = 0;
-  cv::Point at;
-  for (std::size_t k = 0; k < layers_.size(); ++k) {
-    double value = 0;
-    cv::Point p;
-    cv::minMaxLoc(layers_[k], nullptr, &value, nullptr, &p);
-    if (value > highest) {
-      highest = value;
-      layer = k;
-      at = p;
-    }
-  }
-  if (!(highest > 0)) {
+CircleSearch::Top CircleSearch::highest_of(const cv::Mat& layer) {
+  Top top;
+  cv::minMaxLoc(layer, nullptr, &top.votes, nullptr, &top.at);
+  return top;
+}
+
+// The highest cell as a circle; it and what is near it are set to 0. Empty when nothing is left.
+std::optional<Circle> CircleSearch::take_highest() {
+  const auto highest = std::max_element(top_.begin(), top_.end(),
+                                        [](const Top& a, const Top& b) { return a.votes < b.votes; });
+  if (!(highest->votes > 0)) {
     return std::nullopt;
   }
+  const cv::Point at = highest->at;
   Circle c;
   c.centre = Point(area_.x + (at.x + 0.5) * cell_, area_.y + (at.y + 0.5) * cell_);
-  c.r = radius(layer);
+  c.r = radius(static_cast<std::size_t>(highest - top_.begin()));
   const double apart = std::max(1.0, r_min_ / 3 / cell_);
   for (std::size_t k = 0; k < layers_.size(); ++k) {
     if (std::abs(radius(k) - c.r) < std::max(1.5 * cell_, 0.15 * c.r)) {
       cv::circle(layers_[k], at, static_cast<int>(apart), cv::Scalar(0), cv::FILLED);
+      top_[k] = highest_of(layers_[k]);
     }
   }
   return c;
@@ -136,13 +132,13 @@ std::optional<Circle> Accumulator::take_highest() {
 
 // Centre and radius by least squares over the votes that agree with the candidate, and their share of the
 // circumference.
-void refine_circle(const std::vector<Vote>& votes, CircleCandidate& c) {
+void CircleSearch::refine(CircleCandidate& c) const {
   constexpr int kSectors = 72;
   for (int round = 0; round < 3; ++round) {
     const double tolerance = std::max(2.5, 0.06 * c.circle.r / (1 + round));
     std::vector<Point> near;
     bool voted[kSectors] = {};
-    for (const Vote& v : votes) {
+    for (const Vote& v : votes_) {
       const Point d = v.p - c.circle.centre;
       const double l = cv::norm(d);
       if (std::abs(l - c.circle.r) < tolerance && std::abs(d.dot(v.n)) > 0.8 * l) {
@@ -164,34 +160,36 @@ void refine_circle(const std::vector<Vote>& votes, CircleCandidate& c) {
   }
 }
 
-}  // namespace
-
-std::vector<CircleCandidate> find_circles(const GradientField& field, const cv::Mat& blocked,
-                                          double threshold, double r_min, double r_max, int wanted) {
-  if (field.area.empty() || !(r_min >= 2) || !(r_max > r_min) || wanted < 1) {
+std::vector<CircleCandidate> CircleSearch::best(int wanted) {
+  if (votes_.size() < 16) {
     return {};
   }
-  const std::vector<Vote> votes = votes_of(field, blocked, threshold);
-  if (votes.size() < 16) {
-    return {};
+  smooth();
+  top_.clear();
+  for (const cv::Mat& layer : layers_) {
+    top_.push_back(highest_of(layer));
   }
-  Accumulator accumulator(field.area, r_min, r_max);
-  accumulator.add(votes);
-  accumulator.smooth();
   std::vector<CircleCandidate> out;
   for (int n = 0; n < wanted; ++n) {
-    const std::optional<Circle> highest = accumulator.take_highest();
+    const std::optional<Circle> highest = take_highest();
     if (!highest) {
       break;
     }
     CircleCandidate c{*highest, 0};
-    refine_circle(votes, c);
+    refine(c);
     const auto behind = std::upper_bound(
         out.begin(), out.end(), c,
         [](const CircleCandidate& l, const CircleCandidate& r) { return l.score > r.score; });
     out.insert(behind, c);
   }
   return out;
+}
+
+std::vector<CircleCandidate> find_circles(const GradientField& field, const cv::Mat& blocked,
+                                          double threshold, double r_min, double r_max, int wanted) {
+  CircleSearch search(field.area, r_min, r_max);
+  search.vote(field, blocked, threshold, cv::Range::all());
+  return search.best(wanted);
 }
 
 }  // namespace punctum::vision

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
 #include "vision/image/circle.hpp"
@@ -14,9 +15,45 @@ struct CircleCandidate {
   double score = 0;  // share of the circumference that voted
 };
 
-// Every pixel whose gradient exceeds `threshold` votes along its gradient, on both sides. r_min, r_max in px.
-// `blocked` (CV_8U, the whole picture; or empty): pixels > 0 do not vote. At most `wanted` candidates, the
-// best first, whose centres differ by more than r_min / 3 or whose radii differ by more than 15 %.
+// The rows of a picture may vote one part after the other.
+class CircleSearch {
+ public:
+  // area: where the centres may be. r_min, r_max in px.
+  CircleSearch(const cv::Rect& area, double r_min, double r_max);
+
+  // Every pixel in these rows of the field whose gradient exceeds `threshold` votes along its gradient, on
+  // both sides. `blocked` (CV_8U, the whole picture; or empty): pixels > 0 do not vote.
+  void vote(const GradientField& field, const cv::Mat& blocked, double threshold, const cv::Range& rows);
+
+  // Once all have voted. At most `wanted` candidates, the best first, whose centres differ by more than
+  // r_min / 3 or whose radii differ by more than 15 %.
+  [[nodiscard]] std::vector<CircleCandidate> best(int wanted);
+
+ private:
+  struct Vote {
+    Point p, n;  // pixel and unit gradient
+  };
+  struct Top {
+    double votes = 0;
+    cv::Point at;
+  };
+  [[nodiscard]] double radius(std::size_t layer) const {
+    return r_min_ + (static_cast<double>(layer) + 0.5) * cell_;
+  }
+  [[nodiscard]] static Top highest_of(const cv::Mat& layer);
+  void count(const Vote& v);
+  void smooth();
+  [[nodiscard]] std::optional<Circle> take_highest();
+  void refine(CircleCandidate& c) const;
+
+  cv::Rect area_;
+  double r_min_, cell_;          // px; the cells over centre and radius are cubes
+  std::vector<cv::Mat> layers_;  // CV_32F, one per radius
+  std::vector<Top> top_;         // of each layer
+  std::vector<Vote> votes_;
+};
+
+// The whole field at once.
 [[nodiscard]] std::vector<CircleCandidate> find_circles(const GradientField& field, const cv::Mat& blocked,
                                                         double threshold, double r_min, double r_max,
                                                         int wanted);

@@ -28,25 +28,39 @@ const std::vector<Point>& rays(int angles) {
 std::vector<double> polar_radii(std::span<const Point> contour, const Point& centre, int angles) {
   const std::size_t n = static_cast<std::size_t>(angles);
   std::vector<double> out(n, -1.0);
-  const double step = 2 * std::numbers::pi / angles;
   const std::vector<Point>& ray = rays(angles);
+  const auto next = [n](std::size_t k) { return k + 1 < n ? k + 1 : 0; };
+  if (contour.empty() || n < 3) {
+    return {};
+  }
+  // The ray at or before each point: which side of a ray the next one lies on, its cross product tells.
+  const auto ray_before = [&](const Point& d) {
+    const auto k = static_cast<std::size_t>(polar_index(d, angles));
+    return ray[k].cross(d) >= 0 ? k : k > 0 ? k - 1 : n - 1;
+  };
+  Point p = contour[0] - centre;
+  std::size_t at = ray_before(p);
   for (std::size_t i = 0; i < contour.size(); ++i) {
-    const Point p = contour[i] - centre, q = contour[(i + 1) % contour.size()] - centre;
-    const double t0 = math::atan2(p.y, p.x);
-    double dt = math::atan2(p.cross(q), p.dot(q));
-    const double lo = std::min(t0, t0 + dt), hi = std::max(t0, t0 + dt);
-    for (int k = static_cast<int>(std::ceil(lo / step - 1e-9)); k * step <= hi + 1e-9; ++k) {
-      const std::size_t at = static_cast<std::size_t>(((k % angles) + angles) % angles);
-      const Point d = ray[at], e = q - p;
-      const double den = d.cross(e);
-      if (std::abs(den) < 1e-12) {
-        continue;
+    const Point q = contour[i + 1 < contour.size() ? i + 1 : 0] - centre, e = q - p;
+    const double turn = p.cross(q);
+    const auto cross_ray = [&](std::size_t k) {
+      const double den = ray[k].cross(e);
+      if (std::abs(den) > 1e-12) {
+        out[k] = std::max(out[k], turn / den);  // where a wall overhangs, the outermost crossing
       }
-      const double r = p.cross(e) / den;
-      if (r > out[at]) {
-        out[at] = r;  // where a wall overhangs, the outermost crossing
-      }
+    };
+    while (turn > 0 && ray[next(at)].cross(q) >= 0) {
+      at = next(at);
+      cross_ray(at);
     }
+    while (turn < 0 && ray[at].cross(q) < 0) {
+      cross_ray(at);
+      at = at > 0 ? at - 1 : n - 1;
+    }
+    if (turn == 0) {  // through the centre, or straight along a ray
+      at = ray_before(q);
+    }
+    p = q;
   }
   int known = 0;
   for (double r : out) {
@@ -92,6 +106,15 @@ Point on_ray(const Point& centre, int i, int angles, double r) {
   return centre + r * rays(angles)[static_cast<std::size_t>(i)];
 }
 
-double angle_between(double a, double b) { return std::abs(std::remainder(a - b, 2 * std::numbers::pi)); }
+double angle_between(double a, double b) {
+  const double apart = std::abs(a - b);
+  if (apart <= std::numbers::pi) {
+    return apart;
+  }
+  if (apart < 3 * std::numbers::pi) {
+    return std::abs(apart - 2 * std::numbers::pi);  // exact, as the remainder is, and much faster
+  }
+  return std::abs(std::remainder(apart, 2 * std::numbers::pi));
+}
 
 }  // namespace punctum::vision

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <opencv2/imgproc.hpp>
 
 #include "hal/math/elementary.hpp"
+#include "vision/image/gaussian.hpp"
 
 namespace punctum::vision {
 
@@ -45,8 +45,7 @@ double Registration::similarity(const cv::Mat& grey, const cv::Point& corner) co
     return 0;
   }
   cv::Mat smooth;
-  grey(box).convertTo(smooth, CV_32F);
-  cv::GaussianBlur(smooth, smooth, cv::Size(0, 0), kSigma_px, kSigma_px, cv::BORDER_REPLICATE);
+  smooth_part(grey, box, kSigma_px, smooth);
   double n = 0, v1 = 0, p1 = 0, vv = 0, vp = 0, pp = 0;
   for (int y = 0; y < box.height; ++y) {
     const float *seen = smooth.ptr<float>(y), *pattern = pattern_.smooth.ptr<float>(y);
@@ -75,8 +74,7 @@ std::optional<Registration::Place> Registration::place(const cv::Mat& grey, cons
     return std::nullopt;
   }
   cv::Mat smooth;
-  grey(seen).convertTo(smooth, CV_32F);
-  cv::GaussianBlur(smooth, smooth, cv::Size(0, 0), kSigma_px, kSigma_px, cv::BORDER_REPLICATE);
+  smooth_part(grey, seen, kSigma_px, smooth);
   const Point from = corner - Point(seen.x, seen.y);
   Point at = from;
   cv::Mat shifted(h, w, CV_32F);

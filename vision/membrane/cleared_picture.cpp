@@ -129,11 +129,6 @@ void ClearedPicture::find_strong(double threshold) {
   }
 }
 
-bool ClearedPicture::hidden(const Point& p) const {
-  const int x = static_cast<int>(p.x + 0.5), y = static_cast<int>(p.y + 0.5);
-  return x < 0 || y < 0 || x >= covered.cols || y >= covered.rows || covered.at<std::uint8_t>(y, x) > 0;
-}
-
 void ClearedPicture::exclude_holder(EdgeBand& band, const std::vector<double>& expected) const {
   if (!holder_face) {
     return;

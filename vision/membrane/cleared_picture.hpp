@@ -40,7 +40,10 @@ struct ClearedPicture {
   [[nodiscard]] double snake_floor() const noexcept {
     return 4 * gradient_noise;
   }  // its spread where it is flat
-  [[nodiscard]] bool hidden(const Point& p) const;  // covered, or outside the picture
+  [[nodiscard]] bool hidden(const Point& p) const {  // covered, or outside the picture
+    const int x = static_cast<int>(p.x + 0.5), y = static_cast<int>(p.y + 0.5);
+    return x < 0 || y < 0 || x >= covered.cols || y >= covered.rows || covered.ptr(y)[x] > 0;
+  }
 
   // For a membrane that is pressed against the holding pipette. Behind the face of the pipette the membrane
   // cannot be; along the face it is not visible, because of the dark line of the face. expected: radius of

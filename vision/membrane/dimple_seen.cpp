@@ -83,7 +83,14 @@ class Dimples {
 
   [[nodiscard]] bool meets_the_cell() const { return meets_the_cell_; }
   [[nodiscard]] double depth_of_tip() const { return depth_of_tip_; }
-  [[nodiscard]] std::optional<double> evidence(const Shape& shape, double depth) const;
+  // For evidence(): of this shape.
+  void choose(const Shape& shape) {
+    share_.clear();
+    for (int i = entry_ - reach_ - 1; i <= entry_ + reach_ + 1; ++i) {
+      share_.push_back(share_of_depth(shape, from_entry(i)));
+    }
+  }
+  [[nodiscard]] std::optional<double> evidence(double depth) const;
   [[nodiscard]] Contour contour(const Shape& shape, double depth) const {
     Contour out;
     for (int i = 0; i < s_.angles; ++i) {
@@ -94,11 +101,14 @@ class Dimples {
 
  private:
   [[nodiscard]] double from_entry(int i) const {  // half-widths of the needle
-    return std::abs(std::remainder(i - entry_, s_.angles)) * spacing_ / s_.surroundings.needle.half_width;
+    const int apart = std::abs(i - entry_), rays = std::min(apart, std::abs(s_.angles - apart));
+    return rays * spacing_ / s_.surroundings.needle.half_width;
+  }
+  [[nodiscard]] std::size_t index(int i) const {  // of an angle at most once round
+    return static_cast<std::size_t>(i < 0 ? i + s_.angles : i < s_.angles ? i : i - s_.angles);
   }
   [[nodiscard]] Point point(double share, double depth, int i) const {
-    const int n = s_.angles;
-    return outline_[static_cast<std::size_t>((i % n + n) % n)] + depth * share * s_.surroundings.needle.axis;
+    return outline_[index(i)] + depth * share * s_.surroundings.needle.axis;
   }
 
   const MembraneSearch& s_;
@@ -108,18 +118,18 @@ class Dimples {
   bool meets_the_cell_ = false;
   int entry_ = 0;  // index of the angle
   int reach_ = 0;
+  std::vector<double> share_;  // of the depth, from the ray before those that tell to the one after them
 };
 
-std::optional<double> Dimples::evidence(const Shape& shape, double depth) const {
+std::optional<double> Dimples::evidence(double depth) const {
   const double sign = s_.m.polarity == Polarity::darker_out ? -1 : 1;
   double sum = 0;
   int rays = 0;
-  Point last = point(share_of_depth(shape, from_entry(entry_ - reach_ - 1)), depth, entry_ - reach_ - 1),
-        here = point(share_of_depth(shape, from_entry(entry_ - reach_)), depth, entry_ - reach_);
+  const double* share = share_.data();
+  Point last = point(*share++, depth, entry_ - reach_ - 1), here = point(*share++, depth, entry_ - reach_);
   for (int i = entry_ - reach_; i <= entry_ + reach_; ++i) {
-    const Point next = point(share_of_depth(shape, from_entry(i + 1)), depth, i + 1);
-    const std::size_t k = static_cast<std::size_t>((i % s_.angles + s_.angles) % s_.angles);
-    if (!s_.band.upper.empty() && cv::norm(here - s_.band.centre) > s_.band.upper[k]) {
+    const Point next = point(*share++, depth, i + 1);
+    if (!s_.band.upper.empty() && cv::norm(here - s_.band.centre) > s_.band.upper[index(i)]) {
       sum -= 0.5;
       ++rays;
     } else if (!s_.picture.hidden(here)) {
@@ -143,7 +153,7 @@ std::optional<double> Dimples::evidence(const Shape& shape, double depth) const 
 }  // namespace
 
 std::optional<SeenDimple> likeliest_dimple(const MembraneSearch& search) {
-  const Dimples dimples(search);
+  Dimples dimples(search);
   if (!dimples.meets_the_cell()) {
     return std::nullopt;
   }
@@ -165,6 +175,7 @@ std::optional<SeenDimple> likeliest_dimple(const MembraneSearch& search) {
   std::array<double, kDimpleShapes> best;
   best.fill(-1e9);
   for (std::size_t k = 0; k < kDimpleShapes; ++k) {
+    dimples.choose(kShapes[k]);
     for (double depth = -kAbove_px; depth <= deepest + kPast_px; depth += kStepOfDepth_px) {
       // What the needle does not push does not sink.
       const double sunk = m.held ? 0 : std::max(0.0, depth - m.dimple_px);
@@ -174,7 +185,7 @@ std::optional<SeenDimple> likeliest_dimple(const MembraneSearch& search) {
       if (steepness(kShapes[k]) * depth > kSteepest * search.surroundings.needle.half_width) {
         break;
       }
-      const auto evidence = dimples.evidence(kShapes[k], depth);
+      const auto evidence = dimples.evidence(depth);
       if (!evidence) {
         continue;
       }

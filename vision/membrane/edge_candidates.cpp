@@ -19,23 +19,45 @@ constexpr double kPathClear_noise = 2.7;
 constexpr double kContrast = 4;           // of a second edge: times the median edge of its band
 constexpr double kOvalDeviation = 0.055;  // of the radius, rms: a cell is nearly an oval
 
+// A start is refined by the search that follows it: here half as many rays and samples as there do.
+constexpr int kStartAngles = 128;
+constexpr double kCoarse_px = 1;
+constexpr double kSameCentre_px = 1.5;  // the edge round it is the same
+
 struct Radii {
   double from, to, expected;  // px
+
+  // Cells are not round: the radius seen from the centre varies more than the radius of the circle.
+  Radii(const Circle& circle, bool seeded, const VisionConfig& config)
+      : from(seeded ? 0.75 * circle.r : 0.6 * config.px(config.R_min_m)),
+        to(seeded ? 1.25 * circle.r : 1.3 * config.px(config.R_max_m)),
+        expected(circle.r) {}
 };
 
-EdgePath closed_edge_round(const Point& centre, const Radii& radii, const ClearedPicture& picture, int angles,
-                           Polarity polarity, double saturation) {
+EdgeBand band_round(const Point& centre, const Radii& radii, const ClearedPicture& picture) {
   const double width = radii.to - radii.from;
   EdgeBand band;
   band.centre = centre;
-  band.step = std::max(0.5, width / 160);
+  band.step = std::max(kCoarse_px, width / 80);
   band.half_width = width / 2;
-  band.middle.assign(static_cast<std::size_t>(angles), (radii.from + radii.to) / 2);
+  band.middle.assign(kStartAngles, (radii.from + radii.to) / 2);
   band.slope = 1.5;
   band.stiffness = 0.5;
   band.covered = picture.covered;
+  band.measures_background = true;
   picture.exclude_holder(band, std::vector<double>(band.middle.size(), 1.08 * radii.expected));
-  return closed_path(picture.field, band, polarity, picture.edge_floor(), saturation);
+  return band;
+}
+
+ClosedEdge edge_in(const EdgeBand& band, const ClearedPicture& picture, Polarity polarity,
+                   double saturation) {
+  return {closed_path(picture.field, band, polarity, picture.edge_floor(), saturation), band.centre,
+          polarity};
+}
+
+bool stands_out(const EdgePath& path, const ClearedPicture& picture) {
+  return !path.r.empty() && path.visible >= 0.45 && path.support >= 0.6 &&
+         path.level >= 1.8 * path.background && path.level >= kPathClear_noise * picture.gradient_noise;
 }
 
 // Share of the angles that are visible and have less than half of the saturated edge.
@@ -84,59 +106,71 @@ bool nearly_oval(const std::vector<double>& r) {
 
 }  // namespace
 
-std::optional<MainEdge> strongest_closed_edge(const Circle& circle, bool seeded, double saturation,
-                                              const ClearedPicture& picture, const VisionConfig& config) {
-  // Cells are not round: the radius seen from the centre varies more than the radius of the circle.
-  const Radii radii{seeded ? 0.75 * circle.r : 0.6 * config.px(config.R_min_m),
-                    seeded ? 1.25 * circle.r : 1.3 * config.px(config.R_max_m), circle.r};
-  // The centroid of the edge becomes the next centre.
-  const auto iterate = [&](Point centre, Polarity polarity, double edge_saturation, int rounds) {
-    ClosedEdge e;
-    e.polarity = polarity;
-    for (int i = 0; i < rounds; ++i) {
-      e.path = closed_edge_round(centre, radii, picture, config.contour_points, polarity, edge_saturation);
-      e.centre = centre;
-      if (e.path.r.empty()) {
-        break;
-      }
-      centre = centroid(from_polar(centre, e.path.r));
-      if (cv::norm(centre - e.centre) < 0.5) {
-        break;
-      }
+std::optional<ClosedEdge> closed_edge_round(const Circle& circle, bool seeded, double saturation,
+                                            std::vector<Point>& tried, const ClearedPicture& picture,
+                                            const VisionConfig& config) {
+  constexpr int kRounds = 6;
+  constexpr double kSettled_px = 0.5;
+  const Radii radii(circle, seeded, config);
+  ClosedEdge edge;
+  Point centre = circle.centre;
+  for (int round = 0; round < kRounds; ++round) {
+    if (std::any_of(tried.begin(), tried.end(),
+                    [&](const Point& p) { return cv::norm(p - centre) < kSameCentre_px; })) {
+      return std::nullopt;
     }
-    return e;
-  };
-  MainEdge best;
-  best.of_any_sign = iterate(circle.centre, Polarity::any, saturation, 6);
-  const ClosedEdge& any = best.of_any_sign;
-  if (any.path.r.empty()) {
-    return std::nullopt;
+    edge = edge_in(band_round(centre, radii, picture), picture, Polarity::any, saturation);
+    if (edge.path.r.empty()) {
+      return std::nullopt;
+    }
+    centre = centroid(from_polar(centre, edge.path.r));
+    if (cv::norm(centre - edge.centre) < kSettled_px) {
+      break;
+    }
   }
+  tried.push_back(edge.centre);
+  return stands_out(edge.path, picture) ? std::optional(std::move(edge)) : std::nullopt;
+}
+
+std::optional<MainEdge> edge_by_its_sign(const ClosedEdge& any, const Circle& circle, bool seeded,
+                                         const ClearedPicture& picture, const VisionConfig& config) {
+  MainEdge best{any, any};
   // Where the edge has one sign all round (bright field), it is followed by that sign, which tells the two
-  // faces of a membrane apart. Where the sign changes round the cell, some arcs of a signed path are weak.
-  for (const Polarity q : {Polarity::brighter_out, Polarity::darker_out}) {
-    ClosedEdge e = iterate(any.centre, q, any.path.saturation, 2);
-    if (!e.path.r.empty() && e.path.mean_strength > 0.93 * any.path.mean_strength &&
-        weak_share(e.path) < weak_share(any.path) + 0.015 &&
-        (best.edge.path.r.empty() || e.path.mean_strength > best.edge.path.mean_strength)) {
-      best.edge = std::move(e);
+  // faces of a membrane apart. Where the sign changes round the cell, some arcs of a signed path are weak. In
+  // noise single rays are, too, and a path of any sign finds some other edge there: at a noise of 0.28 of the
+  // edge's level on up to 0.05 of the rays.
+  const double noise = picture.gradient_noise / std::max(any.path.level, 1e-6);
+  const double weak_most = weak_share(any.path) + 0.015 + 2.5 * noise * noise * noise;
+  const auto follow_signs = [&](const EdgeBand& band) {
+    for (const Polarity sign : {Polarity::brighter_out, Polarity::darker_out}) {
+      ClosedEdge e = edge_in(band, picture, sign, any.path.saturation);
+      if (!e.path.r.empty() && e.path.mean_strength > 0.93 * any.path.mean_strength &&
+          weak_share(e.path) < weak_most &&
+          (best.edge.polarity == Polarity::any || e.path.mean_strength > best.edge.path.mean_strength)) {
+        best.edge = std::move(e);
+      }
     }
+  };
+  EdgeBand band = band_round(any.centre, Radii(circle, seeded, config), picture);
+  follow_signs(band);
+  if (best.edge.polarity == Polarity::any) {  // another edge has more of one sign: near this one alone
+    constexpr double kNear_px = 6;
+    band.middle = any.path.r;
+    band.half_width = kNear_px;
+    follow_signs(band);
+    best.edge.path.background = any.path.background;
   }
-  if (best.edge.path.r.empty()) {
-    best.edge = any;
-  }
-  const EdgePath& path = best.edge.path;
-  if (path.visible < 0.45 || path.support < 0.6 || path.level < 1.8 * path.background ||
-      path.level < kPathClear_noise * picture.gradient_noise) {
-    return std::nullopt;
-  }
-  return best;
+  return stands_out(best.edge.path, picture) ? std::optional(std::move(best)) : std::nullopt;
 }
 
 SecondEdge find_second(const std::vector<double>& r1, const Point& centre, Polarity known_sign, bool outside,
                        const ClearedPicture& picture, const VisionConfig& config) {
   const double r_max = config.px(config.R_max_m), mean = median_of(r1);
+  const std::vector<double> first = polar_radii(from_polar(centre, r1), centre, kStartAngles);
   SecondEdge best;
+  if (first.empty()) {
+    return best;
+  }
   for (const Polarity q : {Polarity::brighter_out, Polarity::darker_out, Polarity::any}) {
     // Two edges of known sign may lie close together; a line whose sign is not known has two flanks.
     const bool known = q != Polarity::any && known_sign != Polarity::any;
@@ -150,15 +184,16 @@ SecondEdge find_second(const std::vector<double>& r1, const Point& centre, Polar
     EdgeBand band;
     band.centre = centre;
     band.half_width = (to - from) / 2;
-    band.step = std::max(0.5, (to - from) / 120);
-    band.middle = r1;
-    picture.exclude_holder(band, outside ? std::vector<double>(r1.size(), mean + gap) : r1);
+    band.step = std::max(kCoarse_px, (to - from) / 120);
+    band.middle = first;
+    picture.exclude_holder(band, outside ? std::vector<double>(first.size(), mean + gap) : first);
     for (double& r : band.middle) {
       r += (from + to) / 2;
     }
     band.slope = 1.0;
     band.stiffness = 0.8;
     band.covered = picture.covered;
+    band.measures_background = true;
     EdgePath p = closed_path(picture.field, band, q, picture.edge_floor(), 0);
     if (p.r.empty() || p.visible < 0.4) {
       continue;
@@ -166,7 +201,7 @@ SecondEdge find_second(const std::vector<double>& r1, const Point& centre, Polar
     // Along the limit of the band it is the flank of the first edge.
     std::vector<double> offsets;
     for (std::size_t i = 0; i < p.r.size(); ++i) {
-      offsets.push_back(std::abs(p.r[i] - r1[i]));
+      offsets.push_back(std::abs(p.r[i] - first[i]));
     }
     if (median_of(offsets) < gap + 1.0) {
       continue;
@@ -177,6 +212,9 @@ SecondEdge find_second(const std::vector<double>& r1, const Point& centre, Polar
     if (quality > best.quality) {
       best = {std::move(p), q, quality};
     }
+  }
+  if (!best.path.r.empty()) {
+    best.path.r = polar_radii(from_polar(centre, best.path.r), centre, static_cast<int>(r1.size()));
   }
   return best;
 }

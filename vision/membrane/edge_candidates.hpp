@@ -30,12 +30,19 @@ struct SecondEdge {
   double quality = 0;
 };
 
-// The strongest closed edge round a circle's centre, whichever membrane it is. seeded: the circle was given,
-// so that the edge is near it. saturation: of the edge strength; <= 0: by the picture. Empty when no edge
-// stands out.
-[[nodiscard]] std::optional<MainEdge> strongest_closed_edge(const Circle& circle, bool seeded,
-                                                            double saturation, const ClearedPicture& picture,
-                                                            const VisionConfig& config);
+// The closed edge round a circle's centre, whatever its sign is; the centroid of the edge becomes the next
+// centre. seeded: the circle was given, so that the edge is near it. saturation: of the edge strength; <= 0:
+// by the picture. tried: centres of edges that are known already. Empty when it is one of those, or when no
+// edge stands out.
+[[nodiscard]] std::optional<ClosedEdge> closed_edge_round(const Circle& circle, bool seeded,
+                                                          double saturation, std::vector<Point>& tried,
+                                                          const ClearedPicture& picture,
+                                                          const VisionConfig& config);
+
+// The same edge, finely and by its sign, where it has one. Empty when that edge does not stand out.
+[[nodiscard]] std::optional<MainEdge> edge_by_its_sign(const ClosedEdge& coarse, const Circle& circle,
+                                                       bool seeded, const ClearedPicture& picture,
+                                                       const VisionConfig& config);
 
 // A second closed edge, at some distance outside or inside of one that is known: `r1`, per angle round the
 // centre, of the sign `known_sign`. Its path is empty when there is none.

@@ -17,7 +17,9 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr int kCircles = 6;  // candidates that are tried
+constexpr int kCircles = 6;         // candidates that are tried
+constexpr int kVotingParts = 2;     // of the picture's rows
+constexpr int kCirclesPerPart = 2;  // most are given up after one closed path; at most it takes six each
 constexpr double kHalo = 1.4;
 constexpr double kCircleScore = 0.35;  // share of a circumference that must have voted
 
@@ -100,7 +102,8 @@ StartedMembranes tell_apart(const MainEdge& found, const ClearedPicture& picture
   const bool is_outer =
       outside_is_flank || inside_is_flank
           ? brighter_space_inside(outer_face.r, outside_is_flank ? r1 : inside.path.r, centre, picture.field)
-          : inside.quality > outside.quality;
+          : inside.quality > outside.quality ||
+                parallel_edge_within(r1, centre, main.polarity, picture, config).has_value();
   if (is_outer && !too_small_for_outer) {
     out.outer = outer_face;
   } else {
@@ -124,53 +127,103 @@ double texture(const GradientField& field) {
   return static_cast<double>(*seventh);
 }
 
-std::vector<Circle> circles_to_try(const ClearedPicture& picture, const VisionConfig& config) {
-  // The threshold follows the noise, and in pictures rich in texture the texture.
-  const double threshold = std::max(kEdgeClear_noise * picture.gradient_noise, texture(picture.field));
-  std::vector<Circle> circles;
-  for (const CircleCandidate& c :
-       find_circles(picture.field, picture.covered, threshold, config.px(config.R_min_m),
-                    config.px(config.R_max_m), kCircles)) {
-    if (c.score >= kCircleScore) {
-      circles.push_back(c.circle);
-    }
-  }
-  return circles;
-}
-
 }  // namespace
 
-StartedMembranes start_membranes(const ClearedPicture& picture, const VisionConfig& config,
-                                 const std::optional<Circle>& seed) {
+CellSearch::CellSearch(const std::optional<Circle>& seed, const std::optional<Circle>& last_seen)
+    : seeded_(seed), last_seen_(last_seen), parts_voted_(seed ? kVotingParts : 0) {
+  if (seed) {
+    circles_ = {*seed};
+  }
+}
+
+std::optional<StartedMembranes> CellSearch::advance(const ClearedPicture& picture,
+                                                    const VisionConfig& config) {
   StartedMembranes nothing;
-  std::vector<Circle> circles = seed ? std::vector<Circle>{*seed} : circles_to_try(picture, config);
-  if (circles.empty()) {
+  if (const auto there = std::exchange(last_seen_, std::nullopt)) {
+    return begin_round(*there, picture, config);
+  }
+  if (parts_voted_ < kVotingParts) {
+    vote(picture, config);
+    return std::nullopt;
+  }
+  if (auto votes = std::exchange(votes_, std::nullopt)) {
+    choose_circles(*votes);
+    if (!circles_.empty()) {
+      return std::nullopt;
+    }
     nothing.reason = "no circle found between " + std::to_string(std::lround(config.px(config.R_min_m))) +
                      " and " + std::to_string(std::lround(config.px(config.R_max_m))) + " px radius";
     return nothing;
   }
+  if (!circles_.empty()) {
+    try_circles(picture, config);
+    return std::nullopt;
+  }
+  if (!candidates_.empty()) {
+    const Circle strongest = candidates_.front().circle;
+    candidates_.erase(candidates_.begin());
+    if (auto begun = begin_round(strongest, picture, config)) {
+      return begun;
+    }
+  }
+  if (!candidates_.empty()) {
+    return std::nullopt;
+  }
+  nothing.reason = "no closed edge stands out";
+  return nothing;
+}
+
+void CellSearch::vote(const ClearedPicture& picture, const VisionConfig& config) {
+  const GradientField& field = picture.field;
+  if (!votes_) {
+    votes_.emplace(field.area, config.px(config.R_min_m), config.px(config.R_max_m));
+  }
+  // The threshold follows the noise, and in pictures rich in texture the texture.
+  const double threshold = std::max(kEdgeClear_noise * picture.gradient_noise, texture(field));
+  const int h = field.area.height;
+  votes_->vote(field, picture.covered, threshold,
+               {h * parts_voted_ / kVotingParts, h * (parts_voted_ + 1) / kVotingParts});
+  ++parts_voted_;
+}
+
+void CellSearch::choose_circles(CircleSearch& votes) {
+  for (const CircleCandidate& c : votes.best(kCircles)) {
+    if (c.score >= kCircleScore) {
+      circles_.push_back(c.circle);
+    }
+  }
   // A long cell gives a circle at either end: the mean of the circles is tried as well.
-  if (circles.size() > 2) {
-    Circle mean = circles[0];
-    mean.centre = (circles[0].centre + circles[1].centre + circles[2].centre) / 3;
-    circles.push_back(mean);
+  if (circles_.size() > 2) {
+    Circle mean = circles_[0];
+    mean.centre = (circles_[0].centre + circles_[1].centre + circles_[2].centre) / 3;
+    circles_.push_back(mean);
   }
-  std::optional<MainEdge> best;
-  double saturation = 0;
-  for (const Circle& c : circles) {
-    auto found = strongest_closed_edge(c, seed.has_value(), saturation, picture, config);
-    if (found && saturation <= 0) {
-      saturation = found->edge.path.saturation;  // the same for all circles
+}
+
+void CellSearch::try_circles(const ClearedPicture& picture, const VisionConfig& config) {
+  for (int k = 0; k < kCirclesPerPart && !circles_.empty(); ++k) {
+    const Circle circle = circles_.front();
+    circles_.erase(circles_.begin());
+    const auto edge = closed_edge_round(circle, seeded_, saturation_, tried_, picture, config);
+    if (!edge) {
+      continue;
     }
-    if (found && (!best || found->edge.path.mean_strength > best->edge.path.mean_strength)) {
-      best = std::move(found);
-    }
+    saturation_ = edge->path.saturation;
+    const Candidate c{{edge->centre, circle.r}, edge->path.mean_strength};
+    candidates_.insert(
+        std::upper_bound(candidates_.begin(), candidates_.end(), c,
+                         [](const Candidate& l, const Candidate& r) { return l.strength > r.strength; }),
+        c);
   }
-  if (!best) {
-    nothing.reason = "no closed edge stands out";
-    return nothing;
-  }
-  return tell_apart(*best, picture, config);
+}
+
+// The cell round a circle, in this picture alone. Empty when no closed edge stands out there.
+std::optional<StartedMembranes> CellSearch::begin_round(const Circle& circle, const ClearedPicture& picture,
+                                                        const VisionConfig& config) const {
+  std::vector<Point> others;
+  const auto any = closed_edge_round(circle, seeded_, saturation_, others, picture, config);
+  const auto edge = any ? edge_by_its_sign(*any, circle, seeded_, picture, config) : std::nullopt;
+  return edge ? std::optional(tell_apart(*edge, picture, config)) : std::nullopt;
 }
 
 std::optional<FollowedMembrane> start_inner(const ClearedPicture& picture, const VisionConfig& config,

@@ -4,7 +4,9 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "vision/image/hough_circles.hpp"
 #include "vision/membrane/membrane_following.hpp"
 
 namespace punctum::vision {
@@ -14,9 +16,41 @@ struct StartedMembranes {
   std::string reason;             // when none was found
 };
 
-// seed: a circle that replaces the Hough transform.
-[[nodiscard]] StartedMembranes start_membranes(const ClearedPicture& picture, const VisionConfig& config,
-                                               const std::optional<Circle>& seed);
+// The search of a cell of which nothing is known, in parts of about the same cost: where a frame has no time
+// for all of them, each does its part in its own picture.
+class CellSearch {
+ public:
+  // seed: a circle that replaces the Hough transform. last_seen: of a cell that was lost; there it is looked
+  // for first.
+  explicit CellSearch(const std::optional<Circle>& seed,
+                      const std::optional<Circle>& last_seen = std::nullopt);
+
+  // Does one part. Empty while there is more to do; after kMostParts there is not.
+  static constexpr int kMostParts = 15;
+  [[nodiscard]] std::optional<StartedMembranes> advance(const ClearedPicture& picture,
+                                                        const VisionConfig& config);
+
+ private:
+  struct Candidate {
+    Circle circle;
+    double strength = 0;  // of the closed edge round it
+  };
+  void vote(const ClearedPicture& picture, const VisionConfig& config);
+  void choose_circles(CircleSearch& votes);
+  void try_circles(const ClearedPicture& picture, const VisionConfig& config);
+  [[nodiscard]] std::optional<StartedMembranes> begin_round(const Circle& circle,
+                                                            const ClearedPicture& picture,
+                                                            const VisionConfig& config) const;
+
+  bool seeded_;
+  std::optional<Circle> last_seen_;
+  std::optional<CircleSearch> votes_;
+  int parts_voted_ = 0;
+  std::vector<Circle> circles_;  // still to be tried
+  std::vector<Point> tried_;     // centres of the edges round those that were
+  double saturation_ = 0;        // grey levels per px, the same for all circles
+  std::vector<Candidate> candidates_;
+};
 
 // The inner membrane alone, inside an outer membrane that is followed. faint_too: even if single rays do not
 // show it.

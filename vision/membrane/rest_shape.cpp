@@ -76,6 +76,7 @@ Point LearntUndeformed::update(const Undeformed& now, bool touched, const std::o
       c.centre += gain * (now.circle.centre - c.centre);
       c.r += gain * (now.circle.r - c.r);
       c.rms = now.circle.rms;
+      c.r_sd = now.circle.r_sd;
       shape_->shape = circle_contour(c, static_cast<int>(now.shape.size()));
     } else {
       shape_ = now;

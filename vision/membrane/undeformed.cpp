@@ -63,9 +63,11 @@ std::optional<Undeformed> fit_undeformed(const Contour& contour, std::span<const
 
 std::optional<Point> entry_point(const Contour& shape, const Point& through, const Point& axis) {
   std::optional<double> best;
+  double uq = shape.empty() ? 0 : axis.cross(shape.front() - through);
   for (std::size_t i = 0; i < shape.size(); ++i) {
-    const Point p = shape[i] - through, q = shape[(i + 1) % shape.size()] - through;
-    const double up = axis.cross(p), uq = axis.cross(q);
+    const Point p = shape[i] - through, q = shape[i + 1 < shape.size() ? i + 1 : 0] - through;
+    const double up = uq;
+    uq = axis.cross(q);
     if ((up > 0) == (uq > 0) || up == uq) {
       continue;
     }

@@ -1,7 +1,8 @@
 #include "vision/pipettes/backdrop.hpp"
 
+#include <algorithm>
 #include <cstdint>
-#include <opencv2/imgproc.hpp>
+#include <cstring>
 
 #include "vision/pipettes/pipette_mask.hpp"
 
@@ -13,40 +14,43 @@ constexpr double kBeside_px = 10;   // of the needle's walls: their blur, out of
 constexpr double kAhead_px = 40;    // of the tip: it may be seen short of where it is
 constexpr float kPart = 1.0F / 16;  // of a frame in the mean
 
-void learn_row(const float* now, const std::uint8_t* hidden, const std::uint8_t* known, int n, float* mean) {
-  for (int x = 0; x < n; ++x) {
-    const float before = mean[x], here = now[x];
-    const float mean_so_far = known[x] > 0 ? before : here;
-    const float learnt = mean_so_far * (1 - kPart) + here * kPart;
-    mean[x] = hidden[x] > 0 ? before : learnt;
-  }
-}
+constexpr float kUnknown = -1;
 
-void join_seen(const std::uint8_t* hidden, int n, std::uint8_t* known) {
+void learn_row(const float* now, int n, float* mean) {
   for (int x = 0; x < n; ++x) {
-    known[x] |= hidden[x] > 0 ? 0 : 255;
+    const float before = mean[x] < 0 ? now[x] : mean[x];
+    mean[x] = before + kPart * (now[x] - before);
   }
 }
 
 }  // namespace
 
 void Backdrop::learn(const GradientField& field, const NeedlePose& needle) {
-  if (field.area.empty()) {
+  const cv::Rect& a = field.area;
+  if (a.empty()) {
     return;
   }
   if (mean_.size() != field.picture) {
-    mean_ = cv::Mat::zeros(field.picture, CV_32F);
-    known_ = cv::Mat::zeros(field.picture, CV_8U);
+    mean_ = cv::Mat(field.picture, CV_32F, cv::Scalar(kUnknown));
   }
-  hidden_.create(field.picture, CV_8U);
-  hidden_.setTo(0);
-  draw_mask(hidden_, {needle_polygon(needle, field.picture, kBeside_px, kAhead_px)});
-  const cv::Rect& a = field.area;
+  near_.create(a.size(), CV_8U);
+  near_.setTo(0);
+  Polygon polygon = needle_polygon(needle, field.picture, kBeside_px, kAhead_px);
+  for (Point& p : polygon) {
+    p -= Point(a.x, a.y);
+  }
+  draw_mask(near_, {polygon});
   for (int y = 0; y < a.height; ++y) {
-    const std::uint8_t* hidden = hidden_.ptr(a.y + y) + a.x;
-    std::uint8_t* known = known_.ptr(a.y + y) + a.x;
-    learn_row(field.smooth.ptr<float>(y), hidden, known, a.width, mean_.ptr<float>(a.y + y) + a.x);
-    join_seen(hidden, a.width, known);
+    const std::uint8_t *row = near_.ptr(y), *end = row + a.width;
+    const auto* first =
+        static_cast<const std::uint8_t*>(std::memchr(row, 255, static_cast<std::size_t>(a.width)));
+    const std::uint8_t* last = first == nullptr ? end : std::find(first, end, std::uint8_t{0});
+    const int from = first == nullptr ? a.width : static_cast<int>(first - row),
+              to = static_cast<int>(last - row);
+    const float* now = field.smooth.ptr<float>(y);
+    float* mean = mean_.ptr<float>(a.y + y) + a.x;
+    learn_row(now, from, mean);
+    learn_row(now + to, a.width - to, mean + to);
   }
 }
 
@@ -55,11 +59,10 @@ std::optional<double> Backdrop::grey(const Point& p) const {
     return std::nullopt;
   }
   const int x = static_cast<int>(p.x), y = static_cast<int>(p.y);
-  const std::uint8_t *k0 = known_.ptr(y) + x, *k1 = known_.ptr(y + 1) + x;
-  if ((k0[0] & k0[1] & k1[0] & k1[1]) == 0) {
+  const float *a = mean_.ptr<float>(y) + x, *b = mean_.ptr<float>(y + 1) + x;
+  if (a[0] < 0 || a[1] < 0 || b[0] < 0 || b[1] < 0) {
     return std::nullopt;
   }
-  const float *a = mean_.ptr<float>(y) + x, *b = mean_.ptr<float>(y + 1) + x;
   const double u = p.x - x, v = p.y - y;
   return (1 - v) * ((1 - u) * static_cast<double>(a[0]) + u * static_cast<double>(a[1])) +
          v * ((1 - u) * static_cast<double>(b[0]) + u * static_cast<double>(b[1]));

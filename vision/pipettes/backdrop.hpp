@@ -19,9 +19,8 @@ class Backdrop {
   [[nodiscard]] std::optional<double> grey(const Point& p) const;
 
  private:
-  cv::Mat mean_;    // CV_32F, the whole picture
-  cv::Mat known_;   // CV_8U, likewise: 255 = seen without the needle
-  cv::Mat hidden_;  // CV_8U, likewise: 255 = near the needle in this frame
+  cv::Mat mean_;  // CV_32F grey levels, the whole picture; less than 0: not seen without the needle
+  cv::Mat near_;  // CV_8U, of the area that is searched: 255 = near the needle in this frame
 };
 
 }  // namespace punctum::vision

@@ -1,6 +1,7 @@
 #include "vision/pipettes/holding_pipette.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "vision/image/correlation.hpp"
@@ -10,8 +11,9 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr int kStill_px = 3;            // a frame moves it by less
-constexpr double kCertainMouth_px = 1;  // of a mouth that is less certain nothing is claimed
+constexpr int kBlurred_px = 8;            // the smoothing before the gradient reaches so far
+constexpr std::array kStill_px = {1, 3};  // a frame moves it by less
+constexpr double kCertainMouth_px = 1;    // of a mouth that is less certain nothing is claimed
 
 }  // namespace
 
@@ -40,11 +42,14 @@ void HoldingPipette::use_template(const cv::Mat& pattern) {
 }
 
 std::string HoldingPipette::cut_template(const cv::Mat& grey, const TubeTrace& tube, double noise) {
-  GradientField field;
-  field.compute(grey, cv::Rect(0, 0, grey.cols, grey.rows), 1.2);
   Point mouth = tube.end();
-  if (const auto s = end_face(field, mouth, tube.axis, 0.6 * tube.end_half_width,
-                              std::clamp(0.4 * tube.end_half_width, 8.0, 25.0), noise)) {
+  const double half_face = 0.6 * tube.end_half_width,
+               reach = std::clamp(0.4 * tube.end_half_width, 8.0, 25.0);
+  const int side = static_cast<int>(half_face + reach) + kBlurred_px;
+  GradientField field;
+  field.compute(
+      grey, {static_cast<int>(mouth.x) - side, static_cast<int>(mouth.y) - side, 2 * side, 2 * side}, 1.2);
+  if (const auto s = end_face(field, mouth, tube.axis, half_face, reach, noise)) {
     mouth += *s * tube.axis;
   }
   // Mostly tube, and little of the cell, which is dented and moves by itself.
@@ -84,12 +89,15 @@ HolderPose HoldingPipette::find(const cv::Mat& grey) {
   };
   if (last_ && lost_ < 5) {
     // It hardly moves. Where the best place lies on the rim, a better one may lie outside.
-    if (lost_ == 0) {
-      search(kStill_px);
-    }
     const auto on_rim = [](double at, int places) { return at <= 0 || at >= places - 1; };
-    if (!p || on_rim(p->at.x, window.width - template_.cols + 1) ||
-        on_rim(p->at.y, window.height - template_.rows + 1)) {
+    const auto found = [&] {
+      return p && !on_rim(p->at.x, window.width - template_.cols + 1) &&
+             !on_rim(p->at.y, window.height - template_.rows + 1);
+    };
+    for (std::size_t k = 0; lost_ == 0 && k < kStill_px.size() && !found(); ++k) {
+      search(kStill_px[k]);
+    }
+    if (!found()) {
       search(config_.window_px);
     }
   } else {

@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "hal/math/elementary.hpp"
 #include "vision/image/correlation.hpp"
 #include "vision/pipettes/narrow_tube.hpp"
 #include "vision/pipettes/needle_end.hpp"
@@ -15,13 +16,15 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr double kLeastScore = 0.3;  // of the centred correlation
-constexpr double kJump_px = 4;       // along the axis, from what motion and correlation predict
-constexpr int kJumpsMax = 3;         // frames in a row; then it is where it is seen
-constexpr double kAside_px = 2;      // across the axis; further aside the shaft must lie there, too
-constexpr double kDoubtMax_px = 5;   // an end that is less certain is not seen
-constexpr double kAgain_px = 16;     // by no more is the end put right once the walls are fitted there
-constexpr double kSameEnd_px = 5;    // the walls end where the shape does, but for what either errs
+constexpr double kLeastScore = 0.3;                  // of the centred correlation
+constexpr int kNearAlong_px = 4, kNearAside_px = 2;  // from where it is expected
+constexpr double kJump_px = 4;      // along the axis, from what motion and correlation predict
+constexpr int kJumpsMax = 3;        // frames in a row; then it is where it is seen
+constexpr double kAside_px = 2;     // across the axis; further aside the shaft must lie there, too
+constexpr double kDoubtMax_px = 5;  // an end that is less certain is not seen
+// By no more is the end put right once the walls are fitted there; where it was expected, by less.
+constexpr double kAgain_px = 16, kAgainNear_px = 4;
+constexpr double kSameEnd_px = 5;  // the walls end where the shape does, but for what either errs
 // By which the walls may seem to end too early: 1.9 to 4.2 px in pictures of two renderers; later it is
 // known.
 constexpr double kStartReach_px = 7, kGlassReach_px = 4;
@@ -36,23 +39,10 @@ constexpr double kSharp_px = 2.3;
 // In a needle with a smaller half-width no lumen is left between the walls, and a line across it looks like
 // them.
 constexpr double kLumen_px = 4.5;
-constexpr int kLostMax = 3;  // frames in a row; then it is looked for from the border
-
-// The best narrow tube of both borders, or of the one that is known.
-std::optional<TubeTrace> best_tube(const GradientField& field, Side side, double width_max, double noise) {
-  std::optional<TubeTrace> best;
-  for (const Side s : {Side::right, Side::left}) {
-    if (side != Side::automatic && s != side) {
-      continue;
-    }
-    const auto t = trace_narrow_tube(field, s, 3, width_max, noise);
-    if (t && t->edge_share > 0.5 && t->similarity > 0.5 && t->length > 12 &&
-        (!best || t->edge_share * t->similarity > best->edge_share * best->similarity)) {
-      best = t;
-    }
-  }
-  return best;
-}
+// Frames in a row; then it is looked for from the border, too, in every other frame.
+constexpr int kLostMax = 3;
+constexpr const char* kNotRecognised = "tip not recognised";
+constexpr int kWiderMost = 6;  // frames in a row; then the window for its tip grows no more
 
 // Mean change of grey across the two outer faces. Those of two equal walls have opposite senses; in relief
 // contrast they need not.
@@ -129,24 +119,69 @@ bool InjectionPipette::cut_template(const GradientField& field) {
 }
 
 bool InjectionPipette::start(const GradientField& field, double noise, const Clear& clear_at) {
-  const auto tube = best_tube(field, side_, std::max(22.0, 8 * radius_px_), noise);
-  if (!tube) {
+  sides_traced_ = 0;
+  tube_.reset();
+  Start start = Start::more_to_do;
+  while (start == Start::more_to_do) {
+    start = advance_start(field, noise, clear_at, false);
+  }
+  return start == Start::found;
+}
+
+InjectionPipette::Start InjectionPipette::advance_start(const GradientField& field, double noise,
+                                                        const Clear& clear_at, bool keep_tube) {
+  if (trace_next_side(field, noise)) {
+    return Start::more_to_do;
+  }
+  bool found = false;
+  if (tube_) {
+    found = begin_at_end_of(*tube_, field, noise, clear_at);
+  } else {
     reason_ = "no narrow tube enters through the border";
+  }
+  if (found || !tube_ || !keep_tube) {
+    sides_traced_ = 0;
+    tube_.reset();
+  }
+  return found ? Start::found : Start::failed;
+}
+
+// False when both borders were traced before, or the one that is known.
+bool InjectionPipette::trace_next_side(const GradientField& field, double noise) {
+  constexpr Side kSides[] = {Side::right, Side::left};
+  const int sides = side_ == Side::automatic ? 2 : 1;
+  if (sides_traced_ == sides) {
     return false;
   }
+  const Side side = sides == 1 ? side_ : kSides[sides_traced_];
+  ++sides_traced_;
+  const auto t = trace_narrow_tube(field, side, 3, std::max(22.0, 8 * radius_px_), noise);
+  if (t && t->edge_share > 0.5 && t->similarity > 0.5 && t->length > 12 &&
+      (!tube_ || t->edge_share * t->similarity > tube_->edge_share * tube_->similarity)) {
+    tube_ = t;
+  }
+  return true;
+}
+
+bool InjectionPipette::begin_at_end_of(const TubeTrace& tube, const GradientField& field, double noise,
+                                       const Clear& clear_at) {
   last_ = {};
-  last_.axis = tube->axis;
-  last_.half_width = tube->end_half_width;
-  last_.taper = std::clamp((tube->half_width - tube->end_half_width) / std::max(tube->length, 1.0), 0.0, 0.2);
-  last_.tip = tube->end();
+  last_.axis = tube.axis;
+  last_.half_width = tube.end_half_width;
+  last_.taper = std::clamp((tube.half_width - tube.end_half_width) / std::max(tube.length, 1.0), 0.0, 0.2);
+  last_.tip = tube.end();
   double straight = 0;
   for (int round = 0; round < 3; ++round) {
     straight = round == 0 ? fit_walls_at_start(field, noise, radius_px_, last_)
                           : fit_walls(field, noise, radius_px_, last_, kLongest_px);
-    const double back = std::min(30.0, 0.5 * tube->length), ahead = round == 0 ? 25 : 10;
+    const double back = std::min(30.0, 0.5 * tube.length), ahead = round == 0 ? 25 : 10;
     if (const auto s = end_of_profile(field, last_, back, ahead, noise)) {
       last_.tip += *s * last_.axis;
     }
+  }
+  if (straight < kStraight || last_.half_width > 2 * radius_px_ + 1) {
+    reason_ = "what enters through the border is not a straight needle";
+    return false;
   }
   step_sign_ = 0;
   walls_offset_ = 0.15 * last_.half_width;
@@ -171,17 +206,13 @@ bool InjectionPipette::start(const GradientField& field, double noise, const Cle
       return false;
     }
   }
-  if (straight < kStraight || last_.half_width > 2 * radius_px_ + 1) {
-    reason_ = "what enters through the border is not a straight needle";
-    return false;
-  }
   if (!cut_template(field)) {
     reason_ = "tip too close to the border";
     return false;
   }
   last_.ok = true;
   last_.score = 1;
-  found_side_ = tube->side;
+  found_side_ = tube.side;
   velocity_ = {};
   lost_ = 0;
   started_ = true;
@@ -195,7 +226,15 @@ NeedlePose InjectionPipette::find(const GradientField& field, double noise,
   velocity_ = moved.value_or(velocity_);
   NeedlePose needle = follow(field, noise);
   needle.tip += glass_ahead_ * needle.axis;
-  needle.sd = tip_sd(noise);
+  // Of a needle whose lumen is not seen only the walls tell the end.
+  constexpr double kWalls_px = 0.5, kBeyondWalls_px = 0.8;
+  const bool by_walls = last_.half_width < kLumen_px && glass_frames_ == 0;
+  needle.constant_sd = by_walls ? kBeyondWalls_px : 0;
+  // It is learnt in focus. Out of it the end seems to lie further back; beyond the blurs that are tried, as
+  // far as its contrast lasts.
+  constexpr double kBeyondBlurs_px = 6;
+  const double unsharp = NeedleShape::beyond_blurs(view_) ? kBeyondBlurs_px : NeedleShape::blur_px(view_);
+  needle.sd = math::hypot(math::hypot(by_walls ? kWalls_px : tip_sd(noise), needle.constant_sd), unsharp);
   return needle;
 }
 
@@ -235,20 +274,37 @@ NeedlePose InjectionPipette::follow(const GradientField& field, double noise) {
     needle.reason = reason_.empty() ? "not started" : reason_;
     return needle;
   }
+  if (search_next_) {
+    return search_from_border(field, noise, needle);
+  }
   const cv::Rect all = field.area;
   const Point expected = last_.tip + velocity_ - tip_in_template_;
-  const int rx = 24 + 8 * lost_, ry = 10 + 6 * lost_;
-  const cv::Rect window =
-      cv::Rect(static_cast<int>(std::lround(expected.x)) - rx, static_cast<int>(std::lround(expected.y)) - ry,
-               template_.cols + 2 * rx, template_.rows + 2 * ry) &
-      all;
-  const auto p = peak(centred_correlation_map(field.smooth(window - all.tl()), template_));
+  cv::Rect window;
+  const auto search = [&](int rx, int ry) {
+    window = cv::Rect(static_cast<int>(std::lround(expected.x)) - rx,
+                      static_cast<int>(std::lround(expected.y)) - ry, template_.cols + 2 * rx,
+                      template_.rows + 2 * ry) &
+             all;
+    return peak(centred_correlation_map(field.smooth(window - all.tl()), template_));
+  };
+  // First near where the motion predicts it: across the needle that tells its place, unless a better one may
+  // lie further aside.
+  auto p = lost_ == 0 ? search(kNearAlong_px, kNearAside_px) : std::nullopt;
+  const bool on_rim = p && (p->at.y <= 0 || p->at.y >= window.height - template_.rows);
+  const bool narrow = p && !on_rim && p->score >= kLeastScore;
+  const int wider = std::min(lost_, kWiderMost), wide_x = 24 + 8 * wider, wide_y = 10 + 6 * wider;
+  if (!narrow) {
+    p = search(wide_x, wide_y);
+  }
   needle.score = p ? p->score : 0;
   if (!p || p->score < kLeastScore) {
-    return not_recognised(field, noise, needle);
+    needle.reason = kNotRecognised;
+    velocity_ = {};
+    search_next_ = ++lost_ > kLostMax;
+    return needle;
   }
   // Across the needle the correlation tells its place.
-  const Point correlated = p->at + Point(window.x, window.y) + tip_in_template_;
+  Point correlated = p->at + Point(window.x, window.y) + tip_in_template_;
   const Point across(-last_.axis.y, last_.axis.x);
   needle.tip = last_.tip + velocity_;
   needle.tip += aside(field, noise, needle, (correlated - needle.tip).dot(across)) * across;
@@ -258,6 +314,11 @@ NeedlePose InjectionPipette::follow(const GradientField& field, double noise) {
     velocity_ = {};
     ++lost_;
     return needle;
+  }
+  if (!near && narrow) {
+    if (const auto anywhere = search(wide_x, wide_y)) {
+      correlated = anywhere->at + Point(window.x, window.y) + tip_in_template_;
+    }
   }
   // Far from where the motion predicts the end, and from where the whole tip is recognised: something else
   // crosses the needle.
@@ -290,17 +351,15 @@ double InjectionPipette::aside(const GradientField& field, double noise, const N
              : 0;
 }
 
-NeedlePose InjectionPipette::not_recognised(const GradientField& field, double noise, NeedlePose needle) {
-  needle.reason = "tip not recognised";
-  velocity_ = {};
-  if (++lost_ > kLostMax) {
-    const NeedlePose before = last_;
-    if (start(field, noise, [](const Point&) { return false; })) {
-      return last_;
-    }
-    last_ = before;
-    started_ = true;
+// One part of the search from the border, in place of the look at where it was last.
+NeedlePose InjectionPipette::search_from_border(const GradientField& field, double noise, NeedlePose needle) {
+  search_next_ = false;
+  const NeedlePose before = last_;
+  if (advance_start(field, noise, [](const Point&) { return false; }, false) == Start::found) {
+    return last_;
   }
+  last_ = before;
+  needle.reason = kNotRecognised;
   return needle;
 }
 
@@ -310,7 +369,10 @@ bool InjectionPipette::find_end(const GradientField& field, double noise, Needle
   (void)fit_walls(field, noise, radius_px_, needle, longest_);
   needle.tip -= shape_offset_ * needle.axis;
   // First near where the motion predicts it: what lies further ahead cannot be mistaken for it then.
-  auto end = shape_.end(field, backdrop_, needle, 18, 18, view_);
+  std::optional<NeedleShape::End> end;
+  for (const double reach : {8, 18}) {
+    end = end ? end : shape_.end(field, backdrop_, needle, reach, reach, view_);
+  }
   near = end.has_value();
   if (!near) {
     end = shape_.end(field, backdrop_, needle, 36, 44, view_);
@@ -321,7 +383,7 @@ bool InjectionPipette::find_end(const GradientField& field, double noise, Needle
   view_ = end->view;
   needle.tip += end->ahead * needle.axis;
   (void)fit_walls(field, noise, radius_px_, needle, longest_);
-  if (const auto again = shape_.end_near(view_, field, backdrop_, needle, kAgain_px)) {
+  if (const auto again = shape_.end_near(view_, field, backdrop_, needle, near ? kAgainNear_px : kAgain_px)) {
     needle.tip += *again * needle.axis;
   }
   shape_origin_ = needle.tip;

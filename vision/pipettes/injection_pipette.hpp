@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 
 #include "vision/config.hpp"
@@ -12,6 +13,7 @@
 #include "vision/pipettes/backdrop.hpp"
 #include "vision/pipettes/needle_pose.hpp"
 #include "vision/pipettes/needle_shape.hpp"
+#include "vision/pipettes/tube_trace.hpp"
 
 namespace punctum::vision {
 
@@ -25,6 +27,11 @@ class InjectionPipette {
   // else lies near.
   using Clear = std::function<bool(const Point& tip)>;
   [[nodiscard]] bool start(const GradientField& field, double noise, const Clear& clear_at);
+  // The same in parts, each in the picture of its frame: the tube through either border, then its end.
+  // keep_tube: where that end is not a needle's or not clear, the next part looks at it once more.
+  enum class Start : std::uint8_t { more_to_do, failed, found };
+  [[nodiscard]] Start advance_start(const GradientField& field, double noise, const Clear& clear_at,
+                                    bool keep_tube);
   // moved: what the manipulator has moved it by since the last frame, px, where that is known.
   [[nodiscard]] NeedlePose find(const GradientField& field, double noise, const std::optional<Point>& moved);
   // It is known to be elsewhere along its axis than the picture shows.
@@ -39,6 +46,9 @@ class InjectionPipette {
   [[nodiscard]] Side side() const noexcept { return found_side_; }
 
  private:
+  [[nodiscard]] bool trace_next_side(const GradientField& field, double noise);
+  [[nodiscard]] bool begin_at_end_of(const TubeTrace& tube, const GradientField& field, double noise,
+                                     const Clear& clear_at);
   bool cut_template(const GradientField& field);
   [[nodiscard]] double aside(const GradientField& field, double noise, const NeedlePose& predicted,
                              double correlated) const;
@@ -50,12 +60,14 @@ class InjectionPipette {
   void learn_glass(const GradientField& field, double noise, NeedlePose followed, double reach);
   [[nodiscard]] double tip_sd(double noise) const;
   [[nodiscard]] NeedlePose follow(const GradientField& field, double noise);
-  [[nodiscard]] NeedlePose not_recognised(const GradientField& field, double noise, NeedlePose needle);
+  [[nodiscard]] NeedlePose search_from_border(const GradientField& field, double noise, NeedlePose needle);
 
   Side side_;
   double radius_px_;
   bool started_ = false;
-  double longest_ = 0;  // of a wall that an edge is averaged over, px
+  int sides_traced_ = 0;           // in the search for it
+  std::optional<TubeTrace> tube_;  // the best through those
+  double longest_ = 0;             // of a wall that an edge is averaged over, px
   Side found_side_ = Side::right;
   std::string reason_;  // why it was not started
   cv::Mat template_;
@@ -66,9 +78,10 @@ class InjectionPipette {
   Point learnt_at_;         // the tip in the last frame that the shape was learnt from
   Point shape_origin_;      // where the shape was seen in the last frame
   NeedlePose last_;
-  Point velocity_;  // px per frame: what it is expected to move by
-  int lost_ = 0;    // frames in a row without the tip
-  int jumps_ = 0;   // frames in a row in which the end lay somewhere else
+  Point velocity_;            // px per frame: what it is expected to move by
+  int lost_ = 0;              // frames in a row without the tip
+  int jumps_ = 0;             // frames in a row in which the end lay somewhere else
+  bool search_next_ = false;  // from the border, in the next frame
 
   double shape_offset_ = 0;   // from where the learnt shape has its origin to the end face, px
   double walls_offset_ = 0;   // from where the profile of the walls ends to the end face, px

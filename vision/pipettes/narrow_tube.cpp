@@ -61,25 +61,18 @@ class ProfileTracer {
     contrast_ = normalise(learnt_);
     return contrast_ > 0;
   }
-  void follow() {
+  // Returns the index of the last station on the tube: there the sum of (similarity - kContinued) is largest,
+  // so that a short foreign thing across the tube does not end it. Empty: it does not end in the picture.
+  [[nodiscard]] std::optional<std::size_t> follow() {
     const double longest = 0.85 * field_.area.width / std::abs(tube_.axis.x);
-    for (double s = 0; s < longest; s += kStride_px) {
-      step(s);
-    }
-  }
-  // Index of the last station on the tube: there the sum of (similarity - kContinued) is largest, so that a
-  // short foreign thing across the tube does not end it. Empty: it does not end in the picture.
-  [[nodiscard]] std::optional<std::size_t> last_station() const {
     double sum = 0, sum_best = 0;
     std::size_t last = 0;
-    for (std::size_t i = 0; i < similarity_.size(); ++i) {
-      sum += std::clamp(similarity_[i], -0.5, 1.0) - kContinued;
+    for (double s = 0; s < longest && sum >= sum_best - kGiveUp; s += kStride_px) {
+      step(s);
+      sum += std::clamp(similarity_.back(), -0.5, 1.0) - kContinued;
       if (sum > sum_best) {
         sum_best = sum;
-        last = i;
-      }
-      if (sum < sum_best - kGiveUp) {
-        break;
+        last = similarity_.size() - 1;
       }
     }
     if (last < 3 || last + 1 >= similarity_.size()) {
@@ -237,8 +230,7 @@ std::optional<TubeTrace> trace_narrow_tube(const GradientField& field, Side side
   if (!tracer.learn_at_border(strip)) {
     return std::nullopt;
   }
-  tracer.follow();
-  const auto last = tracer.last_station();
+  const auto last = tracer.follow();
   auto tube = last ? tracer.straight_tube(*last) : std::nullopt;
   if (tube) {
     tube->end_half_width = tracer.half_width_near_end(*tube);

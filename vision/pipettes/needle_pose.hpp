@@ -10,13 +10,14 @@ namespace punctum::vision {
 
 struct NeedlePose {
   bool ok = false;
-  Point tip;              // sub-pixel: the middle of the end face
-  double sd = 0;          // standard deviation of the tip along the axis, px
-  Point axis{-1, 0};      // unit, pointing out of the tip
-  double half_width = 0;  // at the tip, px
-  double taper = 0;       // growth of the half-width per px away from the tip
-  double score = 0;       // centred correlation of the tip; 1 in the frame that the template was cut from
-  std::string reason;     // when not ok
+  Point tip;               // sub-pixel: the middle of the end face
+  double sd = 0;           // standard deviation of the tip along the axis, px
+  double constant_sd = 0;  // the part of it that is the same in every frame
+  Point axis{-1, 0};       // unit, pointing out of the tip
+  double half_width = 0;   // at the tip, px
+  double taper = 0;        // growth of the half-width per px away from the tip
+  double score = 0;        // centred correlation of the tip; 1 in the frame that the template was cut from
+  std::string reason;      // when not ok
 
   // Half-width of the outside at the distance s behind the tip.
   [[nodiscard]] double half_width_at(double s) const { return half_width + taper * std::max(0.0, s); }

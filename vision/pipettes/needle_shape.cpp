@@ -4,9 +4,9 @@
 #include <cmath>
 #include <cstddef>
 #include <numeric>
+#include <span>
 
 #include "hal/math/elementary.hpp"
-#include "vision/image/median.hpp"
 #include "vision/image/parabola.hpp"
 
 namespace punctum::vision {
@@ -27,10 +27,10 @@ constexpr std::array kBlurs_px = {0.0, 0.8, 1.2, 1.6, 2.0, 2.5};
 
 // Where the lanes stand across the needle: -1 .. 1.
 template <std::size_t kLanes>
-constexpr std::array<double, kLanes> places() {
-  std::array<double, kLanes> out{};
+constexpr std::array<float, kLanes> places() {
+  std::array<float, kLanes> out{};
   for (std::size_t i = 0; i < kLanes; ++i) {
-    out[i] = 2.0 * static_cast<double>(i) / (kLanes - 1) - 1;
+    out[i] = 2.0F * static_cast<float>(i) / (kLanes - 1) - 1;
   }
   return out;
 }
@@ -39,13 +39,13 @@ constexpr std::array<double, kLanes> places() {
 
 void NeedleShape::remove_mean_and_slope(Profile& p) {
   constexpr auto kPlaces = places<kLanes>();
-  double sum = 0, tilt = 0, xx = 0;
+  float sum = 0, tilt = 0, xx = 0;
   for (std::size_t i = 0; i < kLanes; ++i) {
     sum += p[i];
     tilt += kPlaces[i] * p[i];
     xx += kPlaces[i] * kPlaces[i];
   }
-  const double mean = sum / kLanes, slope = tilt / xx;
+  const float mean = sum / kLanes, slope = tilt / xx;
   for (std::size_t i = 0; i < kLanes; ++i) {
     p[i] -= mean + slope * kPlaces[i];
   }
@@ -64,16 +64,16 @@ std::optional<NeedleShape::Profile> NeedleShape::light_across(const GradientFiel
   }
   Profile light{};
   for (std::size_t i = 0; i < kLanes; ++i) {
-    const Point p = needle.at(behind, kPlaces[i] * reach_);
-    light[i] = Bilinear(p.x - a.x, p.y - a.y).of(field.smooth);
+    const Point p = needle.at(behind, static_cast<double>(kPlaces[i]) * reach_);
+    light[i] = static_cast<float>(Bilinear(p.x - a.x, p.y - a.y).of(field.smooth));
   }
   return light;
 }
 
 NeedleShape::Profile NeedleShape::absorption(Profile light) {
-  const double usual = std::accumulate(light.begin(), light.end(), 0.0) / kLanes;
-  for (double& v : light) {
-    v /= std::max(usual, 1.0);
+  const float usual = std::accumulate(light.begin(), light.end(), 0.0F) / kLanes;
+  for (float& v : light) {
+    v /= std::max(usual, 1.0F);
   }
   remove_mean_and_slope(light);
   return light;
@@ -85,11 +85,11 @@ NeedleShape::Profile NeedleShape::absorption_over(const Backdrop& backdrop, cons
   constexpr auto kPlaces = places<kLanes>();
   Profile without{};
   for (std::size_t i = 0; i < kLanes; ++i) {
-    const auto g = backdrop.grey(needle.at(behind, kPlaces[i] * reach_));
+    const auto g = backdrop.grey(needle.at(behind, static_cast<double>(kPlaces[i]) * reach_));
     if (!g || *g <= 1) {
       return absorption(light);
     }
-    without[i] = *g;
+    without[i] = static_cast<float>(*g);
   }
   for (std::size_t i = 0; i < kLanes; ++i) {
     light[i] /= without[i];
@@ -118,13 +118,34 @@ void NeedleShape::learn(const GradientField& field, const NeedlePose& needle) {
   const std::size_t old = mean_.size();
   mean_.resize(std::max(old, now.size()));
   for (std::size_t k = 0; k < now.size(); ++k) {
-    const double part = k < old ? 1.0 / frames_ : 1;
+    const float part = k < old ? 1.0F / static_cast<float>(frames_) : 1;
     for (std::size_t i = 0; i < kLanes; ++i) {
       mean_[k][i] += part * (now[k][i] - mean_[k][i]);
     }
   }
   smooth_along_shaft();
 }
+
+namespace {
+
+// As median_of, of each lane by itself. The order of the rows is lost.
+template <std::size_t kLanes>
+std::array<float, kLanes> median_by_lane(std::span<std::array<float, kLanes>> rows) {
+  const std::size_t middle = rows.size() / 2;
+  for (std::size_t k = 0; k <= middle; ++k) {
+    for (std::size_t j = k + 1; j < rows.size(); ++j) {
+      float *lower = rows[k].data(), *upper = rows[j].data();
+      for (std::size_t i = 0; i < kLanes; ++i) {
+        const float a = lower[i], b = upper[i];
+        lower[i] = b < a ? b : a;
+        upper[i] = b < a ? a : b;
+      }
+    }
+  }
+  return rows[middle];
+}
+
+}  // namespace
 
 // Behind its tip the needle looks the same everywhere, and ahead of it is nothing of it: what differs there
 // is a speck, and one that stands still while the needle moves must not hold the shape where it was.
@@ -135,7 +156,7 @@ void NeedleShape::smooth_along_shaft() {
   constexpr double kBlur_px = 4;                   // ahead of the face
   Profiles& shape = shape_.front().rows;
   shape = mean_;
-  std::vector<double> near;
+  std::array<Profile, 2 * kReach / kStride + 1> near;
   for (std::size_t k = tip; k < mean_.size(); ++k) {
     std::size_t from = std::max(tip, k - kReach), to = std::min(mean_.size() - 1, k + kReach);
     if (frames_ >= kMemory / 2) {  // even, so that a needle that widens is not drawn to one side
@@ -143,30 +164,42 @@ void NeedleShape::smooth_along_shaft() {
       from = k - reach;
       to = k + reach;
     }
-    for (std::size_t i = 0; i < kLanes; ++i) {
-      near.clear();
-      for (std::size_t j = from; j <= to; j += kStride) {
-        near.push_back(mean_[j][i]);
-      }
-      shape[k][i] = median_of(near);
+    std::size_t n = 0;
+    for (std::size_t j = from; j <= to; j += kStride) {
+      near[n++] = mean_[j];
     }
+    shape[k] = median_by_lane(std::span(near).first(n));
   }
   const double front = kAhead - (face().value_or(0) + kBlur_px) / kStep_px;
   for (std::size_t k = 0; k < kAhead && static_cast<double>(k) < front; ++k) {
     shape[k].fill(0);
   }
-  for (std::size_t b = 1; b < shape_.size(); ++b) {
-    shape_[b].rows = blurred(kBlurs_px[b]);
-  }
   for (Look& look : shape_) {
-    look.arrange();
+    if (&look != &shape_.front()) {
+      look.rows.clear();
+    }
   }
+  shape_.front().arrange();
+}
+
+double NeedleShape::blur_px(View view) { return kBlurs_px[view.blur]; }
+
+bool NeedleShape::beyond_blurs(View view) { return view.blur + 1 == kBlurs_px.size(); }
+
+// Blurred when it is first asked for: most needles stay in focus.
+const NeedleShape::Look& NeedleShape::look(std::size_t blurred) {
+  Look& out = shape_[blurred];
+  if (out.rows.empty()) {
+    blur(kBlurs_px[blurred], out.rows);
+    out.arrange();
+  }
+  return out;
 }
 
 // In three sums that do not wait for each other.
-double NeedleShape::product(const Profile& a, const Profile& b) {
+float NeedleShape::product(const Profile& a, const Profile& b) {
   static_assert(kLanes % 3 == 0);
-  std::array<double, 3> sum{};
+  std::array<float, 3> sum{};
   for (std::size_t i = 0; i < kLanes; i += 3) {
     sum[0] += a[i] * b[i];
     sum[1] += a[i + 1] * b[i + 1];
@@ -185,7 +218,7 @@ std::optional<double> NeedleShape::face() const {
     return std::nullopt;
   }
   const auto strength = [&shape](std::size_t k, const Profile& walls) {
-    return product(shape[k], walls) / std::max(product(walls, walls), 1e-12);
+    return static_cast<double>(product(shape[k], walls) / std::max(product(walls, walls), 1e-12F));
   };
   for (std::size_t k = kSurely; k > 0; --k) {
     Profile walls{};
@@ -204,31 +237,32 @@ std::optional<double> NeedleShape::face() const {
 }
 
 // The shape out of focus.
-NeedleShape::Profiles NeedleShape::blurred(double sigma_px) const {
-  Profiles out = shape_.front().rows;
+void NeedleShape::blur(double sigma_px, Profiles& out) const {
+  out = shape_.front().rows;
   const auto kernel = [](double sigma) {
-    std::vector<double> k;
-    double sum = 0;
+    std::vector<float> k;
+    float sum = 0;
     for (int i = -static_cast<int>(std::ceil(3 * sigma)); i <= std::ceil(3 * sigma); ++i) {
-      k.push_back(math::exp(-0.5 * i * i / (sigma * sigma)));
+      k.push_back(static_cast<float>(math::exp(-0.5 * i * i / (sigma * sigma))));
       sum += k.back();
     }
-    for (double& x : k) {
+    for (float& x : k) {
       x /= sum;
     }
     return k;
   };
   const auto across = kernel(sigma_px * (kLanes - 1) / (2 * reach_)), along = kernel(sigma_px / kStep_px);
   const int m = static_cast<int>(across.size() / 2), l = static_cast<int>(along.size() / 2);
+  std::vector<float> wide(across.size() - 1 + kLanes, 0.0F);  // with nothing on either side
   for (Profile& p : out) {
-    const double beside = 0.5 * (p.front() + p.back());  // there is no needle
+    const float beside = 0.5F * (p.front() + p.back());  // there is no needle
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      wide[static_cast<std::size_t>(m) + i] = p[i] - beside;
+    }
     Profile q{};
-    for (int i = 0; i < static_cast<int>(kLanes); ++i) {
-      for (int d = -m; d <= m; ++d) {
-        if (i + d >= 0 && i + d < static_cast<int>(kLanes)) {
-          q[static_cast<std::size_t>(i)] +=
-              across[static_cast<std::size_t>(d + m)] * (p[static_cast<std::size_t>(i + d)] - beside);
-        }
+    for (std::size_t d = 0; d < across.size(); ++d) {
+      for (std::size_t i = 0; i < kLanes; ++i) {
+        q[i] += across[d] * wide[i + d];
       }
     }
     remove_mean_and_slope(q);
@@ -246,15 +280,14 @@ NeedleShape::Profiles NeedleShape::blurred(double sigma_px) const {
     }
     out[static_cast<std::size_t>(k)] = q;
   }
-  return out;
 }
 
 namespace {
 
 // What a row of power `power` in the shape tells for the needle. A speck or another edge may tell for or
 // against it no more than the needle itself.
-double gain_of_row(double product, double power) {
-  return std::min(std::max(product, -0.5 * power), 1.5 * power) - 0.5 * power;
+float gain_of_row(float product, float power) {
+  return std::min(std::max(product, -0.5F * power), 1.5F * power) - 0.5F * power;
 }
 
 }  // namespace
@@ -273,13 +306,13 @@ void NeedleShape::Look::arrange() {
 }
 
 // Of a row of the picture with the n rows of the shape from the k-th on, the last one being the first.
-void NeedleShape::Look::products(const Profile& row, std::size_t k, std::size_t n, double* out) const {
+void NeedleShape::Look::products(const Profile& row, std::size_t k, std::size_t n, float* out) const {
   constexpr std::size_t kAtOnce = 7;  // lanes: the compiler keeps them in registers
   static_assert(kLanes % kAtOnce == 0);
-  std::fill_n(out, n, 0.0);
+  std::fill_n(out, n, 0.0F);
   for (std::size_t i = 0; i < kLanes; i += kAtOnce) {
     const std::size_t size = rows.size();
-    const double *r = row.data() + i, *lane = lanes.data() + i * size + k;
+    const float *r = row.data() + i, *lane = lanes.data() + i * size + k;
     for (std::size_t q = 0; q < n; ++q) {
       out[q] += r[0] * lane[q] + r[1] * lane[q + size] + r[2] * lane[q + 2 * size] +
                 r[3] * lane[q + 3 * size] + r[4] * lane[q + 4 * size] + r[5] * lane[q + 5 * size] +
@@ -290,21 +323,21 @@ void NeedleShape::Look::products(const Profile& row, std::size_t k, std::size_t 
 
 // Of the ends from..to - 1; the shape of the e-th end begins at the e-th row. This is where the needle's time
 // goes: row by row of the picture, all ends at once.
-std::vector<double> NeedleShape::gains(const Profiles& seen, const Look& look, int from, int to) {
+std::vector<float> NeedleShape::gains(const Profiles& seen, const Look& look, int from, int to) {
   const int n = static_cast<int>(seen.size()), last = static_cast<int>(look.rows.size()) - 1;
-  std::vector<double> gain(static_cast<std::size_t>(to - from), 0.0), sum(gain);
+  std::vector<float> gain(static_cast<std::size_t>(to - from), 0.0F), sum(gain);
   for (int j = from; j < n; ++j) {
     const Profile& row = seen[static_cast<std::size_t>(j)];
     // Of the ends so far ahead that the row lies behind their shape, the shaft goes on as the shape ends.
     const int first = std::clamp(j - last, from, to), ends = std::min(to, j + 1) - first;
     if (first > from) {
-      const double shaft = gain_of_row(product(row, look.rows.back()), look.power.front());
-      std::for_each(gain.begin(), gain.begin() + (first - from), [shaft](double& g) { g += shaft; });
+      const float shaft = gain_of_row(product(row, look.rows.back()), look.power.front());
+      std::for_each(gain.begin(), gain.begin() + (first - from), [shaft](float& g) { g += shaft; });
     }
     if (ends > 0) {
       const std::size_t k = static_cast<std::size_t>(last - j + first), many = static_cast<std::size_t>(ends);
       look.products(row, k, many, sum.data());
-      double* of_ends = gain.data() + (first - from);
+      float* of_ends = gain.data() + (first - from);
       for (std::size_t q = 0; q < many; ++q) {
         of_ends[q] += gain_of_row(sum[q], look.power[k + q]);
       }
@@ -313,11 +346,11 @@ std::vector<double> NeedleShape::gains(const Profiles& seen, const Look& look, i
   return gain;
 }
 
-NeedleShape::Fit NeedleShape::fit(const Profiles& seen, View view, int ends) const {
-  const Look& look = shape_[view.blur];
+NeedleShape::Fit NeedleShape::fit(const Profiles& seen, View view, int ends) {
+  const Look& shape = look(view.blur);
   Fit out;
   out.view = view;
-  out.gain = gains(seen, look, 0, ends);
+  out.gain = gains(seen, shape, 0, ends);
   out.best = static_cast<int>(std::max_element(out.gain.begin(), out.gain.end()) - out.gain.begin());
   // What the surroundings of the needle show is noise to it. Variance of a lane: by the profiles ahead of
   // this end, and of what is left behind it.
@@ -326,10 +359,10 @@ NeedleShape::Fit NeedleShape::fit(const Profiles& seen, View view, int ends) con
   for (int j = 0; j < static_cast<int>(seen.size()) && j - out.best < kLeastShaft; ++j) {
     const int k = j - out.best;
     const Profile of_shape =
-        k < 0 ? Profile{} : look.rows[std::min(static_cast<std::size_t>(k), look.rows.size() - 1)];
+        k < 0 ? Profile{} : shape.rows[std::min(static_cast<std::size_t>(k), shape.rows.size() - 1)];
     for (std::size_t i = 0; i < kLanes; ++i, ++count) {
-      const double d = seen[static_cast<std::size_t>(j)][i] - of_shape[i];
-      sum += d * d;
+      const float d = seen[static_cast<std::size_t>(j)][i] - of_shape[i];
+      sum += static_cast<double>(d * d);
     }
   }
   out.variance = sum / std::max(count, 1);
@@ -338,13 +371,13 @@ NeedleShape::Fit NeedleShape::fit(const Profiles& seen, View view, int ends) con
 
 // first: of the first end.
 double NeedleShape::Fit::ahead_of(double first) const {
-  const auto at = [&](int e) { return gain[static_cast<std::size_t>(e)]; };
+  const auto at = [&](int e) { return static_cast<double>(gain[static_cast<std::size_t>(e)]); };
   return first - (best + vertex_offset(at(best - 1), at(best), at(best + 1))) * kStep_px;
 }
 
 std::optional<NeedleShape::End> NeedleShape::end(const GradientField& field, const Backdrop& backdrop,
                                                  const NeedlePose& needle, double back, double ahead,
-                                                 View near) const {
+                                                 View near) {
   const int ends = static_cast<int>((back + ahead) / kStep_px) + 1;
   // A backdrop takes granules off, unless they have moved since; then it doubles them.
   Profiles plain, over;
@@ -368,7 +401,7 @@ std::optional<NeedleShape::End> NeedleShape::end(const GradientField& field, con
   constexpr int kNear = 6;  // steps: another blur does not move the end further
   const auto better = [&](std::size_t blur) {
     const auto near_best =
-        gains(seen, shape_[blur], std::max(best.best - kNear, 0), std::min(best.best + kNear + 1, ends));
+        gains(seen, look(blur), std::max(best.best - kNear, 0), std::min(best.best + kNear + 1, ends));
     const bool is = *std::max_element(near_best.begin(), near_best.end()) > best.top();
     if (is) {
       best = fit(seen, {best.view.over_backdrop, blur}, ends);
@@ -385,7 +418,7 @@ std::optional<NeedleShape::End> NeedleShape::end(const GradientField& field, con
 }
 
 std::optional<double> NeedleShape::end_near(View view, const GradientField& field, const Backdrop& backdrop,
-                                            const NeedlePose& needle, double reach) const {
+                                            const NeedlePose& needle, double reach) {
   const int ends = static_cast<int>(2 * reach / kStep_px) + 1;
   Profiles seen;
   for (int j = -kAhead; j < ends + kBehind - kAhead; ++j) {
@@ -410,7 +443,9 @@ std::optional<NeedleShape::End> NeedleShape::end_of(const Fit& f, double ahead) 
   }
   const int ends = static_cast<int>(f.gain.size());
   const double unit = kJoined * std::max(f.variance, 1e-8);
-  const auto below_best = [&](int e) { return (f.top() - f.gain[static_cast<std::size_t>(e)]) / unit; };
+  const auto below_best = [&](int e) {
+    return static_cast<double>(f.top() - f.gain[static_cast<std::size_t>(e)]) / unit;
+  };
   if (below_best(0) < kClear || below_best(ends - 1) < kClear) {
     return std::nullopt;
   }

@@ -38,47 +38,51 @@ class NeedleShape {
   // or when the shape is not known. backdrop: what would be seen there without the needle, as far as known.
   // The views near the given one are tried.
   [[nodiscard]] std::optional<End> end(const GradientField& field, const Backdrop& backdrop,
-                                       const NeedlePose& needle, double back, double ahead, View near) const;
+                                       const NeedlePose& needle, double back, double ahead, View near);
+  // By which the needle is less sharp in a view than it was learnt, px; beyond_blurs: at least.
+  [[nodiscard]] static double blur_px(View view);
+  [[nodiscard]] static bool beyond_blurs(View view);
   // How far ahead of the tip an end is, px, that is known to be within `reach` px of it. In this view alone.
   [[nodiscard]] std::optional<double> end_near(View view, const GradientField& field,
                                                const Backdrop& backdrop, const NeedlePose& needle,
-                                               double reach) const;
+                                               double reach);
 
  private:
   static constexpr int kReliable = 8;  // frames
   static constexpr std::size_t kLanes = 21;
   // Absorption across the needle, as a share of the light, without mean and slope.
-  using Profile = std::array<double, kLanes>;
+  using Profile = std::array<float, kLanes>;
 
   using Profiles = std::vector<Profile>;  // every half pixel along the needle, from ahead of the tip
-  [[nodiscard]] static double product(const Profile& a, const Profile& b);
+  [[nodiscard]] static float product(const Profile& a, const Profile& b);
   static void remove_mean_and_slope(Profile& p);
   [[nodiscard]] std::optional<Profile> light_across(const GradientField& field, const NeedlePose& needle,
                                                     double behind) const;
   [[nodiscard]] static Profile absorption(Profile light);
   [[nodiscard]] Profile absorption_over(const Backdrop& backdrop, const NeedlePose& needle, double behind,
                                         Profile light) const;
-  [[nodiscard]] Profiles blurred(double sigma_px) const;
+  void blur(double sigma_px, Profiles& out) const;
 
   // The shape in one sharpness.
   struct Look {
-    Profiles rows;
-    std::vector<double> power;  // of the rows, the last one first
-    std::vector<double> lanes;  // the rows lane by lane, in each the last row first
-    void arrange();             // power and lanes
-    void products(const Profile& row, std::size_t k, std::size_t n, double* out) const;
+    Profiles rows;             // empty: not blurred since the shape was learnt
+    std::vector<float> power;  // of the rows, the last one first
+    std::vector<float> lanes;  // the rows lane by lane, in each the last row first
+    void arrange();            // power and lanes
+    void products(const Profile& row, std::size_t k, std::size_t n, float* out) const;
   };
   struct Fit {
-    std::vector<double> gain;  // of each end, over no needle; in squares of the absorption
+    std::vector<float> gain;  // of each end, over no needle; in squares of the absorption
     int best = 0;
     double variance = 0;  // of a lane, once the needle is taken off
     View view;
-    [[nodiscard]] double top() const { return gain[static_cast<std::size_t>(best)]; }
+    [[nodiscard]] float top() const { return gain[static_cast<std::size_t>(best)]; }
     [[nodiscard]] bool inside() const { return best >= 2 && best + 3 <= static_cast<int>(gain.size()); }
     [[nodiscard]] double ahead_of(double first) const;
   };
-  [[nodiscard]] static std::vector<double> gains(const Profiles& seen, const Look& look, int from, int to);
-  [[nodiscard]] Fit fit(const Profiles& seen, View view, int ends) const;
+  [[nodiscard]] static std::vector<float> gains(const Profiles& seen, const Look& look, int from, int to);
+  [[nodiscard]] const Look& look(std::size_t blurred);
+  [[nodiscard]] Fit fit(const Profiles& seen, View view, int ends);
   [[nodiscard]] static std::optional<End> end_of(const Fit& fit, double ahead);
 
   // The shape without what lay beside the needle in a few frames only.
@@ -86,7 +90,7 @@ class NeedleShape {
 
   double reach_ = 0;           // to either side of the axis, px
   Profiles mean_;              // of the frames
-  std::array<Look, 6> shape_;  // likewise, without specks; ever less sharp
+  std::array<Look, 6> shape_;  // likewise, without specks; ever less sharp, see look()
   int frames_ = 0;
 };
 

@@ -7,13 +7,16 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr double kScatter_px = 0.15;     // of the stage, before it is known
-constexpr double kStageDrift_px = 0.03;  // per frame, of the picture against the stage
-constexpr double kMost_px = 8;           // of disagreement, unless the needle has slipped or bent
-constexpr double kFastest_px = 25;       // in a frame; faster, it was placed anew
-constexpr double kFarthest_px = 1e7;     // a number beyond it is no place
-constexpr int kDisagreements = 10;       // frames in a row; then how far off the stage is, is not known
-constexpr int kStageMemory = 30;         // frames
+constexpr double kScatter_px = 0.15;          // of the stage, before it is known
+constexpr double kStageDrift_px = 0.03;       // per frame, of the picture against the stage
+constexpr double kMost_px = 8, kMost_sd = 3;  // of disagreement, unless the needle has slipped or bent
+constexpr double kFastest_px = 25;            // in a frame; faster, it was placed anew
+constexpr double kFarthest_px = 1e7;          // a number beyond it is no place
+constexpr int kDisagreements = 10;            // frames in a row; then how far off the stage is, is not known
+constexpr int kStageMemory = 30;              // frames
+// A camera that is late shows a needle that moves fast where it was.
+constexpr double kResting_px = 0.5;             // per frame
+constexpr double kMoved_px = 4, kStayed = 0.3;  // along the axis, from rest to rest; share of it
 
 double squared(double x) { return x * x; }
 
@@ -26,6 +29,7 @@ void TipByStage::begin(const std::optional<Point>& stage) {
     moved_ = *stage - *stage_;
     if (cv::norm(*moved_) > kFastest_px) {  // it was placed anew
       moved_.reset();
+      rest_.reset();
       frames_ = 0;
     }
   }
@@ -37,7 +41,7 @@ std::optional<Point> TipByStage::tip() const {
   return stage_ && frames_ > 0 ? std::optional(*stage_ + off_) : std::nullopt;
 }
 
-double TipByStage::sd() const { return std::sqrt(variance_ + scatter_); }
+double TipByStage::sd() const { return std::sqrt(variance_ + scatter_ + squared(constant_sd_)); }
 
 NeedlePose TipByStage::most_likely(const NeedlePose& seen) {
   const auto told = tip();
@@ -45,17 +49,20 @@ NeedlePose TipByStage::most_likely(const NeedlePose& seen) {
     return seen;
   }
   const double apart = (*told - seen.tip).dot(seen.axis);
-  disagreements_ = std::abs(apart) > kMost_px ? disagreements_ + 1 : 0;
+  // What is wrong in every frame is wrong in both.
+  const double of_both = squared(seen.constant_sd);
+  const double of_picture = squared(seen.sd) - of_both, of_stage = variance_ + scatter_;
+  const bool disagree = std::abs(apart) > std::max(kMost_px, kMost_sd * std::sqrt(of_picture + of_stage));
+  disagreements_ = disagree ? disagreements_ + 1 : 0;
   if (disagreements_ > kDisagreements) {
     frames_ = disagreements_ = 0;
   }
-  if (std::abs(apart) > kMost_px) {
+  if (disagree) {
     return seen;
   }
-  const double of_picture = squared(seen.sd), of_stage = variance_ + scatter_;
   NeedlePose both = seen;
   both.tip += of_picture / (of_picture + of_stage) * apart * seen.axis;
-  both.sd = std::sqrt(of_picture * of_stage / (of_picture + of_stage));
+  both.sd = std::sqrt(of_picture * of_stage / (of_picture + of_stage) + of_both);
   return both;
 }
 
@@ -63,21 +70,39 @@ void TipByStage::learn(const NeedlePose& seen) {
   if (!stage_) {
     return;
   }
+  compare(seen);
   const Point off = seen.tip - *stage_;
+  constant_sd_ = seen.constant_sd;
+  const double of_picture = squared(seen.sd) - squared(constant_sd_);
   if (frames_ == 0) {
     off_ = off;
-    variance_ = squared(seen.sd);
+    variance_ = of_picture;
     scatter_ = squared(kScatter_px);
     frames_ = 1;
     return;
   }
   const double surprise = (off - off_).dot(seen.axis);
   frames_ = std::min(frames_ + 1, kStageMemory);
-  const double expected = variance_ + squared(seen.sd);
+  const double expected = variance_ + of_picture;
   scatter_ = std::max(0.0, scatter_ + (surprise * surprise - expected - scatter_) / frames_);
   const double gain = variance_ / (expected + scatter_);
   off_ += gain * (off - off_);
   variance_ *= 1 - gain;
+}
+
+void TipByStage::compare(const NeedlePose& seen) {
+  if (!moved_ || cv::norm(*moved_) > kResting_px) {
+    return;
+  }
+  const Rest now{*stage_, seen.tip};
+  if (!rest_) {
+    rest_ = now;
+  }
+  const double moved = (now.stage - rest_->stage).dot(seen.axis);
+  if (std::abs(moved) > kMoved_px) {
+    picture_stays_ = std::abs((now.tip - rest_->tip).dot(seen.axis)) < kStayed * std::abs(moved);
+    rest_ = now;
+  }
 }
 
 }  // namespace punctum::vision

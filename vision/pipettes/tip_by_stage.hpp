@@ -20,14 +20,24 @@ class TipByStage {
   // Takes in how far off the stage is. Only while nothing touches the tip.
   void learn(const NeedlePose& seen);
   [[nodiscard]] double sd() const;  // of tip() along the axis, px
+  // The manipulator has moved the needle, and what is seen as its tip stayed: it is something else.
+  [[nodiscard]] bool picture_stays() const { return picture_stays_; }
 
  private:
+  void compare(const NeedlePose& seen);
+
+  struct Rest {
+    Point stage, tip;
+  };
   std::optional<Point> stage_, moved_;
-  Point off_;              // of the stage: tip in the picture minus stage, px
-  double variance_ = 0;    // of off_ along the axis, px^2
-  double scatter_ = 0;     // variance of the stage from frame to frame, px^2
-  int frames_ = 0;         // that it was learnt from
-  int disagreements_ = 0;  // frames in a row
+  Point off_;                 // of the stage: tip in the picture minus stage, px
+  double variance_ = 0;       // of off_ along the axis, px^2
+  double constant_sd_ = 0;    // of the picture that off_ was learnt from
+  double scatter_ = 0;        // variance of the stage from frame to frame, px^2
+  int frames_ = 0;            // that it was learnt from
+  int disagreements_ = 0;     // frames in a row
+  std::optional<Rest> rest_;  // the last one
+  bool picture_stays_ = false;
 };
 
 }  // namespace punctum::vision

@@ -56,6 +56,7 @@ struct ModelInWorld {
   Vec3 tip{60e-6, 5e-6, 0};
   int latency = 80;
   bool seeing = true;
+  double R_sd_m = 0, a_sd_m = 0;
   double noise_m = 0, error_m = 0;  // of an observation: what it says, and what it has
   std::array<Vec3, 1024> past{};
   std::uint64_t tick = 0;
@@ -69,6 +70,8 @@ struct ModelInWorld {
     if (seeing && tick % 40 == 0 && tick > static_cast<std::uint64_t>(latency)) {
       Observation o = world.see(past[(tick - latency) % 1024], now - latency * kTick_ns);
       o.noise_m = noise_m;
+      o.R_sd_m = R_sd_m;
+      o.a_sd_m = a_sd_m;
       o.gap_m += error_m;
       used = model.observe(o, false);
     }
@@ -132,13 +135,48 @@ TEST(LocalMembraneModel, follows_doubtful_observations_where_there_are_no_others
   EXPECT_LT(std::abs(b.error()), 0.2e-6);
 }
 
+TEST(LocalMembraneModel, tells_how_well_it_knows_the_depth) {
+  ModelInWorld b;
+  EXPECT_EQ(b.model.depth_sd_m(), 0) << "of no cell";
+  b.noise_m = 0.5e-6;
+  b.R_sd_m = 0.2e-6;
+  b.a_sd_m = 0.3e-6;
+  while (!b.model.membrane().known) {
+    b.step();
+  }
+  const double first_m = b.model.depth_sd_m();
+  EXPECT_NEAR(first_m, 0.5e-6, 0.05e-6);
+  for (int k = 0; k < 2000; ++k) {
+    b.step();
+  }
+  const double followed_m = b.model.depth_sd_m();
+  EXPECT_LT(followed_m, 0.7 * first_m) << "many pictures say more than one";
+  EXPECT_EQ(b.model.R_sd_m(), 0.2e-6);
+  EXPECT_EQ(b.model.seen_a_sd_m(), 0.3e-6);
+  b.seeing = false;
+  for (int k = 0; k < 3000; ++k) {
+    b.step();
+  }
+  EXPECT_GT(b.model.depth_sd_m(), 1.5 * followed_m) << "and an old one less";
+  b.model.restart(b.now);
+  EXPECT_EQ(b.model.depth_sd_m(), 0);
+  EXPECT_EQ(b.model.R_sd_m(), 0);
+}
+
 TEST(LocalMembraneModel, refuses_a_deviation_that_is_none) {
   ModelInWorld b;
   for (int k = 0; k < 500; ++k) {
     b.step();
   }
-  for (const double noise_m : {std::numeric_limits<double>::quiet_NaN(), -1e-7}) {
+  constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  for (const auto& [noise_m, R_sd_m, a_sd_m] : {std::array{kNaN, 0.0, 0.0},
+                                                {-1e-7, 0.0, 0.0},
+                                                {0.0, kNaN, 0.0},
+                                                {0.0, -1e-7, 0.0},
+                                                {0.0, 0.0, kNaN}}) {
     b.noise_m = noise_m;
+    b.R_sd_m = R_sd_m;
+    b.a_sd_m = a_sd_m;
     const Vec3 entry = b.model.membrane().entry_m;
     b.error_m = 2e-6;
     for (int k = 0; k < 200; ++k) {

@@ -17,7 +17,8 @@ struct Told {
     rendering = std::make_unique<Rendering>(config);
   }
   void publish() {
-    writer.publish({now, 5, readings, requested, velocity, cell, task, *rendering, safety, set_point});
+    writer.publish(
+        {now, 5, readings, requested, velocity, cell, task, *rendering, modulus, safety, set_point});
   }
   // A second of damping at 1 cm/s.
   void render() {
@@ -34,6 +35,7 @@ struct Told {
   CellFacts cell;
   TaskFacts task;
   std::unique_ptr<Rendering> rendering;
+  ModulusEstimate modulus{.E_Pa = 30e3, .sd_Pa = 2e3};
   SafetyOutput safety;
   hal::StageCommand set_point{.tip_m = Vec3(4, 5, 6)};
   TelemetryWriter writer{station->station};
@@ -54,6 +56,23 @@ TEST(TelemetryWriter, publishes_one_sample_per_tick_with_the_time_since_the_firs
   EXPECT_EQ(s.v_m_s[2], 3);
   EXPECT_EQ(s.cmd_m[0], 4);
   EXPECT_EQ(s.obs_age_s, -1);
+}
+
+TEST(TelemetryWriter, tells_the_standard_deviations) {
+  Told t;
+  t.cell.depth_sd_m = 1;
+  t.cell.R_sd_m = 2;
+  t.cell.observed_a_m = 3;
+  t.cell.observed_a_sd_m = 4;
+  t.publish();
+  const TelemetrySample& s = t.writer.sample();
+  EXPECT_EQ(s.wd_sd_m, 1);
+  EXPECT_EQ(s.R_sd_m, 2);
+  EXPECT_EQ(s.obs_a_m, 3);
+  EXPECT_EQ(s.obs_a_sd_m, 4);
+  EXPECT_EQ(s.E_fit_Pa, 30e3);
+  EXPECT_EQ(s.E_fit_sd_Pa, 2e3);
+  EXPECT_EQ(s.tip_force_sd_N, 0) << "no membrane";
 }
 
 TEST(TelemetryWriter, tells_each_effect_in_the_place_that_the_list_gives_it) {

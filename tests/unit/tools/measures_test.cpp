@@ -228,6 +228,32 @@ TEST(Measures, the_needle_is_where_the_core_last_saw_it_and_unknown_where_it_saw
   EXPECT_EQ(Measures(scene_of("free")).whereabouts().where, Whereabouts::no_cell);
 }
 
+TEST(Measures, keeps_the_last_modulus_of_each_cell) {
+  Measures m(scene_of("icsi"));
+  rt::TelemetrySample s;
+  const auto tick = [&](std::uint32_t cell, rt::Phase phase, double E_Pa) {
+    s.tick++;
+    s.t_s += 1e-3;
+    s.cell = cell;
+    s.phase = phase;
+    s.E_fit_Pa = E_Pa;
+    s.E_fit_sd_Pa = 0.1 * E_Pa;
+    m.tick(s, nullptr);
+  };
+  tick(0, rt::Phase::indentation, 20e3);
+  tick(0, rt::Phase::indentation, 30e3);
+  tick(0, rt::Phase::clear, 0);
+  tick(1, rt::Phase::indentation, 50e3);
+  tick(2, rt::Phase::indentation, 0);
+  m.finish();
+  ASSERT_EQ(m.cells.size(), 3U);
+  EXPECT_EQ(m.cells[0].E_fit_Pa, 30e3);
+  EXPECT_EQ(m.cells[0].E_fit_sd_Pa, 3e3);
+  EXPECT_EQ(m.cells[2].E_fit_Pa, 0);
+  EXPECT_EQ(m.E_fit_Pa.n, 2U);
+  EXPECT_NEAR(m.E_fit_Pa.mean, 40e3, 1e-6);
+}
+
 TEST(Measures, eight_hours_of_cells_take_no_more_memory_than_one) {
   const Scene scene = scene_of("icsi");
   Measures m(scene);

@@ -90,7 +90,8 @@ TEST_F(RecorderTest, every_column_holds_what_it_is_called_after) {
     fill(effect);
   }
   fill(s.guard_N, s.wd_m, s.a_m, s.R_m, s.tip_force_N, s.sigma_d_Pa, s.pressure_Pa, s.obs_age_s, s.sensor_N,
-       s.vacuum_Pa, s.stored_energy_J, s.injected_energy_J, s.obs_gap_m);
+       s.vacuum_Pa, s.stored_energy_J, s.injected_energy_J, s.obs_gap_m, s.wd_sd_m, s.R_sd_m,
+       s.tip_force_sd_N, s.obs_a_m, s.obs_a_sd_m, s.E_fit_Pa, s.E_fit_sd_Pa);
   s.phase = rt::Phase::injection;
   s.fault = rt::Fault::tip_force;
   s.stop = rt::StopStage::stopping;
@@ -122,7 +123,14 @@ TEST_F(RecorderTest, every_column_holds_what_it_is_called_after) {
                                                      {"injected_energy_J", s.injected_energy_J},
                                                      {"injector_open", 1},
                                                      {"sensor_N", s.sensor_N},
-                                                     {"vacuum_Pa", s.vacuum_Pa}};
+                                                     {"vacuum_Pa", s.vacuum_Pa},
+                                                     {"wd_sd_m", s.wd_sd_m},
+                                                     {"R_sd_m", s.R_sd_m},
+                                                     {"tip_force_sd_N", s.tip_force_sd_N},
+                                                     {"obs_a_m", s.obs_a_m},
+                                                     {"obs_a_sd_m", s.obs_a_sd_m},
+                                                     {"E_fit_Pa", s.E_fit_Pa},
+                                                     {"E_fit_sd_Pa", s.E_fit_sd_Pa}};
   const auto vector = [&wanted](const std::string& name, const std::string& unit, const double (&v)[3]) {
     for (int i = 0; i < 3; ++i) {
       wanted.emplace_back(name + "xyz"[i] + unit, v[i]);

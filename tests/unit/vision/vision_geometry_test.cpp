@@ -145,11 +145,25 @@ TEST(HalfWidth, is_where_the_depth_has_fallen_to_one_percent) {
     const double s = 1 - u * u / 900;
     profile.push_back({u, s > 0 ? 12 * s * s : 0});
   }
-  const auto a = half_width(profile, 12, 4.6, 73);
+  const auto a = half_width(profile, 12, 4.6, 73, 0);
   ASSERT_TRUE(a);
-  EXPECT_NEAR(*a, 30 * std::sqrt(0.9), 1.0);
-  EXPECT_FALSE(half_width(profile, 0, 4.6, 73));
-  EXPECT_FALSE(half_width({}, 12, 4.6, 73));
+  EXPECT_NEAR(a->a, 30 * std::sqrt(0.9), 1.0);
+  EXPECT_EQ(a->sd, 0);
+  EXPECT_FALSE(half_width(profile, 0, 4.6, 73, 0));
+  EXPECT_FALSE(half_width({}, 12, 4.6, 73, 0));
+}
+
+TEST(HalfWidth, is_as_certain_as_the_profile_is_steep_where_it_ends) {
+  // A cone: its depth falls by 0.4 per px, so an error of 0.2 in the depth is one of 0.5 px in the width of
+  // each side, and of 0.5/sqrt(2) in their mean.
+  std::vector<ProfilePoint> profile;
+  for (double u = -80; u <= 80; u += 0.5) {
+    profile.push_back({u, 12 - 0.4 * std::abs(u)});
+  }
+  const auto a = half_width(profile, 12, 4.6, 73, 0.2);
+  ASSERT_TRUE(a);
+  EXPECT_NEAR(a->a, (12 - 0.12) / 0.4, 0.1);
+  EXPECT_NEAR(a->sd, 0.5 / std::sqrt(2), 0.02);
 }
 
 }  // namespace

@@ -120,7 +120,27 @@ TEST_F(Needle, ends_where_it_ends_when_it_leaves_the_plane_of_focus_and_comes_ba
     const NeedlePose seen = look(d);
     ASSERT_TRUE(seen.ok) << i << seen.reason;
     EXPECT_NEAR(seen.tip.x, d.tip, 3) << i << ", blur " << d.blur;
+    EXPECT_LT(std::abs(seen.tip.x - d.tip), 3 * seen.sd) << i << ", blur " << d.blur;
   }
+}
+
+TEST_F(Needle, is_the_less_certain_the_further_it_is_out_of_focus) {
+  Drawing d;
+  approach(d);
+  const double in_focus = look(d).sd;
+  EXPECT_LT(in_focus, 1);
+  int doubtful = 0;
+  for (; d.blur < 4; d.blur += 0.1) {
+    const NeedlePose seen = look(d);
+    if (d.blur > 2 && seen.ok) {
+      EXPECT_GT(seen.sd, in_focus + 0.2) << d.blur;
+    }
+    if (d.blur > 3.2 && seen.ok) {  // more than any that is tried
+      ++doubtful;
+      EXPECT_GT(seen.sd, 5) << d.blur;
+    }
+  }
+  EXPECT_GT(doubtful, 3);
 }
 
 TEST_F(Needle, is_told_from_granules_that_were_there_before_it_came) {

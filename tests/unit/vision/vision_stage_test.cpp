@@ -57,6 +57,28 @@ TEST_F(StageTip, is_off_by_what_nothing_but_clear_frames_tell) {
   EXPECT_NEAR(told_.moved()->x, -1, 1e-12);
 }
 
+// A needle whose walls end 0.8 px before its glass in every frame: stage and picture share that.
+TEST_F(StageTip, is_no_more_certain_than_the_picture_that_it_was_learnt_from) {
+  std::normal_distribution<double> noise(0, 0.2);
+  const auto seen = [&] {
+    NeedlePose pose = seen_at({x_ + noise(random_), 100}, std::hypot(0.25, 0.8));
+    pose.constant_sd = 0.8;
+    return pose;
+  };
+  for (int k = 0; k < 60; ++k) {
+    x_ -= 1;
+    told_.begin(Point(x_ - 40, 103));
+    told_.learn(seen());
+  }
+  EXPECT_GT(told_.sd(), 0.8);
+  EXPECT_LT(told_.sd(), 0.85);
+  NeedlePose aside = seen();
+  aside.tip.x = x_ + 1;
+  const NeedlePose both = told_.most_likely(aside);
+  EXPECT_NEAR(both.tip.x, x_, 0.25) << "what is the same in every frame gives the picture no less weight";
+  EXPECT_GT(both.sd, 0.8);
+}
+
 TEST_F(StageTip, holds_against_a_picture_that_is_drawn_aside) {
   approach(20);
   for (int k = 0; k < 200; ++k) {
@@ -81,6 +103,40 @@ TEST_F(StageTip, is_given_up_where_the_needle_has_slipped) {
   }
   EXPECT_NEAR(last.x, x_ + 12, 1e-12);
   EXPECT_FALSE(told_.tip());
+}
+
+// Out of focus the end of a needle is seen 10 px too far back, and said to be within 6 px.
+TEST_F(StageTip, holds_against_a_picture_that_says_how_wrong_it_may_be) {
+  approach(20);
+  for (int k = 0; k < 60; ++k) {
+    told_.begin(Point(x_ - 40, 103));
+    EXPECT_NEAR(told_.most_likely(seen_at({x_ + 10, 100}, 6)).tip.x, x_, 0.5) << k;
+  }
+}
+
+// A speck on the needle looks like its end, and stays while the needle goes on.
+TEST_F(StageTip, tells_that_the_picture_stays_where_the_needle_is_moved_on) {
+  for (int k = 0; k < 40; ++k) {
+    x_ -= 0.3;
+    told_.begin(Point(x_ - 40, 103));
+    told_.learn(seen_at({500, 100 + 0.2 * k}, 0.25));  // aside it follows the shaft
+    EXPECT_EQ(told_.picture_stays(), k > 14) << k << ": told once it was moved by 4 px";
+    if (told_.picture_stays()) {
+      return;
+    }
+  }
+  ADD_FAILURE() << "never told";
+}
+
+TEST_F(StageTip, does_not_tell_so_of_a_needle_that_is_seen_late_or_thinly) {
+  std::normal_distribution<double> noise(0, 0.5);
+  for (int k = 0; k < 400; ++k) {
+    const double speed = k % 100 < 20 ? 8 : 0.3;  // a camera that is two frames late
+    x_ -= speed;
+    told_.begin(Point(x_ - 40, 103));
+    told_.learn(seen_at({x_ + 2 * speed + noise(random_), 100}, 0.9));
+    EXPECT_FALSE(told_.picture_stays()) << k;
+  }
 }
 
 TEST_F(StageTip, is_learnt_anew_where_the_stage_jumps) {

@@ -732,7 +732,7 @@ TEST(ToObservation, is_in_metres_from_the_middle_of_the_picture) {
   r.needle.tip = {320.5, 200};
   r.needle.axis = {-1, 0};
   r.outer.ok = true;
-  r.undeformed = Circle{{219.5, 199.5}, 60, 0};
+  r.undeformed = Circle{{219.5, 199.5}, 60, 0, 0.5};
   r.gap_px = -12.5;
   r.wd_px = 12.5;
   r.contact = true;

@@ -1,0 +1,416 @@
+#include "vision/membrane/common_shape.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+#include <utility>
+
+#include "hal/math/elementary.hpp"
+#include "vision/image/median.hpp"
+#include "vision/image/periodic_smoothing.hpp"
+
+namespace punctum::vision {
+
+namespace {
+
+constexpr int kRounds = 2;  // shape and places in turn; a third makes no contour measurably better
+constexpr double kFurthestPlace_px = 2.5;  // a place further from the contour is another edge's
+constexpr int kLeastSamples = 12;          // of a profile
+constexpr std::ptrdiff_t kPadding = 8;     // samples beyond either end of the shape that a place may reach
+constexpr double kLeastShare = 0.35;       // of the points must be seen
+constexpr double kLeastLikeness = 0.5;     // median share of a profile's variance that the shape explains
+constexpr double kTukey = 4.7;             // times the scale: 95 % efficiency for normally distributed errors
+constexpr double kLeastScale_px = 0.05;
+constexpr double kGainReach = 0.04;  // of the circumference to either side, over which contrast is averaged
+// A place follows the samples that tell it, so that little is left of what they err by.
+constexpr double kMostTrust = 3;
+constexpr double kGrain = 0.6;  // per point, for granules of about 2 px
+// Of the variance of the noise: samples between pixels and the weights of the places leave so much.
+constexpr double kSampledNoise = 0.5;
+constexpr double kClip = 1.3;        // times the spread: Huber's limit
+constexpr double kBesideLine = 0.1;  // weight of a place beside a line that is not its own
+constexpr double kCommon_px = 0.03;  // sd of what is wrong alike all round: the steps are no perfect model
+constexpr double kSoft = 0.02;       // of the stiffness, where the membrane may have any shape
+
+// Mean of the middle half: as robust as is needed against impurities, and less noisy than the median.
+double middle_mean(std::vector<double>& v) {
+  if (v.size() < 8) {
+    return 0;
+  }
+  const auto quarter = static_cast<std::ptrdiff_t>(v.size() / 4);
+  std::nth_element(v.begin(), v.begin() + quarter, v.end());
+  std::nth_element(v.begin() + quarter, v.end() - quarter, v.end());
+  double sum = 0;
+  for (auto it = v.begin() + quarter; it != v.end() - quarter; ++it) {
+    sum += *it;
+  }
+  return sum / static_cast<double>(v.end() - v.begin() - 2 * quarter);
+}
+
+float sum_of(const Lanes& v) { return (v[0] + v[1]) + (v[2] + v[3]); }
+
+}  // namespace
+
+double stiffness_of(double modes, double soft, std::size_t points) {
+  const double wave = static_cast<double>(points) / (2 * std::numbers::pi * modes);
+  return wave * wave * (wave * wave) * math::pow(kSoft, soft);
+}
+
+CommonShape::CommonShape(const EdgeProfiles& profiles, const std::vector<double>& soft, const EdgeShape& edge)
+    : profiles_(profiles),
+      soft_(soft),
+      beside_(edge.beside),
+      modes_(edge.modes),
+      least_lasting_(edge.lasting),
+      trust_(profiles.samples, 1.0F),
+      place_(profiles.points),
+      raw_(profiles.points),
+      weight_(profiles.points),
+      gain_(profiles.points, 1.0),
+      gain_raw_(profiles.points, 1.0),
+      noise_(profiles.points),
+      misfit_(profiles.points),
+      likeness_(profiles.points),
+      padded_(profiles.samples + 2 * kPadding),
+      padded_slope_(padded_.size()),
+      moved_shape_(profiles.samples),
+      moved_slope_(profiles.samples) {}
+
+bool CommonShape::find() {
+  average_first();
+  for (int round = 0; round < kRounds; ++round) {
+    if (!place_all()) {
+      return false;
+    }
+    smooth_places();
+    average();
+  }
+  values_.clear();
+  for (std::size_t i = 0; i < profiles_.points; ++i) {
+    if (weight_[i] > 0) {
+      values_.push_back(likeness_[i]);
+    }
+  }
+  return median_in_place(values_) > kLeastLikeness;
+}
+
+// Of every second profile as it is.
+void CommonShape::average_first() {
+  shape_.resize(profiles_.samples);
+  for (std::size_t j = 0; j < profiles_.samples; ++j) {
+    values_.clear();
+    for (std::size_t i = 0; i < profiles_.points; i += 2) {
+      if (profiles_.whole(i) && soft_[i] < 0.5) {
+        const Lanes& grey = profiles_.grey_of(i / kSideBySide)[j];
+        values_.push_back(static_cast<double>(grey[static_cast<int>(i % kSideBySide)]));
+      }
+    }
+    shape_[j] = middle_mean(values_);
+  }
+}
+
+// Of the profiles put where the shape is, level and gain taken off, and of what is within the usual spread;
+// what lies further out counts as if it lay there.
+void CommonShape::average() {
+  const auto m = static_cast<int>(profiles_.samples);
+  std::vector<Lanes> sum(profiles_.samples, Lanes{}), low(sum), high(sum);
+  for (std::size_t j = 0; j < profiles_.samples; ++j) {
+    const double most = kClip * spread_[j];
+    low[j] = static_cast<float>(shape_[j] - most) + Lanes{};
+    high[j] = static_cast<float>(shape_[j] + most) + Lanes{};
+  }
+  float used = 0;
+  for (std::size_t g = 0; g < profiles_.groups; ++g) {
+    Lanes scale{}, use{};
+    for (std::size_t l = 0, i = g * kSideBySide; l < kSideBySide && i < profiles_.points; ++l, ++i) {
+      if (profiles_.whole(i) && soft_[i] < 0.5) {
+        scale[static_cast<int>(l)] = static_cast<float>(1 / gain_[i]);
+        use[static_cast<int>(l)] = 1;
+      }
+    }
+    used += sum_of(use);
+    const double by = place_of_group(g) / EdgeProfiles::kStep_px, last = m - 1.001;
+    const int whole = static_cast<int>(std::floor(by));
+    const float u = static_cast<float>(by - whole);
+    const Lanes* row = profiles_.grey_of(g);
+    for (int j = 0; j < m; ++j) {
+      const int low_sample = std::clamp(j + whole, 0, m - 2);
+      const float part = j + by <= 0 ? 0 : j + by >= last ? 1 : u;
+      const Lanes x = scale * (row[low_sample] + part * (row[low_sample + 1] - row[low_sample]));
+      const auto k = static_cast<std::size_t>(j);
+      sum[k] += use * (x < low[k] ? low[k] : x > high[k] ? high[k] : x);
+    }
+  }
+  for (std::size_t j = 0; j < profiles_.samples; ++j) {
+    shape_[j] = used > 0 ? static_cast<double>(sum_of(sum[j]) / used) : 0;
+  }
+}
+
+void CommonShape::trust_samples() {
+  double usual = 0;
+  for (const double s : spread_) {
+    usual += s * s / static_cast<double>(spread_.size());
+  }
+  for (std::size_t j = 0; j < trust_.size(); ++j) {
+    const double square = spread_[j] * spread_[j];
+    trust_[j] = static_cast<float>(usual / std::max(square, usual / kMostTrust + 1e-9));
+  }
+}
+
+// Neighbouring places differ little: one step of Gauss and Newton from their mean leads to each of them.
+double CommonShape::place_of_group(std::size_t group) const {
+  const auto from = place_.begin() + static_cast<std::ptrdiff_t>(group * kSideBySide);
+  const auto to = std::min(from + kSideBySide, place_.end());
+  return std::accumulate(from, to, 0.0) / static_cast<double>(to - from);
+}
+
+// The shape and its slope (per px) at the samples of a profile whose place that is.
+void CommonShape::move_shape(double place_px) {
+  const double shift = place_px / EdgeProfiles::kStep_px, whole = std::ceil(shift);
+  const auto u = static_cast<float>(whole - shift);
+  const std::ptrdiff_t from = kPadding - static_cast<std::ptrdiff_t>(whole);
+  const float *shape = padded_.data() + from, *slope = padded_slope_.data() + from;
+  for (std::size_t j = 0; j < profiles_.samples; ++j) {
+    moved_shape_[j] = shape[j] + u * (shape[j + 1] - shape[j]);
+    moved_slope_[j] = slope[j] + u * (slope[j + 1] - slope[j]);
+  }
+}
+
+CommonShape::Products CommonShape::products(std::size_t group) const {
+  const Lanes *grey = profiles_.grey_of(group), *seen = profiles_.seen_in(group);
+  Products p{};
+  for (std::size_t j = 0; j < profiles_.samples; ++j) {
+    const float w = trust_[j], t = moved_shape_[j], s = moved_slope_[j], wt = w * t, ws = w * s;
+    p.one += w * seen[j];
+    p.shape += wt * seen[j];
+    p.slope += ws * seen[j];
+    p.shape_shape += wt * t * seen[j];
+    p.shape_slope += wt * s * seen[j];
+    p.slope_slope += ws * s * seen[j];
+    p.untrusted += s * s * seen[j];
+    p.grey += w * grey[j];
+    p.grey_shape += wt * grey[j];
+    p.grey_slope += ws * grey[j];
+    p.grey_grey += w * grey[j] * grey[j];
+  }
+  return p;
+}
+
+// Places all profiles, each with its neighbourhood's contrast: of one profile alone contrast and place are
+// hard to tell apart. False: too little of the edge is seen, or it is another one.
+bool CommonShape::place_all() {
+  const std::size_t n = profiles_.samples;
+  const auto end = padded_.begin() + kPadding + static_cast<std::ptrdiff_t>(n);
+  std::fill_n(padded_.begin(), kPadding, static_cast<float>(shape_.front()));
+  std::transform(shape_.begin(), shape_.end(), padded_.begin() + kPadding,
+                 [](double v) { return static_cast<float>(v); });
+  std::fill(end, padded_.end(), static_cast<float>(shape_.back()));
+  constexpr float kPerTwoSamples = 0.5F / static_cast<float>(EdgeProfiles::kStep_px);
+  for (std::size_t k = 1; k + 1 < padded_.size(); ++k) {
+    padded_slope_[k] = kPerTwoSamples * (padded_[k + 1] - padded_[k - 1]);
+  }
+  double shape_energy = 0;
+  for (const float slope : padded_slope_) {
+    shape_energy += static_cast<double>(slope * slope);
+  }
+  if (!(shape_energy > 0)) {
+    return false;
+  }
+  std::size_t used = 0;
+  std::vector<Products> sums(profiles_.groups);
+  for (std::size_t g = 0; g < profiles_.groups; ++g) {
+    move_shape(place_of_group(g));
+    sums[g] = products(g);
+    for (std::size_t i = g * kSideBySide; i < std::min((g + 1) * kSideBySide, profiles_.points); ++i) {
+      const bool seen = compare(i, sums[g], shape_energy);
+      weight_[i] = seen ? 1 : 0;
+      used += seen ? 1 : 0;
+    }
+  }
+  average_gains();
+  std::vector<Lanes> square(n, Lanes{}), count(square);  // of what the shape leaves, per sample
+  for (std::size_t g = 0; g < profiles_.groups; ++g) {
+    place(g, sums[g], square, count);
+  }
+  spread_.resize(n);
+  for (std::size_t j = 0; j < n; ++j) {
+    const float seen = sum_of(count[j]);
+    spread_[j] = seen > 0 ? std::sqrt(static_cast<double>(sum_of(square[j]) / seen)) : 0;
+  }
+  trust_samples();
+  return static_cast<double>(used) >= kLeastShare * static_cast<double>(profiles_.points);
+}
+
+// Level, gain and place of one profile that fit best, all at once. False: too little of the edge is seen.
+bool CommonShape::compare(std::size_t i, const Products& sums, double shape_energy) {
+  const auto of = [l = static_cast<int>(i % kSideBySide)](const Lanes& v) {
+    return static_cast<double>(v[l]);
+  };
+  if (profiles_.seen_of[i] < kLeastSamples || of(sums.untrusted) < 0.5 * shape_energy) {
+    return false;
+  }
+  // Without level.
+  const double n = of(sums.one), t = of(sums.shape) / n, s = of(sums.slope) / n, v = of(sums.grey);
+  const double tt = of(sums.shape_shape) - n * t * t, ts = of(sums.shape_slope) - n * t * s;
+  const double ss = of(sums.slope_slope) - n * s * s, spread = of(sums.grey_grey) - v * v / n;
+  const double vt = of(sums.grey_shape) - v * t, vs = of(sums.grey_slope) - v * s;
+  const double det = tt * ss - ts * ts;
+  if (!(det > 0)) {
+    return false;
+  }
+  const double gain = (vt * ss - vs * ts) / det, of_slope = (vs * tt - vt * ts) / det;
+  if (!(gain > 0)) {
+    return false;
+  }
+  gain_raw_[i] = std::clamp(gain, 0.2, 5.0);
+  const double left = std::max(0.0, spread - gain * vt - of_slope * vs);
+  likeness_[i] = spread > 0 ? std::max(0.0, 1 - left / spread) : 0;
+  misfit_[i] = std::sqrt(left / n);
+  return true;
+}
+
+// With the gain that is given: one step, and what the shape then leaves.
+void CommonShape::place(std::size_t group, const Products& sums, std::vector<Lanes>& square,
+                        std::vector<Lanes>& count) {
+  const double at = place_of_group(group);
+  Lanes used{}, level{}, gain{}, gain_step{}, mean_slope{};
+  const std::size_t first = group * kSideBySide;
+  for (std::size_t i = first; i < std::min(first + kSideBySide, profiles_.points); ++i) {
+    const int l = static_cast<int>(i - first);
+    raw_[i] = place_[i];
+    if (weight_[i] > 0) {
+      const auto of = [l](const Lanes& v) { return static_cast<double>(v[l]); };
+      const double n = of(sums.one), g = gain_[i], s = of(sums.slope) / n,
+                   ss = of(sums.slope_slope) - n * s * s;
+      const double rest =
+          of(sums.grey_slope) - of(sums.grey) * s - g * (of(sums.shape_slope) - of(sums.shape) * s);
+      const double step = -rest / (g * ss);
+      raw_[i] = std::clamp(at + step, -kFurthestPlace_px, kFurthestPlace_px);
+      used[l] = 1;
+      gain[l] = static_cast<float>(g);
+      gain_step[l] = static_cast<float>(g * step);
+      level[l] = static_cast<float>((of(sums.grey) - g * of(sums.shape)) / n + g * step * s);
+      mean_slope[l] = static_cast<float>(s);
+      noise_[i] = kSampledNoise / (EdgeProfiles::kStep_px * g * g * ss * ss);
+    }
+  }
+  move_shape(at);
+  const Lanes *grey = profiles_.grey_of(group), *seen = profiles_.seen_in(group);
+  Lanes pulled{};
+  for (std::size_t j = 0; j < profiles_.samples; ++j) {
+    const Lanes here = used * seen[j];
+    const Lanes rest = grey[j] - level - gain * moved_shape_[j] + gain_step * moved_slope_[j];
+    square[j] += here * rest * rest;
+    count[j] += here;
+    const Lanes pull = here * trust_[j] * (moved_slope_[j] - mean_slope);
+    pulled += pull * pull;
+  }
+  for (std::size_t i = first; i < std::min(first + kSideBySide, profiles_.points); ++i) {
+    noise_[i] *= static_cast<double>(pulled[static_cast<int>(i - first)]);
+  }
+}
+
+// Over so many points that those of a group have one in common.
+void CommonShape::average_gains() {
+  const std::size_t n = profiles_.points;
+  const auto reach = static_cast<std::size_t>(kGainReach * static_cast<double>(n));
+  for (std::size_t first = 0; first < n; first += kSideBySide) {
+    values_.clear();
+    for (std::size_t k = n + kSideBySide / 2 - reach; k <= n + kSideBySide / 2 + reach; k += 2) {
+      const std::size_t q = (first + k) % n;
+      if (weight_[q] > 0) {
+        values_.push_back(gain_raw_[q]);
+      }
+    }
+    if (values_.size() >= 4) {
+      const std::size_t end = std::min(first + kSideBySide, n);
+      std::fill(gain_.begin() + first, gain_.begin() + end, median_in_place(values_));
+    }
+  }
+}
+
+void CommonShape::smooth_places() {
+  const std::size_t n = profiles_.points;
+  values_.clear();
+  for (std::size_t i = 0; i < n; ++i) {
+    if (weight_[i] > 0) {
+      values_.push_back(misfit_[i]);
+    }
+  }
+  const double usual = std::max(median_in_place(values_), 1e-3);
+  stiffness_.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    // An impurity on the edge makes the profile fit badly, and pulls.
+    const double bad = 2 * std::max(0.0, misfit_[i] / usual - 1);
+    weight_[i] *= std::min(1.0, gain_[i] * gain_[i]) / (1 + bad * bad);
+    if (!beside_.empty() && beside_[i] != 0) {
+      weight_[i] *= kBesideLine;
+    }
+    stiffness_[i] = stiffness_of(modes_, soft_[i], n);
+  }
+  robust_ = weight_;
+  for (int round = 0; round < 2; ++round) {
+    place_ = smooth_periodic(raw_, robust_, stiffness_);
+    values_.clear();
+    for (std::size_t i = 0; i < n; ++i) {
+      if (weight_[i] > 0) {
+        values_.push_back(std::abs(raw_[i] - place_[i]));
+      }
+    }
+    const double limit = kTukey * std::max(kSdOfMedian * median_in_place(values_), kLeastScale_px);
+    for (std::size_t i = 0; i < n; ++i) {
+      const double t = (raw_[i] - place_[i]) / limit;
+      robust_[i] = std::abs(t) < 1 ? weight_[i] * std::pow(1 - t * t, 2) : 0;
+    }
+  }
+  place_ = smooth_periodic(raw_, robust_, stiffness_);
+  for (double& p : place_) {
+    p = std::clamp(p, -kFurthestPlace_px, kFurthestPlace_px);
+  }
+}
+
+// The raw places scatter by the picture's noise, which differs from point to point and from frame to frame,
+// and by what is beside the edge, of which neighbours see the same and the next frames, too.
+CommonShape::Variance CommonShape::variance(double noise, EdgeLearnt& mean) const {
+  const std::size_t n = profiles_.points;
+  double points = 0, weight = 0, square = 0, weights = 0, difference = 0, by_noise = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::size_t next = (i + 1) % n;
+    const double w = robust_[i], off = raw_[i] - place_[i];
+    if (w > 0) {
+      points += 1;
+      weight += w;
+      square += w * off * off;
+      by_noise += w * noise * noise * noise_[i];
+      const double both = std::sqrt(w * robust_[next]);
+      weights += both;
+      difference += 0.5 * both * std::pow(off - raw_[next] + place_[next], 2);
+    }
+  }
+  constexpr int kMemory = 40;  // frames
+  const double part = 1.0 / (mean.frames = std::min(mean.frames + 1, kMemory));
+  mean.square += part * (square / weight - mean.square);  // some are seen, or there would be no shape
+  mean.difference += part * (difference / std::max(weights, 1e-9) - mean.difference);
+  by_noise /= weight;
+  // What neighbours have in common falls off by kGrain from point to point. Of waves that are long against
+  // its kernel K the smoothing takes all: of the scatter 2 K(0) - K * K(0), times what is in common.
+  const double wave = static_cast<double>(n) / (2 * std::numbers::pi * modes_);
+  double scatter = mean.square, together = 1;
+  for (int round = 0; round < 4; ++round) {
+    scatter = mean.square / (1 - std::min(0.6, 0.44 * together / wave));
+    together = 1 + 2 / (1 - kGrain) * std::max(0.0, 1 - mean.difference / std::max(scatter, 1e-9));
+  }
+  scatter *= together;
+  by_noise = std::min(scatter, by_noise);
+  const double lasting = std::max(scatter - by_noise, least_lasting_ * scatter);
+  Variance out{variance_of_smoothing(robust_, stiffness_), std::vector<double>(n)};
+  for (std::size_t i = 0; i < n; ++i) {
+    out.all[i] += 1 / points;  // of the steps in the mean profile
+    out.lasting[i] = lasting * out.all[i] + kCommon_px * kCommon_px;
+    out.all[i] = by_noise * out.all[i] + out.lasting[i];
+  }
+  return out;
+}
+
+}  // namespace punctum::vision

@@ -188,12 +188,12 @@ TEST_F(Scenes, every_scene_costs_the_same_without_its_tables) {
 // The functions that the processor called, whatever vision reports about itself.
 TEST_F(Scenes, vision_calls_nothing_for_what_is_left_out) {
   report::InjectionPlan plan;
-  plan.gap_m = 18e-6;
+  plan.gap_m = 16e-6;
   plan.approach_m_s = 200e-6;
   const report::SimulatedInjection injection = report::simulate_injection(plan);
   const fs::path frames = folder_ / "frames";
   fs::create_directories(frames);
-  constexpr std::size_t kFrames = 3;  // 18, 10 and 2 um before the cell: 22, 12 and 2 px
+  constexpr std::size_t kFrames = 3;  // 16, 8 and 0 um before the cell
   ASSERT_GT(injection.pixels.size(), kFrames);
   for (std::size_t i = 0; i < kFrames; ++i) {
     std::ofstream out(frames / (std::to_string(i) + ".pgm"), std::ios::binary);

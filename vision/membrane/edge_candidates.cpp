@@ -22,6 +22,10 @@ constexpr double kOvalDeviation = 0.055;  // of the radius, rms: a cell is nearl
 // A start is refined by the search that follows it: here half as many rays and samples as there do.
 constexpr int kStartAngles = 128;
 constexpr double kCoarse_px = 1;
+// By its sign an edge is followed finely: the two faces of a thin membrane are closer than coarse samples
+// tell.
+constexpr int kFineAngles = 256;
+constexpr double kFine_px = 0.5;
 constexpr double kSameCentre_px = 1.5;  // the edge round it is the same
 
 struct Radii {
@@ -34,13 +38,14 @@ struct Radii {
         expected(circle.r) {}
 };
 
-EdgeBand band_round(const Point& centre, const Radii& radii, const ClearedPicture& picture) {
+EdgeBand band_round(const Point& centre, const Radii& radii, int angles, double finest_px,
+                    const ClearedPicture& picture) {
   const double width = radii.to - radii.from;
   EdgeBand band;
   band.centre = centre;
-  band.step = std::max(kCoarse_px, width / 80);
+  band.step = std::max(finest_px, finest_px * width / 80);
   band.half_width = width / 2;
-  band.middle.assign(kStartAngles, (radii.from + radii.to) / 2);
+  band.middle.assign(static_cast<std::size_t>(angles), (radii.from + radii.to) / 2);
   band.slope = 1.5;
   band.stiffness = 0.5;
   band.covered = picture.covered;
@@ -119,7 +124,8 @@ std::optional<ClosedEdge> closed_edge_round(const Circle& circle, bool seeded, d
                     [&](const Point& p) { return cv::norm(p - centre) < kSameCentre_px; })) {
       return std::nullopt;
     }
-    edge = edge_in(band_round(centre, radii, picture), picture, Polarity::any, saturation);
+    edge = edge_in(band_round(centre, radii, kStartAngles, kCoarse_px, picture), picture, Polarity::any,
+                   saturation);
     if (edge.path.r.empty()) {
       return std::nullopt;
     }
@@ -151,11 +157,11 @@ std::optional<MainEdge> edge_by_its_sign(const ClosedEdge& any, const Circle& ci
       }
     }
   };
-  EdgeBand band = band_round(any.centre, Radii(circle, seeded, config), picture);
+  EdgeBand band = band_round(any.centre, Radii(circle, seeded, config), kFineAngles, kFine_px, picture);
   follow_signs(band);
   if (best.edge.polarity == Polarity::any) {  // another edge has more of one sign: near this one alone
     constexpr double kNear_px = 6;
-    band.middle = any.path.r;
+    band.middle = polar_radii(from_polar(any.centre, any.path.r), any.centre, kFineAngles);
     band.half_width = kNear_px;
     follow_signs(band);
     best.edge.path.background = any.path.background;

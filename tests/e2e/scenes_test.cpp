@@ -189,7 +189,7 @@ TEST_F(Scenes, every_scene_costs_the_same_without_its_tables) {
 TEST_F(Scenes, vision_calls_nothing_for_what_is_left_out) {
   report::InjectionPlan plan;
   plan.gap_m = 16e-6;
-  plan.approach_m_s = 200e-6;
+  plan.approach_m_s = plan.indentation_m_s = 200e-6;
   const report::SimulatedInjection injection = report::simulate_injection(plan);
   const fs::path frames = folder_ / "frames";
   fs::create_directories(frames);

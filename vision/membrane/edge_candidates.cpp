@@ -114,12 +114,12 @@ bool nearly_oval(const std::vector<double>& r) {
 std::optional<ClosedEdge> closed_edge_round(const Circle& circle, bool seeded, double saturation,
                                             std::vector<Point>& tried, const ClearedPicture& picture,
                                             const VisionConfig& config) {
-  constexpr int kRounds = 6;
+  constexpr int kCentrings = 6;
   constexpr double kSettled_px = 0.5;
   const Radii radii(circle, seeded, config);
   ClosedEdge edge;
   Point centre = circle.centre;
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kCentrings; ++round) {
     if (std::any_of(tried.begin(), tried.end(),
                     [&](const Point& p) { return cv::norm(p - centre) < kSameCentre_px; })) {
       return std::nullopt;

@@ -31,7 +31,7 @@ void Backdrop::learn(const GradientField& field, const NeedlePose& needle) {
     return;
   }
   if (mean_.size() != field.picture) {
-    mean_ = cv::Mat(field.picture, CV_32F, cv::Scalar(kUnknown));
+    mean_ = cv::Mat(field.picture, CV_32F, cv::Scalar(double{kUnknown}));
   }
   near_.create(a.size(), CV_8U);
   near_.setTo(0);

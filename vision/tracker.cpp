@@ -69,10 +69,11 @@ struct Tracker::Impl {
   HoldingPipette holder;
   std::optional<TubeTrace> holder_tube;
   bool template_given = false;
-  int holder_tries = 0;
+  int holder_frames = 0;  // without it
   InjectionPipette needle;
   InjectionPipette::Start needle_search = InjectionPipette::Start::failed;
-  int needle_frames = 0, needle_tries = 0;  // that failed
+  int needle_frames = 0, needle_tries = 0;      // that failed
+  bool needle_due = false, holder_due = false;  // looked for in this frame
   TipByStage by_stage;
   NeedlePose membrane_needle;  // its tip where the membrane on it is seen
   NeedlePose seen_needle;      // as the picture alone tells it
@@ -115,7 +116,9 @@ struct Tracker::Impl {
   // A needle that was seen before and is not seen now may be anywhere: it tells neither contact nor its end.
   [[nodiscard]] bool needle_hidden() const { return needle.started() && !result.needle.ok; }
   [[nodiscard]] bool must_start() const;
+  void decide_searches();
   [[nodiscard]] cv::Rect area_to_search(bool starting) const;
+  [[nodiscard]] std::vector<Side> holder_sides() const;
   void search_needle();
   void locate_needle();
   void learn_needle();
@@ -169,6 +172,7 @@ const Result& Tracker::Impl::process(const hal::Frame& frame, const std::optiona
   result.noise = picture.noise;
   by_stage.begin(config.method == Method::tracker ? stage : std::nullopt);
   const bool starting = must_start();
+  decide_searches();
   picture.compute_gradient(area_to_search(starting));
   result.us.prepare = watch.lap_us();
 
@@ -224,15 +228,35 @@ const Result& Tracker::Impl::process(const hal::Frame& frame, const std::optiona
 
 bool Tracker::Impl::must_start() const { return outer.known ? outer.lost() : !inner.known || inner.lost(); }
 
-// The whole picture while something must be found; then the surroundings of cell and needle.
+// Of a faint needle not every frame shows the end: the first tries follow each other.
+void Tracker::Impl::decide_searches() {
+  needle_due = config.needle && !needle.started() &&
+               (needle_tries < kNeedleAtOnce || needle_frames++ % kNeedleEvery == 0 ||
+                needle_search == InjectionPipette::Start::more_to_do);
+  holder_due = config.holder && !holder_tube && holder_frames++ % kHolderEvery == 0;
+}
+
+// It enters through the border opposite to the needle's.
+std::vector<Side> Tracker::Impl::holder_sides() const {
+  const Side known = config.needle && needle.started() ? needle.side() : config.needle_from;
+  return known == Side::automatic ? std::vector{Side::left, Side::right} : std::vector{opposite(known)};
+}
+
+// The whole picture while cell or needle must be found; then their surroundings, and what lies between the
+// cell and the holding pipette's border while that is looked for.
 cv::Rect Tracker::Impl::area_to_search(bool starting) const {
   const cv::Rect whole(0, 0, width, height);
-  if (starting || (config.needle && (!needle.started() || !tip.last))) {
+  if (starting || needle_due || (needle.started() && !tip.last)) {
     return whole;
   }
   const FollowedMembrane& cell = outer.known ? outer : inner;
   cv::Rect2d box = square_round(cell.centre, 1.1 * *std::max_element(cell.r.begin(), cell.r.end()) + 22);
-  if (config.needle) {
+  if (holder_due) {
+    for (const Side side : holder_sides()) {
+      box |= cv::Rect2d(side == Side::left ? 0 : width - 1, box.y, 1, box.height);
+    }
+  }
+  if (needle.started()) {
     constexpr double kShaft_px = 180;  // of the shaft tell its direction
     box |= square_round(*tip.last, 40);
     box |= square_round(*tip.last - kShaft_px * tip.axis, 24) & cv::Rect2d(0, 0, width, height);
@@ -241,10 +265,8 @@ cv::Rect Tracker::Impl::area_to_search(bool starting) const {
                           static_cast<int>(box.height));
 }
 
-// Of a faint needle not every frame shows the end: the first tries follow each other.
 void Tracker::Impl::search_needle() {
-  const bool at_once = needle_tries < kNeedleAtOnce, due = needle_frames++ % kNeedleEvery == 0;
-  if (needle.started() || !(at_once || due || needle_search == InjectionPipette::Start::more_to_do)) {
+  if (!needle_due) {
     return;
   }
   // A membrane at the tip of a faint needle looks like its end.
@@ -252,7 +274,8 @@ void Tracker::Impl::search_needle() {
     return !outer.known || cv::norm(end - outer.centre) > median_of(outer.r) + kUntouched_px;
   };
   do {
-    needle_search = needle.advance_start(picture.field, picture.noise, clear_at, at_once);
+    needle_search =
+        needle.advance_start(picture.field, picture.noise, clear_at, needle_tries < kNeedleAtOnce);
   } while (first_picture && needle_search == InjectionPipette::Start::more_to_do);
   needle_tries += needle_search == InjectionPipette::Start::failed ? 1 : 0;
 }
@@ -307,14 +330,9 @@ void Tracker::Impl::learn_needle() {
 }
 
 void Tracker::Impl::locate_holder() {
-  if (!holder_tube && picture.field.area.width == width && holder_tries++ % kHolderEvery == 0) {
-    // It enters through the border opposite to the needle's.
-    const Side known = config.needle && needle.started() ? needle.side() : config.needle_from;
-    std::vector<Side> sides{Side::left, Side::right};
-    if (known != Side::automatic) {
-      sides = {opposite(known)};
-    }
-    holder_tube = find_holder_tube(picture.field, sides, height, config.px(config.R_max_m), picture.noise);
+  if (holder_due) {
+    holder_tube =
+        find_holder_tube(picture.field, holder_sides(), height, config.px(config.R_max_m), picture.noise);
   }
   if (!holder.has_template()) {
     result.holder.reason = holder_tube ? holder.cut_template(picture.grey, *holder_tube, picture.noise)

@@ -179,6 +179,19 @@ INSTANTIATE_TEST_SUITE_P(Cases, Vesicles,
                                          Vesicle{"small", "snapshot-image_8bit.png", {{187, 115}, 77, 0}}),
                          [](const auto& one) { return std::string(one.param.name); });
 
+TEST(SceneChange, sees_one_scene_in_frames_that_show_nothing_but_their_noise) {
+  cv::Mat before(485, 727, CV_8U), now(485, 727, CV_8U);
+  for (const double noise : {1.0, 5.0, 20.0}) {
+    cv::RNG random(3);
+    for (cv::Mat* m : {&before, &now}) {
+      random.fill(*m, cv::RNG::NORMAL, 130, noise);
+    }
+    EXPECT_GT(similarity(before, now), kSameScene) << noise;
+    cv::circle(now, {360, 240}, 80, cv::Scalar(100), cv::FILLED);
+    EXPECT_LT(similarity(before, now), kSameScene) << noise;
+  }
+}
+
 TEST(SceneChange, tells_stills_of_different_cells_from_frames_of_one_sequence) {
   SKIP_WITHOUT("icsi")
   SKIP_WITHOUT("zebrafish-timelapse")

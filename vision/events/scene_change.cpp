@@ -1,20 +1,41 @@
 #include "vision/events/scene_change.hpp"
 
+#include <algorithm>
 #include <opencv2/imgproc.hpp>
+
+#include "vision/image/noise.hpp"
 
 namespace punctum::vision {
 
+namespace {
+
+// What is left of a picture that is shrunk to `size`, about its mean.
+struct Small {
+  cv::Mat relief;
+  bool even = false;  // it varies, but no more than its noise does
+
+  Small(const cv::Mat& grey, const cv::Size& size) {
+    cv::resize(grey, relief, size, 0, 0, cv::INTER_AREA);
+    relief.convertTo(relief, CV_32F);
+    relief -= cv::mean(relief);
+    constexpr double kRounding = 0.3;  // sd of a whole number of grey levels
+    const double averaged = static_cast<double>(grey.total()) / size.area();
+    const double noise = noise_level(grey), least = 4 * (noise * noise / averaged + kRounding * kRounding);
+    const double varies = relief.dot(relief);
+    even = varies > 0 && varies <= least * size.area();
+  }
+};
+
+}  // namespace
+
 double similarity(const cv::Mat& before, const cv::Mat& now) {
-  const cv::Size small(std::min(32, before.cols), std::min(32, before.rows));
-  cv::Mat a, b;
-  cv::resize(before, a, small, 0, 0, cv::INTER_AREA);
-  cv::resize(now, b, small, 0, 0, cv::INTER_AREA);
-  a.convertTo(a, CV_32F);
-  b.convertTo(b, CV_32F);
-  a -= cv::mean(a);
-  b -= cv::mean(b);
-  const double both = cv::norm(a) * cv::norm(b);
-  return both > 0 ? a.dot(b) / both : 0;
+  const cv::Size size(std::min(32, before.cols), std::min(32, before.rows));
+  const Small a(before, size), b(now, size);
+  if (a.even && b.even) {
+    return 1;
+  }
+  const double both = cv::norm(a.relief) * cv::norm(b.relief);
+  return both > 0 ? a.relief.dot(b.relief) / both : 0;
 }
 
 }  // namespace punctum::vision

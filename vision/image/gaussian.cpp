@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "hal/math/elementary.hpp"
+#include "vision/image/dispatched.hpp"
 
 namespace punctum::vision {
 
@@ -30,7 +31,7 @@ Weights weights_of(double sigma) {
 
 // Of nine rows of n numbers; one long expression, which a compiler computes for several x at once.
 using Rows = std::array<const float*, 2 * kReach + 1>;
-void blend(const Rows& r, const Weights& w, int n, float* out) {
+PUNCTUM_WIDE_LOOP void blend(const Rows& r, const Weights& w, int n, float* out) {
   for (int x = 0; x < n; ++x) {
     out[x] = w[0] * r[4][x] + w[1] * (r[3][x] + r[5][x]) + w[2] * (r[2][x] + r[6][x]) +
              w[3] * (r[1][x] + r[7][x]) + w[4] * (r[0][x] + r[8][x]);

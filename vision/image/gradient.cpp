@@ -4,8 +4,10 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
+#include <utility>
 #include <vector>
 
+#include "vision/image/dispatched.hpp"
 #include "vision/image/gaussian.hpp"
 
 namespace punctum::vision {
@@ -13,15 +15,15 @@ namespace punctum::vision {
 namespace {
 
 // Sobel's mask in two steps, in loops of which a compiler makes several steps at once.
-void across_rows(const float* above, const float* here, const float* below, int n, float* sum,
-                 float* difference) {
+PUNCTUM_WIDE_LOOP void across_rows(const float* above, const float* here, const float* below, int n,
+                                   float* sum, float* difference) {
   for (int x = 0; x < n; ++x) {
     sum[x] = 0.125F * (above[x] + 2 * here[x] + below[x]);
     difference[x] = 0.125F * (below[x] - above[x]);
   }
 }
 
-void along_rows(const float* sum, const float* difference, int n, float* gx, float* gy) {
+PUNCTUM_WIDE_LOOP void along_rows(const float* sum, const float* difference, int n, float* gx, float* gy) {
   for (int x = 0; x < n; ++x) {
     gx[x] = sum[x + 1] - sum[x - 1];
     gy[x] = difference[x - 1] + 2 * difference[x] + difference[x + 1];
@@ -41,9 +43,11 @@ void GradientField::compute(const cv::Mat& grey_in, cv::Rect wanted, double sigm
     sobel.release();
     return;
   }
+  for (auto [field, memory] : {std::pair(&smooth, &kept_[0]), std::pair(&gx, &kept_[1]),
+                               std::pair(&gy, &kept_[2]), std::pair(&sobel, &kept_[3])}) {
+    *field = memory->part(picture, area.size(), CV_32F);
+  }
   smooth_part(grey_in, area, sigma, smooth);
-  gx.create(area.size(), CV_32F);
-  gy.create(area.size(), CV_32F);
   std::vector<float> sum(static_cast<std::size_t>(area.width) + 2), difference(sum);
   for (int y = 0; y < area.height; ++y) {
     const float *above = smooth.ptr<float>(std::max(y - 1, 0)), *here = smooth.ptr<float>(y),

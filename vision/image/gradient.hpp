@@ -1,9 +1,11 @@
 // Smoothed picture and its gradient, sampled between pixels.
 #pragma once
 
+#include <array>
 #include <opencv2/core.hpp>
 
 #include "vision/image/contour.hpp"
+#include "vision/image/kept_memory.hpp"
 
 namespace punctum::vision {
 
@@ -50,6 +52,9 @@ struct GradientField {
     }
     return Bilinear(x, y).of(smooth);
   }
+
+ private:
+  std::array<KeptMemory, 4> kept_;
 };
 
 }  // namespace punctum::vision

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "vision/image/dispatched.hpp"
 #include "vision/image/impurities.hpp"
 #include "vision/image/noise.hpp"
 #include "vision/image/polar_contour.hpp"
@@ -40,17 +41,23 @@ bool has_contrast(const cv::Mat& grey) {
 }
 
 // Rows of n pixels; short loops, which the compiler vectorises.
-void above(const float* v, int n, float limit, std::uint8_t* out) {
+PUNCTUM_WIDE_LOOP void above(const float* v, int n, float limit, std::uint8_t* out) {
   for (int i = 0; i < n; ++i) {
     out[i] = v[i] > limit ? 255 : 0;
   }
 }
 
-template <class T>
-void without(const T* v, const std::uint8_t* hidden, int n, T* out) {
+PUNCTUM_WIDE_LOOP void without(const std::uint8_t* v, const std::uint8_t* hidden, int n, std::uint8_t* out) {
   for (int i = 0; i < n; ++i) {
-    const T here = v[i];
-    out[i] = hidden[i] > 0 ? T{0} : here;
+    const std::uint8_t here = v[i];
+    out[i] = hidden[i] > 0 ? std::uint8_t{0} : here;
+  }
+}
+
+PUNCTUM_WIDE_LOOP void without(const float* v, const std::uint8_t* hidden, int n, float* out) {
+  for (int i = 0; i < n; ++i) {
+    const float here = v[i];
+    out[i] = hidden[i] > 0 ? 0.0F : here;
   }
 }
 
@@ -117,9 +124,9 @@ int ClearedPicture::cover_impurities(const std::vector<Contour>& membranes, doub
 // Sets strong, edge, and open_: what is strong and not covered.
 void ClearedPicture::find_strong(double threshold) {
   const cv::Rect& a = field.area;
-  strong.create(a.size(), CV_8U);
-  open_.create(a.size(), CV_8U);
-  edge.create(a.size(), CV_32F);
+  strong = kept_strong_.part(grey.size(), a.size(), CV_8U);
+  open_ = kept_open_.part(grey.size(), a.size(), CV_8U);
+  edge = kept_edge_.part(grey.size(), a.size(), CV_32F);
   for (int y = 0; y < a.height; ++y) {
     const float* sobel = field.sobel.ptr<float>(y);
     const std::uint8_t* hides = covered.ptr(a.y + y) + a.x;

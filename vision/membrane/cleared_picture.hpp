@@ -54,6 +54,7 @@ struct ClearedPicture {
   void find_strong(double threshold);
 
   cv::Mat open_;  // CV_8U, field.area: 255 = strong gradient that is not covered
+  KeptMemory kept_strong_, kept_open_, kept_edge_;
 };
 
 }  // namespace punctum::vision

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
 #include "hal/math/elementary.hpp"
 #include "vision/image/correlation.hpp"
-#include "vision/pipettes/narrow_tube.hpp"
 #include "vision/pipettes/needle_end.hpp"
 #include "vision/pipettes/needle_walls.hpp"
 
@@ -58,25 +58,10 @@ std::array<double, 2> faces(const GradientField& field, const NeedlePose& needle
   return out;
 }
 
-// As fit_walls, from a pose whose width is not certain.
-double fit_walls_at_start(const GradientField& field, double noise, double radius_px, NeedlePose& needle) {
-  const NeedlePose traced = needle;
-  double straight = -1;
-  // Noise may have hidden the walls near the end; a speck beside a wall draws the tube aside.
-  constexpr double kSurely = 0.9;
-  for (const double reach : {kWallReach_px, kWallReachAtStart_px}) {
-    for (const double wider : {1.0, 0.7, 0.5}) {
-      NeedlePose tried = traced;
-      tried.half_width *= wider;
-      const double s = straight < kSurely ? fit_walls(field, noise, radius_px, tried, kLongest_px, reach) : 0;
-      if (s > straight) {
-        straight = s;
-        needle = tried;
-      }
-    }
-  }
-  // It may hold on to the inner face of one wall: then both faces have the same sense, and on one side there
-  // is another face further out, about as strong, of the opposite sense.
+// It may hold on to the inner face of one wall: then both faces have the same sense, and on one side there
+// is another face further out, about as strong, of the opposite sense.
+void look_further_out(const GradientField& field, double noise, double radius_px, NeedlePose& needle,
+                      double& straight) {
   constexpr double kWider_px = 1.5, kNearlyAs = 0.1, kAsStrong = 0.6;
   for (const double side : {-1.0, 1.0}) {
     const auto [low, high] = faces(field, needle);
@@ -95,7 +80,15 @@ double fit_walls_at_start(const GradientField& field, double noise, double radiu
       straight = s;
     }
   }
-  return straight;
+}
+
+// At the end of its walls, about the end of the tube.
+void put_at_end(const GradientField& field, double noise, const TubeTrace& tube, double ahead,
+                NeedlePose& needle) {
+  const double back = std::min(30.0, 0.5 * tube.length);
+  if (const auto s = end_of_profile(field, needle, back, ahead, noise)) {
+    needle.tip += *s * needle.axis;
+  }
 }
 
 }  // namespace
@@ -119,8 +112,10 @@ bool InjectionPipette::cut_template(const GradientField& field) {
 }
 
 bool InjectionPipette::start(const GradientField& field, double noise, const Clear& clear_at) {
-  sides_traced_ = 0;
+  sides_looked_at_ = 0;
+  trace_.reset();
   tube_.reset();
+  walls_tried_.reset();
   Start start = Start::more_to_do;
   while (start == Start::more_to_do) {
     start = advance_start(field, noise, clear_at, false);
@@ -133,14 +128,18 @@ InjectionPipette::Start InjectionPipette::advance_start(const GradientField& fie
   if (trace_next_side(field, noise)) {
     return Start::more_to_do;
   }
-  bool found = false;
-  if (tube_) {
-    found = begin_at_end_of(*tube_, field, noise, clear_at);
-  } else {
+  if (!tube_) {
     reason_ = "no narrow tube enters through the border";
+    sides_looked_at_ = 0;
+    return Start::failed;
   }
-  if (found || !tube_ || !keep_tube) {
-    sides_traced_ = 0;
+  if (fit_walls_further(field, noise)) {
+    return Start::more_to_do;
+  }
+  const bool found = begin_at_end(field, noise, clear_at);
+  walls_tried_.reset();
+  if (found || !keep_tube) {
+    sides_looked_at_ = 0;
     tube_.reset();
   }
   return found ? Start::found : Start::failed;
@@ -148,36 +147,70 @@ InjectionPipette::Start InjectionPipette::advance_start(const GradientField& fie
 
 // False when both borders were traced before, or the one that is known.
 bool InjectionPipette::trace_next_side(const GradientField& field, double noise) {
+  if (trace_) {
+    if (!trace_->advance(field)) {
+      return true;
+    }
+    const auto t = trace_->tube(field);
+    trace_.reset();
+    if (t && t->edge_share > 0.5 && t->similarity > 0.5 && t->length > 12 &&
+        (!tube_ || t->edge_share * t->similarity > tube_->edge_share * tube_->similarity)) {
+      tube_ = t;
+    }
+    return true;
+  }
   constexpr Side kSides[] = {Side::right, Side::left};
   const int sides = side_ == Side::automatic ? 2 : 1;
-  if (sides_traced_ == sides) {
+  if (sides_looked_at_ == sides) {
     return false;
   }
-  const Side side = sides == 1 ? side_ : kSides[sides_traced_];
-  ++sides_traced_;
-  const auto t = trace_narrow_tube(field, side, 3, std::max(22.0, 8 * radius_px_), noise);
-  if (t && t->edge_share > 0.5 && t->similarity > 0.5 && t->length > 12 &&
-      (!tube_ || t->edge_share * t->similarity > tube_->edge_share * tube_->similarity)) {
-    tube_ = t;
+  const Side side = sides == 1 ? side_ : kSides[sides_looked_at_];
+  ++sides_looked_at_;
+  if (const auto crossing = narrow_tube_at_border(field, side, 3, std::max(22.0, 8 * radius_px_), noise)) {
+    trace_.emplace(*crossing);
   }
   return true;
 }
 
-bool InjectionPipette::begin_at_end_of(const TubeTrace& tube, const GradientField& field, double noise,
-                                       const Clear& clear_at) {
-  last_ = {};
-  last_.axis = tube.axis;
-  last_.half_width = tube.end_half_width;
-  last_.taper = std::clamp((tube.half_width - tube.end_half_width) / std::max(tube.length, 1.0), 0.0, 0.2);
-  last_.tip = tube.end();
-  double straight = 0;
-  for (int round = 0; round < 3; ++round) {
-    straight = round == 0 ? fit_walls_at_start(field, noise, radius_px_, last_)
-                          : fit_walls(field, noise, radius_px_, last_, kLongest_px);
-    const double back = std::min(30.0, 0.5 * tube.length), ahead = round == 0 ? 25 : 10;
-    if (const auto s = end_of_profile(field, last_, back, ahead, noise)) {
-      last_.tip += *s * last_.axis;
+// The width of what was traced is not certain. False when all was tried.
+bool InjectionPipette::fit_walls_further(const GradientField& field, double noise) {
+  // Noise may have hidden the walls near the end; a speck beside a wall draws the tube aside.
+  constexpr double kReaches[] = {kWallReach_px, kWallReachAtStart_px};
+  constexpr double kSurely = 0.9;
+  NeedlePose traced;
+  traced.axis = tube_->axis;
+  traced.half_width = tube_->end_half_width;
+  traced.taper =
+      std::clamp((tube_->half_width - tube_->end_half_width) / std::max(tube_->length, 1.0), 0.0, 0.2);
+  traced.tip = tube_->end();
+  if (!walls_tried_) {
+    walls_tried_ = {traced, -1, 0};
+  }
+  if (walls_tried_->reaches == std::size(kReaches)) {
+    return false;
+  }
+  const double reach = kReaches[walls_tried_->reaches++];
+  for (const double wider : {1.0, 0.7, 0.5}) {
+    NeedlePose tried = traced;
+    tried.half_width *= wider;
+    const double s =
+        walls_tried_->straight < kSurely ? fit_walls(field, noise, radius_px_, tried, kLongest_px, reach) : 0;
+    if (s > walls_tried_->straight) {
+      walls_tried_->straight = s;
+      walls_tried_->needle = tried;
     }
+  }
+  return true;
+}
+
+bool InjectionPipette::begin_at_end(const GradientField& field, double noise, const Clear& clear_at) {
+  last_ = walls_tried_->needle;
+  double straight = walls_tried_->straight;
+  look_further_out(field, noise, radius_px_, last_, straight);
+  put_at_end(field, noise, *tube_, 25, last_);
+  for (int round = 0; round < 2; ++round) {
+    straight = fit_walls(field, noise, radius_px_, last_, kLongest_px);
+    put_at_end(field, noise, *tube_, 10, last_);
   }
   if (straight < kStraight || last_.half_width > 2 * radius_px_ + 1) {
     reason_ = "what enters through the border is not a straight needle";
@@ -212,7 +245,7 @@ bool InjectionPipette::begin_at_end_of(const TubeTrace& tube, const GradientFiel
   }
   last_.ok = true;
   last_.score = 1;
-  found_side_ = tube.side;
+  found_side_ = tube_->side;
   velocity_ = {};
   lost_ = 0;
   started_ = true;

@@ -2,6 +2,7 @@
 // correlation of its tip; its walls are fitted anew in every frame.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <opencv2/core.hpp>
@@ -11,6 +12,7 @@
 #include "vision/config.hpp"
 #include "vision/image/gradient.hpp"
 #include "vision/pipettes/backdrop.hpp"
+#include "vision/pipettes/narrow_tube.hpp"
 #include "vision/pipettes/needle_pose.hpp"
 #include "vision/pipettes/needle_shape.hpp"
 #include "vision/pipettes/tube_trace.hpp"
@@ -27,8 +29,9 @@ class InjectionPipette {
   // else lies near.
   using Clear = std::function<bool(const Point& tip)>;
   [[nodiscard]] bool start(const GradientField& field, double noise, const Clear& clear_at);
-  // The same in parts, each in the picture of its frame: the tube through either border, then its end.
-  // keep_tube: where that end is not a needle's or not clear, the next part looks at it once more.
+  // The same in parts, each in the picture of its frame: what crosses either border, the tube from there,
+  // then its end. keep_tube: where that end is not a needle's or not clear, the next part looks at it once
+  // more.
   enum class Start : std::uint8_t { more_to_do, failed, found };
   [[nodiscard]] Start advance_start(const GradientField& field, double noise, const Clear& clear_at,
                                     bool keep_tube);
@@ -47,8 +50,8 @@ class InjectionPipette {
 
  private:
   [[nodiscard]] bool trace_next_side(const GradientField& field, double noise);
-  [[nodiscard]] bool begin_at_end_of(const TubeTrace& tube, const GradientField& field, double noise,
-                                     const Clear& clear_at);
+  [[nodiscard]] bool fit_walls_further(const GradientField& field, double noise);
+  [[nodiscard]] bool begin_at_end(const GradientField& field, double noise, const Clear& clear_at);
   bool cut_template(const GradientField& field);
   [[nodiscard]] double aside(const GradientField& field, double noise, const NeedlePose& predicted,
                              double correlated) const;
@@ -65,9 +68,16 @@ class InjectionPipette {
   Side side_;
   double radius_px_;
   bool started_ = false;
-  int sides_traced_ = 0;           // in the search for it
+  int sides_looked_at_ = 0;  // in the search for it
+  std::optional<NarrowTubeTrace> trace_;
   std::optional<TubeTrace> tube_;  // the best through those
-  double longest_ = 0;             // of a wall that an edge is averaged over, px
+  struct WallsTried {
+    NeedlePose needle;  // on the straightest
+    double straight;
+    std::size_t reaches;  // that were tried
+  };
+  std::optional<WallsTried> walls_tried_;
+  double longest_ = 0;  // of a wall that an edge is averaged over, px
   Side found_side_ = Side::right;
   std::string reason_;  // why it was not started
   cv::Mat template_;

@@ -21,6 +21,9 @@ constexpr double kLearning = 0.12;                // share of a new profile in t
 constexpr double kContinued = 0.5;                // similarity: the tube goes on
 constexpr double kGiveUp = 8;                     // so far below its best value the sum does not recover
 
+// From the border inwards, px.
+double strip_of(const GradientField& field) { return std::clamp(0.09 * field.area.width, 16.0, 70.0); }
+
 // Takes off mean and slope and scales to unit length. Returns the length before the scaling, 0 for a flat
 // profile.
 double normalise(std::vector<double>& v) {
@@ -46,71 +49,65 @@ double normalise(std::vector<double>& v) {
   return std::sqrt(ss);
 }
 
-// Follows a tube by its cross profile, which it learns on the way.
-class ProfileTracer {
- public:
-  ProfileTracer(const GradientField& field, const TubeTrace& tube)
-      : field_(field),
-        tube_(tube),
-        across_(across_tube(tube.axis)),
-        n_(2 * static_cast<int>(tube.half_width + 5) + 1) {}
+}  // namespace
 
-  // False: the profile at the border is flat.
-  bool learn_at_border(double strip) {
-    learnt_ = profile(tube_.root, strip * 0.8, n_, 1);
-    contrast_ = normalise(learnt_);
-    return contrast_ > 0;
+std::optional<TubeTrace> narrow_tube_at_border(const GradientField& field, Side side, double width_min,
+                                               double width_max, double noise) {
+  constexpr int kLeast_px = 48;
+  if (field.area.width < kLeast_px || field.area.height < kLeast_px) {
+    return std::nullopt;
   }
-  // Returns the index of the last station on the tube: there the sum of (similarity - kContinued) is largest,
-  // so that a short foreign thing across the tube does not end it. Empty: it does not end in the picture.
-  [[nodiscard]] std::optional<std::size_t> follow() {
-    const double longest = 0.85 * field_.area.width / std::abs(tube_.axis.x);
-    double sum = 0, sum_best = 0;
-    std::size_t last = 0;
-    for (double s = 0; s < longest && sum >= sum_best - kGiveUp; s += kStride_px) {
-      step(s);
-      sum += std::clamp(similarity_.back(), -0.5, 1.0) - kContinued;
-      if (sum > sum_best) {
-        sum_best = sum;
-        last = similarity_.size() - 1;
-      }
-    }
-    if (last < 3 || last + 1 >= similarity_.size()) {
-      return std::nullopt;
-    }
-    return last;
+  return border_section(field, side, width_min, width_max, noise, strip_of(field), 0.12, 45);
+}
+
+NarrowTubeTrace::NarrowTubeTrace(const TubeTrace& at_border)
+    : at_border_(at_border),
+      across_(across_tube(at_border.axis)),
+      n_(2 * static_cast<int>(at_border.half_width + 5) + 1) {}
+
+// False: the profile at the border is flat.
+bool NarrowTubeTrace::learn_at_border(const GradientField& field) {
+  learnt_ = profile(field, at_border_.root, strip_of(field) * 0.8, n_, 1);
+  contrast_ = normalise(learnt_);
+  return contrast_ > 0;
+}
+
+// The tube ends where the sum of (similarity - kContinued) is largest, so that a short foreign thing across
+// it does not end it.
+bool NarrowTubeTrace::advance(const GradientField& field) {
+  constexpr int kStationsPerPart = 40;
+  if (learnt_.empty() && !learn_at_border(field)) {
+    return true;
   }
-  // Root, axis, length and similarity, from the stations up to `last`. Empty: they are not on a line.
-  [[nodiscard]] std::optional<TubeTrace> straight_tube(std::size_t last);
-  // Half the distance of the outermost edges of the mean cross profile near the tube's end.
-  [[nodiscard]] double half_width_near_end(const TubeTrace& t) const;
-
- private:
-  void step(double s);
-  [[nodiscard]] std::vector<double> profile(const Point& at, double length, int samples, double apart) const;
-
-  const GradientField& field_;
-  const TubeTrace& tube_;
-  Point across_;
-  int n_;  // samples of a profile, 1 px apart
-  std::vector<double> learnt_;
-  double contrast_ = 0;
-  double lateral_ = 0;  // of the tube at the present station, px
-  std::vector<double> along_, shift_, similarity_;
-};
+  const double longest = 0.85 * field.area.width / std::abs(at_border_.axis.x);
+  for (int part = 0; part < kStationsPerPart; ++part) {
+    const double s = static_cast<double>(along_.size()) * kStride_px;
+    if (s >= longest || sum_ < sum_best_ - kGiveUp) {
+      return true;
+    }
+    step(field, s);
+    sum_ += std::clamp(similarity_.back(), -0.5, 1.0) - kContinued;
+    if (sum_ > sum_best_) {
+      sum_best_ = sum_;
+      last_ = similarity_.size() - 1;
+    }
+  }
+  return false;
+}
 
 // Mean grey over `length` px along the tube; across it, at samples that are `apart` px apart, about `at`.
-std::vector<double> ProfileTracer::profile(const Point& at, double length, int samples, double apart) const {
-  const cv::Rect& a = field_.area;
+std::vector<double> NarrowTubeTrace::profile(const GradientField& field, const Point& at, double length,
+                                             int samples, double apart) const {
+  const cv::Rect& a = field.area;
   std::vector<double> v(static_cast<std::size_t>(samples), 0.0);
   int stations = 0;
   for (double k = 0; k < length; k += kAlongStep_px) {
     ++stations;
     for (int i = 0; i < samples; ++i) {
-      Point q = at + k * tube_.axis + (i - samples / 2) * apart * across_;
+      Point q = at + k * at_border_.axis + (i - samples / 2) * apart * across_;
       q.y = std::clamp(q.y, a.y + 0.0, a.y + a.height - 1.001);
       q.x = std::clamp(q.x, a.x + 0.0, a.x + a.width - 1.001);
-      v[static_cast<std::size_t>(i)] += field_.grey(q);
+      v[static_cast<std::size_t>(i)] += field.grey(q);
     }
   }
   for (double& x : v) {
@@ -119,13 +116,13 @@ std::vector<double> ProfileTracer::profile(const Point& at, double length, int s
   return v;
 }
 
-void ProfileTracer::step(double s) {
+void NarrowTubeTrace::step(const GradientField& field, double s) {
   constexpr int kHalfPixels = 4;  // that it is looked for to either side
   double top = -2, at = lateral_, top_contrast = 0;
   std::vector<double> top_profile;
   // The profiles at all these places share their samples.
-  const std::vector<double> wide = profile(tube_.root + s * tube_.axis + lateral_ * across_, kWindow_px,
-                                           2 * (n_ - 1) + 2 * kHalfPixels + 1, 0.5);
+  const std::vector<double> wide = profile(field, at_border_.root + s * at_border_.axis + lateral_ * across_,
+                                           kWindow_px, 2 * (n_ - 1) + 2 * kHalfPixels + 1, 0.5);
   std::vector<double> v(static_cast<std::size_t>(n_));
   for (int aside = -kHalfPixels; aside <= kHalfPixels; ++aside) {
     const double dl = 0.5 * aside;
@@ -161,38 +158,14 @@ void ProfileTracer::step(double s) {
   }
 }
 
-std::optional<TubeTrace> ProfileTracer::straight_tube(std::size_t last) {
-  TubeTrace t = tube_;
-  double sum = 0;
-  for (std::size_t i = 0; i <= last; ++i) {
-    sum += similarity_[i];
-  }
-  t.similarity = sum / static_cast<double>(last + 1);
-  for (auto* v : {&along_, &shift_, &similarity_}) {
-    v->resize(last + 1);
-  }
-  for (double& weight : similarity_) {
-    weight = std::max(0.0, weight);
-  }
-  const RobustLine middle = fit_robust_line(along_, shift_, similarity_, 2.0);
-  if (middle.rms > 0.15 * t.half_width + 1.0) {
-    return std::nullopt;
-  }
-  t.root += middle.line.offset * across_;
-  t.axis = t.axis + middle.line.slope * across_;
-  t.axis *= 1 / cv::norm(t.axis);
-  t.length = along_[last] + kWindow_px;
-  return t;
-}
-
-double ProfileTracer::half_width_near_end(const TubeTrace& t) const {
+double NarrowTubeTrace::half_width_near_end(const GradientField& field, const TubeTrace& t) const {
   const Point across(-t.axis.y, t.axis.x);
   const double back = std::min(t.length * 0.6, 26.0);
   std::vector<double> tail(static_cast<std::size_t>(n_), 0.0);
   const Point near_end = t.root + (t.length - back) * t.axis;
   for (double k = 0; k < 0.6 * back; k += kAlongStep_px) {
     for (int i = 0; i < n_; ++i) {
-      tail[static_cast<std::size_t>(i)] += field_.grey(near_end + k * t.axis + (i - n_ / 2) * across);
+      tail[static_cast<std::size_t>(i)] += field.grey(near_end + k * t.axis + (i - n_ / 2) * across);
     }
   }
   const auto edge = [&](int i) {
@@ -214,28 +187,32 @@ double ProfileTracer::half_width_near_end(const TubeTrace& t) const {
   return any ? std::clamp(0.5 * (hi - lo), 1.0, t.half_width + 2) : t.half_width;
 }
 
-}  // namespace
-
-std::optional<TubeTrace> trace_narrow_tube(const GradientField& field, Side side, double width_min,
-                                           double width_max, double noise) {
-  if (field.area.width < 48 || field.area.height < 48) {
+std::optional<TubeTrace> NarrowTubeTrace::tube(const GradientField& field) {
+  if (last_ < 3 || last_ + 1 >= similarity_.size()) {
     return std::nullopt;
   }
-  const double strip = std::clamp(0.09 * field.area.width, 16.0, 70.0);
-  const auto section = border_section(field, side, width_min, width_max, noise, strip, 0.12, 45);
-  if (!section) {
+  TubeTrace t = at_border_;
+  double sum = 0;
+  for (std::size_t i = 0; i <= last_; ++i) {
+    sum += similarity_[i];
+  }
+  t.similarity = sum / static_cast<double>(last_ + 1);
+  for (auto* v : {&along_, &shift_, &similarity_}) {
+    v->resize(last_ + 1);
+  }
+  for (double& weight : similarity_) {
+    weight = std::max(0.0, weight);
+  }
+  const RobustLine middle = fit_robust_line(along_, shift_, similarity_, 2.0);
+  if (middle.rms > 0.15 * t.half_width + 1.0) {
     return std::nullopt;
   }
-  ProfileTracer tracer(field, *section);
-  if (!tracer.learn_at_border(strip)) {
-    return std::nullopt;
-  }
-  const auto last = tracer.follow();
-  auto tube = last ? tracer.straight_tube(*last) : std::nullopt;
-  if (tube) {
-    tube->end_half_width = tracer.half_width_near_end(*tube);
-  }
-  return tube;
+  t.root += middle.line.offset * across_;
+  t.axis = t.axis + middle.line.slope * across_;
+  t.axis *= 1 / cv::norm(t.axis);
+  t.length = along_[last_] + kWindow_px;
+  t.end_half_width = half_width_near_end(field, t);
+  return t;
 }
 
 }  // namespace punctum::vision

@@ -1,0 +1,20 @@
+// Pictures of a part whose size changes from frame to frame, in memory that stays.
+#pragma once
+
+#include <opencv2/core.hpp>
+
+namespace punctum::vision {
+
+class KeptMemory {
+ public:
+  // In memory for a picture of size `whole`, so that later parts of it need no other.
+  [[nodiscard]] cv::Mat part(const cv::Size& whole, const cv::Size& size, int type) {
+    memory_.create(1, whole.area(), type);
+    return memory_.colRange(0, size.area()).reshape(0, size.height);
+  }
+
+ private:
+  cv::Mat memory_;
+};
+
+}  // namespace punctum::vision

@@ -12,7 +12,7 @@ namespace {
 // What is left of a picture that is shrunk to `size`, about its mean.
 struct Small {
   cv::Mat relief;
-  bool even = false;  // it varies, but no more than its noise does
+  bool even = false;  // it shows noise and nothing else
 
   Small(const cv::Mat& grey, const cv::Size& size) {
     cv::resize(grey, relief, size, 0, 0, cv::INTER_AREA);
@@ -21,8 +21,8 @@ struct Small {
     constexpr double kRounding = 0.3;  // sd of a whole number of grey levels
     const double averaged = static_cast<double>(grey.total()) / size.area();
     const double noise = noise_level(grey), least = 4 * (noise * noise / averaged + kRounding * kRounding);
-    const double varies = relief.dot(relief);
-    even = varies > 0 && varies <= least * size.area();
+    constexpr double kNoNoise = 0.1;  // noise_level tells as much of a picture without any
+    even = noise > kNoNoise && relief.dot(relief) <= least * size.area();
   }
 };
 

@@ -700,8 +700,8 @@ TEST(Tracker, spreads_the_search_for_what_is_missing_over_frames) {
     return out;
   };
   const auto complete = pictures(true, true, true);
-  // Measured: 1.1 to 1.4. A search that is done at once takes five to ten times as long.
-  constexpr double kMost = 2;
+  // Measured: 0.6 to 1.1, and 1.2 on pictures of another renderer.
+  constexpr double kMost = 1.5;
   for (const auto& [missing, without] :
        {std::pair("cell", pictures(true, false, true)), std::pair("needle", pictures(false, true, true)),
         std::pair("holding pipette", pictures(true, true, false)),

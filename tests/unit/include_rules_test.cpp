@@ -151,6 +151,7 @@ std::vector<Room> house() {
        kTools},
       {"tools/vision/", pictures + Names{"hal/v4l2/", "hal/aravis/"}, kTools},
       {"tools/report/", pictures, kTools},
+      {"tools/jitter/", ground + core + Names{"tools/shared/"}, kTools},
       {"tools/emulators/drive/", {"tools/shared/"}, kTools},
       {"tools/emulators/falcon/", {"tools/shared/"}, kTools},
       {"tools/emulators/positioner/", {"tools/shared/"}, kTools},
@@ -186,6 +187,7 @@ std::vector<Room> house() {
                         "tools/core/",
                         "tools/punctum/",
                         "tools/vision/",
+                        "tools/jitter/",
                         "tools/report/"},
        kTests},
   };

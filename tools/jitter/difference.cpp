@@ -1,0 +1,127 @@
+#include "tools/jitter/difference.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <random>
+
+namespace punctum::jitter {
+namespace {
+
+constexpr std::array kQuantileParts = {0.5, 0.99, 0.999};
+constexpr std::size_t kLeastParts = 8;
+constexpr int kDraws = 2000;
+constexpr double kAlpha = 0.05 / kQuantileParts.size();  // three questions, one answer
+
+using Chosen = std::vector<const Distribution*>;
+using Quantiles = std::array<double, kQuantileParts.size()>;
+
+Distribution together(const Chosen& parts) {
+  Distribution sum;
+  for (const Distribution* part : parts) {
+    if (sum.count.size() < part->count.size()) {
+      sum.count.resize(part->count.size(), 0);
+    }
+    for (std::size_t k = 0; k < part->count.size(); ++k) {
+      sum.count[k] += part->count[k];
+    }
+    sum.longer += part->longer;
+    sum.max_us = std::max(sum.max_us, part->max_us);
+  }
+  return sum;
+}
+
+Quantiles quantiles(const Chosen& parts) {
+  const Distribution sum = together(parts);
+  Quantiles out{};
+  std::transform(kQuantileParts.begin(), kQuantileParts.end(), out.begin(),
+                 [&](double p) { return sum.quantile_us(p); });
+  return out;
+}
+
+Chosen all_of(const Result& r) {
+  Chosen out;
+  for (const Distribution& part : r.parts) {
+    if (part.entries() > 0) {
+      out.push_back(&part);
+    }
+  }
+  return out;
+}
+
+// The generator of the standard with a division of our own: the same draws everywhere.
+std::size_t below(std::mt19937& random, std::size_t n) { return random() % n; }
+
+Chosen drawn_from(const Chosen& parts, std::mt19937& random) {
+  Chosen out(parts.size());
+  std::generate(out.begin(), out.end(), [&] { return parts[below(random, parts.size())]; });
+  return out;
+}
+
+}  // namespace
+
+tl::expected<std::vector<QuantileDifference>, std::string> difference(const Result& a, const Result& b) {
+  const Chosen parts_a = all_of(a), parts_b = all_of(b);
+  if (parts_a.size() < kLeastParts || parts_b.size() < kLeastParts) {
+    return tl::unexpected(fmt::format("{} and {} parts with wake-ups, at least {} each are needed",
+                                      parts_a.size(), parts_b.size(), kLeastParts));
+  }
+  const Quantiles in_a = quantiles(parts_a), in_b = quantiles(parts_b);
+  std::mt19937 random(1);
+  std::array<std::vector<double>, kQuantileParts.size()> drawn;
+  std::array<int, kQuantileParts.size()> as_large{};
+  Chosen mixed = parts_a;
+  mixed.insert(mixed.end(), parts_b.begin(), parts_b.end());
+  for (int draw = 0; draw < kDraws; ++draw) {
+    // How far the difference is certain: parts drawn again from either measurement.
+    const Quantiles now_a = quantiles(drawn_from(parts_a, random)),
+                    now_b = quantiles(drawn_from(parts_b, random));
+    // What chance alone makes of it: the parts dealt out anew.
+    for (std::size_t i = mixed.size(); i > 1; --i) {
+      std::swap(mixed[i - 1], mixed[below(random, i)]);
+    }
+    const auto middle = mixed.begin() + static_cast<std::ptrdiff_t>(parts_a.size());
+    const Quantiles dealt_a = quantiles({mixed.begin(), middle}), dealt_b = quantiles({middle, mixed.end()});
+    for (std::size_t q = 0; q < kQuantileParts.size(); ++q) {
+      drawn[q].push_back(now_b[q] - now_a[q]);
+      as_large[q] += std::abs(dealt_b[q] - dealt_a[q]) >= std::abs(in_b[q] - in_a[q]) ? 1 : 0;
+    }
+  }
+  std::vector<QuantileDifference> out;
+  for (std::size_t q = 0; q < kQuantileParts.size(); ++q) {
+    std::vector<double>& d = drawn[q];
+    std::sort(d.begin(), d.end());
+    const auto at = [&](double p) {
+      return d[static_cast<std::size_t>(std::lround(p * static_cast<double>(d.size() - 1)))];
+    };
+    QuantileDifference one{.part = kQuantileParts[q], .a_us = in_a[q], .b_us = in_b[q]};
+    one.low_us = at(kAlpha / 2);
+    one.high_us = at(1 - kAlpha / 2);
+    const double chance = (as_large[q] + 1.0) / (kDraws + 1.0);
+    one.differs = chance < kAlpha && (one.low_us > 0 || one.high_us < 0);
+    out.push_back(one);
+  }
+  return out;
+}
+
+std::string difference_text(const std::vector<QuantileDifference>& found, const Result& a, const Result& b) {
+  std::string out;
+  if (a.machine != b.machine) {
+    out += "the machines differ:\n  A: " + a.machine + "\n  B: " + b.machine + "\n";
+  }
+  if (a.rate_Hz != b.rate_Hz) {
+    out += fmt::format("the rates differ: A {} Hz, B {} Hz\n", a.rate_Hz, b.rate_Hz);
+  }
+  out += "wake-up, us      A        B    B - A (95 % of all together)\n";
+  for (const QuantileDifference& q : found) {
+    out += fmt::format("p{:<8}{:>9.1f}{:>9.1f}{:>9.1f}  {:.1f} .. {:.1f}{}\n", 100 * q.part, q.a_us, q.b_us,
+                       q.b_us - q.a_us, q.low_us, q.high_us, q.differs ? "  differs" : "");
+  }
+  const bool any = std::any_of(found.begin(), found.end(), [](const auto& q) { return q.differs; });
+  return out + (any ? "they differ\n" : "no difference is shown\n");
+}
+
+}  // namespace punctum::jitter

@@ -1,0 +1,27 @@
+// Whether two measurements differ, and where.
+#pragma once
+
+#include <string>
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "tools/jitter/result.hpp"
+
+namespace punctum::jitter {
+
+struct QuantileDifference {
+  double part = 0;                 // 0.5, 0.99, 0.999
+  double a_us = 0, b_us = 0;       // of either measurement
+  double low_us = 0, high_us = 0;  // b - a lies between these with 95 % confidence for all parts together
+  bool differs = false;
+};
+
+// By the parts of the measurements, which are taken for independent of each other while the wake-ups within
+// one are not. The error: too few parts.
+[[nodiscard]] tl::expected<std::vector<QuantileDifference>, std::string> difference(const Result& a,
+                                                                                    const Result& b);
+
+[[nodiscard]] std::string difference_text(const std::vector<QuantileDifference>& found, const Result& a,
+                                          const Result& b);
+
+}  // namespace punctum::jitter

@@ -1,0 +1,254 @@
+#include "tools/jitter/result.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <stdexcept>
+#include <utility>
+
+namespace punctum::jitter {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr std::size_t kMostBins = 10'000, kMostParts = 1000;
+constexpr std::pair<const char*, double> kQuantiles[] = {
+    {"p50", 0.5}, {"p90", 0.9}, {"p99", 0.99}, {"p99_9", 0.999}, {"p99_99", 0.9999}, {"p99_999", 0.99999}};
+
+// Only bins that hold something: [[bin, count], ...].
+Json json_of(const Distribution& d) {
+  Json bins = Json::array();
+  for (std::size_t k = 0; k < d.count.size(); ++k) {
+    if (d.count[k] > 0) {
+      bins.push_back({k, d.count[k]});
+    }
+  }
+  return {{"bins_us", bins}, {"longer", d.longer}, {"max_us", d.max_us}};
+}
+
+Json with_quantiles(const Distribution& d) {
+  Json out = json_of(d);
+  for (const auto& [name, part] : kQuantiles) {
+    out[name] = d.quantile_us(part);
+  }
+  return out;
+}
+
+template <class T>
+T number(const Json& in, const char* key) {
+  const Json& value = in.at(key);
+  if (!value.is_number()) {
+    throw std::invalid_argument(fmt::format("{}: is not a number", key));
+  }
+  if constexpr (std::is_unsigned_v<T>) {
+    if (!value.is_number_unsigned()) {
+      throw std::invalid_argument(fmt::format("{}: is not a whole number from 0 on", key));
+    }
+  }
+  return value.get<T>();
+}
+
+Distribution distribution(const Json& in) {
+  Distribution out;
+  out.longer = number<std::uint64_t>(in, "longer");
+  out.max_us = number<double>(in, "max_us");
+  if (!(out.max_us >= 0)) {
+    throw std::invalid_argument("max_us: is below 0");
+  }
+  for (const Json& entry : in.at("bins_us")) {
+    if (!entry.is_array() || entry.size() != 2 || !entry[0].is_number_unsigned() ||
+        !entry[1].is_number_unsigned()) {
+      throw std::invalid_argument("bins_us: an entry is not [bin, count]");
+    }
+    const auto bin = entry[0].get<std::uint64_t>();
+    if (bin >= kMostBins) {
+      throw std::invalid_argument(fmt::format("bins_us: bin {}: allowed: 0 .. {}", bin, kMostBins - 1));
+    }
+    if (out.count.size() <= bin) {
+      out.count.resize(bin + 1, 0);
+    }
+    out.count[bin] = entry[1].get<std::uint64_t>();
+  }
+  return out;
+}
+
+}  // namespace
+
+std::uint64_t Distribution::entries() const { return std::accumulate(count.begin(), count.end(), longer); }
+
+double Distribution::quantile_us(double part) const {
+  const std::uint64_t all = entries();
+  if (all == 0) {
+    return 0;
+  }
+  const double wanted = part * static_cast<double>(all);
+  double below = 0;
+  for (std::size_t k = 0; k < count.size(); ++k) {
+    const double here = static_cast<double>(count[k]);
+    if (here > 0 && below + here >= wanted) {
+      return std::min(static_cast<double>(k) + (wanted - below) / here, max_us);
+    }
+    below += here;
+  }
+  return max_us;
+}
+
+std::string json_of(const Result& r) {
+  Json out{{"kind", "punctum-jitter"},
+           {"rate_Hz", r.rate_Hz},
+           {"seconds", r.seconds},
+           {"cpu", r.cpu},
+           {"degraded", r.degraded},
+           {"missing", r.missing},
+           {"ticks", r.ticks},
+           {"missed", r.missed},
+           {"wake_us", with_quantiles(r.wake)},
+           {"tick_us", with_quantiles(r.tick)},
+           {"interval_us", with_quantiles(r.interval)},
+           {"page_faults", {{"minor", r.minor_faults}, {"major", r.major_faults}}},
+           {"switches", {{"voluntary", r.voluntary_switches}, {"involuntary", r.involuntary_switches}}},
+           {"migrations", r.migrations},
+           {"machine", r.machine}};
+  out["allocations"] = r.allocations_watched ? Json(r.allocations) : Json(nullptr);
+  out["spikes"] = Json::array();
+  for (const Spike& s : r.spikes) {
+    out["spikes"].push_back({{"t_s", s.t_s}, {"wake_us", s.wake_us}});
+  }
+  out["parts"] = Json::array();
+  for (const Distribution& part : r.parts) {
+    out["parts"].push_back(json_of(part));
+  }
+  return out.dump(1) + "\n";
+}
+
+tl::expected<Result, std::string> result_of_json(std::string_view text) {
+  try {
+    const Json in = Json::parse(text);
+    if (!in.is_object() || in.value("kind", "") != "punctum-jitter") {
+      return tl::unexpected(std::string("is no result of punctum-jitter --json"));
+    }
+    Result r;
+    r.rate_Hz = number<double>(in, "rate_Hz");
+    r.seconds = number<double>(in, "seconds");
+    r.cpu = number<int>(in, "cpu");
+    r.degraded = in.at("degraded").get<bool>();
+    r.ticks = number<std::uint64_t>(in, "ticks");
+    r.missed = number<std::uint64_t>(in, "missed");
+    r.wake = distribution(in.at("wake_us"));
+    r.tick = distribution(in.at("tick_us"));
+    r.interval = distribution(in.at("interval_us"));
+    r.machine = in.at("machine").get<std::string>();
+    const Json& parts = in.at("parts");
+    if (!parts.is_array() || parts.size() > kMostParts) {
+      return tl::unexpected(fmt::format("parts: allowed: a list of at most {}", kMostParts));
+    }
+    for (const Json& part : parts) {
+      r.parts.push_back(distribution(part));
+    }
+    return r;
+  } catch (const std::exception& e) {
+    return tl::unexpected(std::string(e.what()));
+  }
+}
+
+std::string histogram_text(const Distribution& wake) {
+  std::string out = "# Histogram\n";
+  double sum = 0;
+  std::size_t least = wake.count.size();
+  for (std::size_t k = 0; k < wake.count.size(); ++k) {
+    out += fmt::format("{:06} {:06}\n", k, wake.count[k]);
+    sum += static_cast<double>(k) * static_cast<double>(wake.count[k]);
+    if (wake.count[k] > 0) {
+      least = std::min(least, k);
+    }
+  }
+  const std::uint64_t within = wake.entries() - wake.longer;
+  out += fmt::format("# Total: {:09}\n", within);
+  out += fmt::format("# Min Latencies: {:05}\n", within > 0 ? least : 0);
+  out += fmt::format("# Avg Latencies: {:05}\n",
+                     within > 0 ? std::llround(sum / static_cast<double>(within)) : 0);
+  out += fmt::format("# Max Latencies: {:05}\n", std::llround(std::floor(wake.max_us)));
+  out += fmt::format("# Histogram Overflows: {:05}\n", wake.longer);
+  return out;
+}
+
+namespace {
+
+std::string quantile_line(const char* name, const Distribution& d) {
+  std::string out = fmt::format("{:<10}", name);
+  for (const auto& [label, part] : kQuantiles) {
+    // Fewer entries than it takes for one beyond the quantile tell only the largest.
+    const bool told = static_cast<double>(d.entries()) * (1 - part) >= 1;
+    out += told ? fmt::format("{:>9.1f}", d.quantile_us(part)) : fmt::format("{:>9}", "-");
+  }
+  return out + fmt::format("{:>9.1f}\n", d.max_us);
+}
+
+// One line per class of latency, classes a quarter of an octave wide; the bars are as long as the logarithm
+// of the count, since one late wake-up in a million matters.
+std::string bars(const Distribution& d, int columns) {
+  struct Class {
+    double from, to;
+    std::uint64_t count;
+  };
+  std::vector<Class> classes;
+  std::size_t k = 0;
+  while (k < d.count.size()) {
+    const std::size_t wide = k < 8 ? 1 : std::max<std::size_t>(1, k / 4);
+    const std::size_t end = std::min(k + wide, d.count.size());
+    std::uint64_t sum = 0;
+    for (std::size_t i = k; i < end; ++i) {
+      sum += d.count[i];
+    }
+    classes.push_back({static_cast<double>(k), static_cast<double>(end), sum});
+    k = end;
+  }
+  if (d.longer > 0) {
+    classes.push_back({static_cast<double>(d.count.size()), d.max_us, d.longer});
+  }
+  const auto filled = [](const Class& c) { return c.count > 0; };
+  const auto first = std::find_if(classes.begin(), classes.end(), filled);
+  const auto last = std::find_if(classes.rbegin(), classes.rend(), filled).base();
+  double most = 0;
+  for (const Class& c : classes) {
+    most = std::max(most, std::log10(1.0 + static_cast<double>(c.count)));
+  }
+  std::string out;
+  for (auto c = first; c < last; ++c) {
+    const double part = std::log10(1.0 + static_cast<double>(c->count)) / most;
+    const int length = static_cast<int>(std::lround(part * std::max(10, columns - 32)));
+    out += fmt::format("{:>7.0f} .. {:<7.0f}{:>11} {:#<{}}\n", c->from, c->to, c->count, "", length);
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string summary(const Result& r, int columns) {
+  std::string out = fmt::format("{:.0f} Hz for {:.1f} s: {} ticks, {} releases missed", r.rate_Hz, r.seconds,
+                                r.ticks, r.missed);
+  out += r.degraded ? "; WITHOUT real-time rights\n" : "\n";
+  for (const std::string& one : r.missing) {
+    out += "  missing: " + one + "\n";
+  }
+  out += fmt::format("{:<10}", "us");
+  for (const char* label : {"p50", "p90", "p99", "p99.9", "p99.99", "p99.999", "max"}) {
+    out += fmt::format("{:>9}", label);
+  }
+  out += "\n" + quantile_line("wake-up", r.wake) + quantile_line("tick", r.tick) +
+         quantile_line("interval", r.interval);
+  out +=
+      fmt::format("page faults {} minor, {} major; switches {} voluntary, {} involuntary; migrations {}\n",
+                  r.minor_faults, r.major_faults, r.voluntary_switches, r.involuntary_switches, r.migrations);
+  if (!r.spikes.empty()) {
+    out += fmt::format("worst wake-up {:.1f} us, {:.3f} s after the first tick\n", r.spikes.back().wake_us,
+                       r.spikes.back().t_s);
+  }
+  out += "wake-up, us        count (bars: logarithm)\n" + bars(r.wake, columns);
+  return out;
+}
+
+}  // namespace punctum::jitter

@@ -1,0 +1,60 @@
+// What a measurement found: distributions, spikes, counters and the machine; as JSON, as cyclictest's
+// histogram, and as a figure for the terminal.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <tl/expected.hpp>
+#include <vector>
+
+namespace punctum::jitter {
+
+// Counts of durations in bins of 1 us: count[k] holds [k, k+1) us. What is longer is counted in `longer`.
+struct Distribution {
+  std::vector<std::uint64_t> count;
+  std::uint64_t longer = 0;
+  double max_us = 0;
+
+  [[nodiscard]] std::uint64_t entries() const;
+  // The value that `part` (0 .. 1) of all entries does not exceed, between the edges of its bin; max_us where
+  // it is longer than the bins. 0 without entries.
+  [[nodiscard]] double quantile_us(double part) const;
+};
+
+// A wake-up that was later than all before it.
+struct Spike {
+  double t_s = 0;  // since the first tick
+  double wake_us = 0;
+};
+
+struct Result {
+  double rate_Hz = 0, seconds = 0;
+  int cpu = -1;
+  bool degraded = false;             // a right that real time needs is missing
+  std::vector<std::string> missing;  // which
+  std::uint64_t ticks = 0, missed = 0;
+  Distribution wake;      // release -> wake-up
+  Distribution tick;      // wake-up -> end of the tick
+  Distribution interval;  // end of a tick -> end of the next one
+  std::vector<Spike> spikes;
+  std::uint64_t minor_faults = 0, major_faults = 0, voluntary_switches = 0, involuntary_switches = 0;
+  std::uint64_t migrations = 0, allocations = 0;
+  bool allocations_watched = false;
+  // Wake-ups of equal parts of the measurement: what differs between them is not the machine's.
+  std::vector<Distribution> parts;
+  std::string machine;  // kernel, processor, boot line: two results with the same text are comparable
+};
+
+[[nodiscard]] std::string json_of(const Result& result);
+// The error is one line that says where and what is allowed.
+[[nodiscard]] tl::expected<Result, std::string> result_of_json(std::string_view text);
+
+// As `cyclictest -h` writes it.
+[[nodiscard]] std::string histogram_text(const Distribution& wake);
+
+// Quantiles and the figure, `columns` wide.
+[[nodiscard]] std::string summary(const Result& result, int columns);
+
+}  // namespace punctum::jitter

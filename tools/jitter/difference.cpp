@@ -112,6 +112,9 @@ std::string difference_text(const std::vector<QuantileDifference>& found, const 
   if (a.machine != b.machine) {
     out += "the machines differ:\n  A: " + a.machine + "\n  B: " + b.machine + "\n";
   }
+  if (a.load != b.load) {
+    out += "the loads beside them differ\n";
+  }
   if (a.rate_Hz != b.rate_Hz) {
     out += fmt::format("the rates differ: A {} Hz, B {} Hz\n", a.rate_Hz, b.rate_Hz);
   }

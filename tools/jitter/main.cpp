@@ -14,7 +14,9 @@
 #include <vector>
 
 #include "tools/jitter/audit.hpp"
+#include "tools/jitter/comparison.hpp"
 #include "tools/jitter/difference.hpp"
+#include "tools/jitter/load.hpp"
 #include "tools/jitter/measurement.hpp"
 #include "tools/jitter/result.hpp"
 #include "tools/shared/command_line.hpp"
@@ -76,11 +78,28 @@ int audit(int cpu, int priority) {
   return ready ? kDone : kNotReady;
 }
 
-int measure(const jitter::Wanted& wanted, const std::string& histogram, const std::string& json) {
-  const auto result = jitter::measure(wanted);
+int compare(const jitter::Wanted& wanted) {
+  const auto both = jitter::compare_with_cyclictest(wanted);
+  if (!both) {
+    return bad(both.error());
+  }
+  const auto found = jitter::difference(both->cyclictest, both->loop);
+  if (!found) {
+    return bad("--compare: " + found.error() + "; take more --seconds");
+  }
+  say("A: cyclictest, B: the loop of the core, in turns\n" +
+      jitter::difference_text(*found, both->cyclictest, both->loop));
+  say(fmt::format("max{:>14.1f}{:>9.1f}\n", both->cyclictest.wake.max_us, both->loop.wake.max_us));
+  return kDone;
+}
+
+int measure(const jitter::Wanted& wanted, const std::string& load, const std::string& histogram,
+            const std::string& json) {
+  auto result = jitter::measure(wanted);
   if (!result) {
     return bad(result.error());
   }
+  result->load = load;
   say(jitter::summary(*result, columns()));
   for (const auto& [path, text] : {std::pair(histogram, jitter::histogram_text(result->wake)),
                                    std::pair(json, jitter::json_of(*result))}) {
@@ -104,6 +123,8 @@ int main_or_throw(int argc, char** argv) {
   app.set_version_flag("--version", tools::version_line("punctum-jitter"), "version and commit");
   app.footer(tools::help_footer(
       {{"punctum-jitter --seconds 60 --cpu 3 --json a.json", "one minute on CPU 3"},
+       {"punctum-jitter --compare --load --seconds 60",
+        "the core's loop and cyclictest in turns, under load"},
        {"punctum-jitter diff a.json b.json", "whether two results differ, and where"},
        {"punctum-jitter --audit --cpu 3", "what of this machine is not ready, and what mends it"}},
       {{kDone, "it was measured; the machine is ready; no difference is shown"},
@@ -111,7 +132,7 @@ int main_or_throw(int argc, char** argv) {
        {kBadInput, "bad input"}}));
   jitter::Wanted wanted;
   std::string histogram, json;
-  bool audit_only = false;
+  bool audit_only = false, loaded = false, beside = false;
   const int last_cpu = static_cast<int>(std::max(1U, std::thread::hardware_concurrency())) - 1;
   app.add_option("--rate", wanted.rate_Hz, "ticks per second (default: 1000)")
       ->type_name("HZ")
@@ -128,16 +149,31 @@ int main_or_throw(int argc, char** argv) {
   app.add_option("--histogram", histogram, "wake-ups as cyclictest writes them")->type_name("FILE");
   app.add_option("--json", json, "everything that was found")->type_name("FILE");
   app.add_flag("--audit", audit_only, "measure nothing; say what of this machine is not ready");
-  CLI::App* compare = app.add_subcommand("diff", "whether two results differ, and where");
+  app.add_flag("--load", loaded, "keep processors, caches, disk, scheduler and timers busy meanwhile");
+  app.add_flag("--compare", beside, "take turns with cyclictest, half of the time each");
+  CLI::App* difference = app.add_subcommand("diff", "whether two results differ, and where");
   std::vector<std::string> files;
-  compare->add_option("FILES", files, "two results of --json")->required()->expected(2);
+  difference->add_option("FILES", files, "two results of --json")->required()->expected(2);
   if (const auto code = tools::parse_command_line(app, argc, argv)) {
     return *code;
   }
-  if (compare->parsed()) {
+  if (difference->parsed()) {
     return diff(files);
   }
-  return audit_only ? audit(wanted.cpu, wanted.priority) : measure(wanted, histogram, json);
+  if (audit_only) {
+    return audit(wanted.cpu, wanted.priority);
+  }
+  if (beside && !(histogram.empty() && json.empty())) {
+    return bad("--compare: writes no files, allowed without --histogram and --json");
+  }
+  tl::expected<jitter::Load, std::string> load = tl::unexpected(std::string());
+  if (loaded) {
+    load = jitter::Load::start();
+    if (!load) {
+      return bad(load.error());
+    }
+  }
+  return beside ? compare(wanted) : measure(wanted, loaded ? jitter::Load::stated() : "", histogram, json);
 }
 
 }  // namespace

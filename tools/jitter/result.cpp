@@ -111,6 +111,7 @@ std::string json_of(const Result& r) {
            {"page_faults", {{"minor", r.minor_faults}, {"major", r.major_faults}}},
            {"switches", {{"voluntary", r.voluntary_switches}, {"involuntary", r.involuntary_switches}}},
            {"migrations", r.migrations},
+           {"load", r.load},
            {"machine", r.machine}};
   out["allocations"] = r.allocations_watched ? Json(r.allocations) : Json(nullptr);
   out["spikes"] = Json::array();
@@ -140,6 +141,7 @@ tl::expected<Result, std::string> result_of_json(std::string_view text) {
     r.wake = distribution(in.at("wake_us"));
     r.tick = distribution(in.at("tick_us"));
     r.interval = distribution(in.at("interval_us"));
+    r.load = in.at("load").get<std::string>();
     r.machine = in.at("machine").get<std::string>();
     const Json& parts = in.at("parts");
     if (!parts.is_array() || parts.size() > kMostParts) {
@@ -230,6 +232,7 @@ std::string bars(const Distribution& d, int columns) {
 std::string summary(const Result& r, int columns) {
   std::string out = fmt::format("{:.0f} Hz for {:.1f} s: {} ticks, {} releases missed", r.rate_Hz, r.seconds,
                                 r.ticks, r.missed);
+  out += r.load.empty() ? "" : "\nbeside it: " + r.load;
   out += r.degraded ? "; WITHOUT real-time rights\n" : "\n";
   for (const std::string& one : r.missing) {
     out += "  missing: " + one + "\n";

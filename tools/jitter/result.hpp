@@ -44,6 +44,7 @@ struct Result {
   bool allocations_watched = false;
   // Wake-ups of equal parts of the measurement: what differs between them is not the machine's.
   std::vector<Distribution> parts;
+  std::string load;     // that ran beside it; empty: none of ours
   std::string machine;  // kernel, processor, boot line: two results with the same text are comparable
 };
 

@@ -14,7 +14,9 @@
 #include <vector>
 
 #include "tools/jitter/audit.hpp"
+#include "tools/jitter/comparison.hpp"
 #include "tools/jitter/difference.hpp"
+#include "tools/jitter/load.hpp"
 #include "tools/jitter/measurement.hpp"
 #include "tools/jitter/result.hpp"
 
@@ -169,6 +171,34 @@ TEST(Histogram, is_written_as_cyclictest_does) {
             "# Histogram\n000000 000000\n000001 000001\n000002 000000\n000003 000002\n000004 000000\n"
             "# Total: 000000003\n# Min Latencies: 00001\n# Avg Latencies: 00002\n# Max Latencies: 00007\n"
             "# Histogram Overflows: 00001\n");
+}
+
+TEST(Histogram, of_cyclictest_is_read_whole_or_refused) {
+  const auto seen = read_histogram(
+      "# /dev/cpu_dma_latency set to 0us\n# Histogram\n000000 000000\n000011 000001\n000012 000040\n"
+      "# Total: 000000041\n# Min Latencies: 00011\n# Avg Latencies: 00012\n# Max Latencies: 02312\n"
+      "# Histogram Overflows: 00002\n# Histogram Overflow at cycle number:\n# Thread 0: 00162 00583\n");
+  ASSERT_TRUE(seen) << seen.error();
+  EXPECT_EQ(seen->entries(), 43U);
+  EXPECT_EQ(seen->count[12], 40U);
+  EXPECT_EQ(seen->max_us, 2312);
+  for (const char* text : {"", "# Histogram\n", "000001\n", "a b\n", "000001 -3\n", "5000 1\n"}) {
+    EXPECT_FALSE(read_histogram(text)) << text;
+  }
+}
+
+TEST(TheLoad, ends_with_its_object_and_leaves_nobody_behind) {
+  const auto children = [] {
+    std::ifstream in("/proc/self/task/" + std::to_string(getpid()) + "/children");
+    return std::string(std::istreambuf_iterator<char>(in), {});
+  };
+  ASSERT_EQ(children(), "");
+  {
+    const auto load = Load::start();
+    ASSERT_TRUE(load) << load.error();
+    EXPECT_NE(children(), "");
+  }
+  EXPECT_EQ(children(), "");
 }
 
 // A machine made of files.

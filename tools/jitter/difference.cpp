@@ -6,13 +6,14 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <numeric>
 #include <random>
 
 namespace punctum::jitter {
 namespace {
 
 constexpr std::array kQuantileParts = {0.5, 0.99, 0.999};
-constexpr std::size_t kLeastParts = 8;
+constexpr std::size_t kLeastParts = 8, kLeastBlocks = 6;
 constexpr int kDraws = 2000;
 constexpr double kAlpha = 0.05 / kQuantileParts.size();  // three questions, one answer
 
@@ -52,13 +53,84 @@ Chosen all_of(const Result& r) {
   return out;
 }
 
+// Share of the wake-ups of each part that are later than `limit_us`.
+std::vector<double> later_than(double limit_us, const Chosen& parts) {
+  std::vector<double> out;
+  for (const Distribution* part : parts) {
+    const auto first = std::min(part->count.size(), static_cast<std::size_t>(std::ceil(limit_us)));
+    const auto later = std::accumulate(part->count.begin() + static_cast<std::ptrdiff_t>(first),
+                                       part->count.end(), part->longer);
+    out.push_back(static_cast<double>(later) / static_cast<double>(part->entries()));
+  }
+  return out;
+}
+
+// Over how many neighbours parts hang together: one and twice the sum of their autocorrelation, as long as it
+// is worth mentioning.
+double correlation_length(const std::vector<double>& x) {
+  const double n = static_cast<double>(x.size()), mean = std::accumulate(x.begin(), x.end(), 0.0) / n;
+  const auto covariance = [&](std::size_t lag) {
+    double sum = 0;
+    for (std::size_t i = lag; i < x.size(); ++i) {
+      sum += (x[i] - mean) * (x[i - lag] - mean) / n;
+    }
+    return sum;
+  };
+  constexpr double kMentioned = 0.1;
+  const double variance = covariance(0);
+  double length = 1;
+  for (std::size_t lag = 1; variance > 0 && lag < x.size() / 2; ++lag) {
+    const double correlation = covariance(lag) / variance;
+    if (correlation < kMentioned) {
+      break;
+    }
+    length += 2 * correlation;
+  }
+  return length;
+}
+
+// Neighbours that hang together stay together.
+using Blocks = std::vector<Chosen>;
+Blocks in_blocks(const Chosen& parts, std::size_t length) {
+  Blocks out;
+  const std::size_t n = std::max<std::size_t>(parts.size() / length, 1);
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto at = [&](std::size_t k) {
+      return parts.begin() + static_cast<std::ptrdiff_t>(k * parts.size() / n);
+    };
+    out.emplace_back(at(i), at(i + 1));
+  }
+  return out;
+}
+
+std::size_t block_length(const Chosen& a, const Chosen& b) {
+  double longest = 1;
+  for (const Chosen* parts : {&a, &b}) {
+    const Quantiles own = quantiles(*parts);
+    for (const double limit : {own[0], own[1]}) {
+      longest = std::max(longest, correlation_length(later_than(limit, *parts)));
+    }
+  }
+  const std::size_t most = std::min(a.size(), b.size()) / kLeastBlocks;
+  return std::clamp<std::size_t>(static_cast<std::size_t>(std::ceil(2 * longest - 1)), 1, most);
+}
+
+template <class Iterator>
+Chosen parts_of(Iterator first, Iterator last) {
+  Chosen out;
+  for (; first != last; ++first) {
+    out.insert(out.end(), first->begin(), first->end());
+  }
+  return out;
+}
+
 // The generator of the standard with a division of our own: the same draws everywhere.
 std::size_t below(std::mt19937& random, std::size_t n) { return random() % n; }
 
-Chosen drawn_from(const Chosen& parts, std::mt19937& random) {
-  Chosen out(parts.size());
-  std::generate(out.begin(), out.end(), [&] { return parts[below(random, parts.size())]; });
-  return out;
+Chosen drawn_from(const Blocks& blocks, std::mt19937& random) {
+  Blocks out(blocks.size());
+  std::generate(out.begin(), out.end(), [&] { return blocks[below(random, blocks.size())]; });
+  return parts_of(out.begin(), out.end());
 }
 
 }  // namespace
@@ -73,18 +145,21 @@ tl::expected<std::vector<QuantileDifference>, std::string> difference(const Resu
   std::mt19937 random(1);
   std::array<std::vector<double>, kQuantileParts.size()> drawn;
   std::array<int, kQuantileParts.size()> as_large{};
-  Chosen mixed = parts_a;
-  mixed.insert(mixed.end(), parts_b.begin(), parts_b.end());
+  const std::size_t length = block_length(parts_a, parts_b);
+  const Blocks blocks_a = in_blocks(parts_a, length), blocks_b = in_blocks(parts_b, length);
+  Blocks mixed = blocks_a;
+  mixed.insert(mixed.end(), blocks_b.begin(), blocks_b.end());
   for (int draw = 0; draw < kDraws; ++draw) {
-    // How far the difference is certain: parts drawn again from either measurement.
-    const Quantiles now_a = quantiles(drawn_from(parts_a, random)),
-                    now_b = quantiles(drawn_from(parts_b, random));
-    // What chance alone makes of it: the parts dealt out anew.
+    // How far the difference is certain: blocks drawn again from either measurement.
+    const Quantiles now_a = quantiles(drawn_from(blocks_a, random)),
+                    now_b = quantiles(drawn_from(blocks_b, random));
+    // What chance alone makes of it: the blocks dealt out anew.
     for (std::size_t i = mixed.size(); i > 1; --i) {
       std::swap(mixed[i - 1], mixed[below(random, i)]);
     }
-    const auto middle = mixed.begin() + static_cast<std::ptrdiff_t>(parts_a.size());
-    const Quantiles dealt_a = quantiles({mixed.begin(), middle}), dealt_b = quantiles({middle, mixed.end()});
+    const auto middle = mixed.begin() + static_cast<std::ptrdiff_t>(blocks_a.size());
+    const Quantiles dealt_a = quantiles(parts_of(mixed.begin(), middle)),
+                    dealt_b = quantiles(parts_of(middle, mixed.end()));
     for (std::size_t q = 0; q < kQuantileParts.size(); ++q) {
       drawn[q].push_back(now_b[q] - now_a[q]);
       as_large[q] += std::abs(dealt_b[q] - dealt_a[q]) >= std::abs(in_b[q] - in_a[q]) ? 1 : 0;

@@ -16,8 +16,9 @@ struct QuantileDifference {
   bool differs = false;
 };
 
-// By the parts of the measurements, which are taken for independent of each other while the wake-ups within
-// one are not. The error: too few parts.
+// By blocks of as many neighbouring parts as hang together, which are taken for independent of each other.
+// Six blocks of each are the fewest: what drifts more slowly is taken for a difference. The error: too few
+// parts.
 [[nodiscard]] tl::expected<std::vector<QuantileDifference>, std::string> difference(const Result& a,
                                                                                     const Result& b);
 

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstdint>
 #include <fstream>
+#include <memory>
 #include <string>
 #include <thread>
 #include <utility>
@@ -78,10 +79,11 @@ class EmptyTick {
   bool first_ = true;
 };
 
-// Static: their pages are there from the start.
-rt::MonotonicClock monotonic;
-rt::CoreStatus status;
-EmptyTick empty_tick;
+// What the loop writes; touched before it begins.
+struct Written {
+  rt::CoreStatus status;
+  EmptyTick empty_tick;
+};
 
 Distribution distribution_of(const rt::TimeHistogram& histogram) {
   Distribution out;
@@ -110,7 +112,7 @@ Distribution since(const Distribution& before, const Distribution& after) {
 // Copies the histogram of wake-ups at equal intervals, from an ordinary thread: it may be read live.
 class Parts {
  public:
-  explicit Parts(double seconds) : every_(seconds / kParts) {
+  Parts(const rt::CoreStatus& status, double seconds) : status_(status), every_(seconds / kParts) {
     sigset_t all, before;
     sigfillset(&all);
     pthread_sigmask(SIG_BLOCK, &all, &before);
@@ -133,20 +135,21 @@ class Parts {
     while (!over_.load()) {
       std::this_thread::sleep_for(kLook);
       const auto now = Clock::now();
-      if (status.started.load() == 0) {
+      if (status_.started.load() == 0) {
         continue;
       }
       if (due == Clock::time_point{}) {
         due = now + std::chrono::duration_cast<Clock::duration>(every_);
       } else if (now >= due) {
         due += std::chrono::duration_cast<Clock::duration>(every_);
-        Distribution all = distribution_of(status.wake);
+        Distribution all = distribution_of(status_.wake);
         parts_.push_back(since(before, all));
         before = std::move(all);
       }
     }
   }
 
+  const rt::CoreStatus& status_;
   std::chrono::duration<double> every_;
   std::atomic<bool> over_{false};
   std::vector<Distribution> parts_;
@@ -186,10 +189,13 @@ tl::expected<Result, std::string> measure(const Wanted& wanted) {
   result.cpu = wanted.cpu;
   result.machine = machine();
   const auto period_ns = static_cast<std::int64_t>(std::llround(1e9 / wanted.rate_Hz));
+  rt::MonotonicClock monotonic;
+  const auto written = std::make_unique<Written>();
+  auto& [status, empty_tick] = *written;
   empty_tick.set_up(monotonic, period_ns,
                     static_cast<std::uint64_t>(std::llround(wanted.seconds * wanted.rate_Hz)));
   tools::stop_signal::watch({SIGINT, SIGTERM}, on_stop_signal);
-  Parts parts(wanted.seconds);
+  Parts parts(status, wanted.seconds);
 
   rt::RightsWanted rights_wanted;
   rights_wanted.priority = wanted.priority;
@@ -201,8 +207,7 @@ tl::expected<Result, std::string> measure(const Wanted& wanted) {
       result.missing.push_back(fmt::format("{}: {}", right.name, right.remedy));
     }
   }
-  rt::prefault_writable(&status, sizeof status);
-  rt::prefault_writable(&empty_tick, sizeof empty_tick);
+  rt::prefault_writable(written.get(), sizeof(Written));
   const std::array slots{rt::slot<&EmptyTick::run>("empty", empty_tick)};
   rt::ExecutiveConfig config;
   config.period_ns = period_ns;

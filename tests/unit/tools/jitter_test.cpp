@@ -1,6 +1,8 @@
 // Results of punctum-jitter: distributions by hand, differences between random measurements whose truth is
 // known, machines made of files, and the loop itself for a moment.
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -289,6 +291,38 @@ TEST(Measurement, counts_every_tick_once) {
   const std::string text = summary(*result, 100);
   EXPECT_NE(text.find("wake-up"), std::string::npos);
   EXPECT_EQ(text.find("nan"), std::string::npos);
+}
+
+// Somebody stops the process for a while and lets it go on.
+void pause_this_process(int after_ms, int for_ms) {
+  const pid_t measured = getpid(), pid = fork();
+  if (pid == 0) {
+    usleep(static_cast<useconds_t>(after_ms) * 1000);
+    (void)kill(measured, SIGSTOP);
+    usleep(static_cast<useconds_t>(for_ms) * 1000);
+    (void)kill(measured, SIGCONT);
+    _exit(0);
+  }
+  ASSERT_GT(pid, 0);
+}
+
+TEST(Measurement, tells_a_wake_up_later_than_many_periods_from_the_release_it_slept_for) {
+  constexpr int kPause_ms = 80;
+  pause_this_process(250, kPause_ms);
+  Wanted wanted;
+  wanted.rate_Hz = 500;
+  wanted.seconds = 0.8;
+  const auto result = measure(wanted);
+  while (wait(nullptr) > 0) {
+  }
+  ASSERT_TRUE(result) << result.error();
+  EXPECT_GE(result->wake.max_us, (kPause_ms - 10) * 1e3);
+  EXPECT_GE(result->missed, 30U);
+  EXPECT_EQ(result->ticks + result->missed, 400U);
+  EXPECT_GE(result->wake.longer, 1U);
+  ASSERT_FALSE(result->spikes.empty());
+  EXPECT_NEAR(result->spikes.back().wake_us, result->wake.max_us, 1e-6);
+  EXPECT_NEAR(result->spikes.back().t_s, 0.25, 0.2);
 }
 
 }  // namespace

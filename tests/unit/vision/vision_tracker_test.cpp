@@ -662,6 +662,26 @@ TEST(Tracker, reports_that_the_cell_vanished_and_finds_it_again) {
   EXPECT_TRUE(again);
 }
 
+TEST(Tracker, finds_a_holding_pipette_that_comes_while_everything_else_is_followed) {
+  Tracker tracker({}, kW, kH);
+  Drawing d;
+  d.tip = 460;
+  d.holder = false;
+  for (int i = 0; i < 20; ++i) {
+    d.seed = static_cast<unsigned>(i) + 1;
+    const Result& r = tracker.process(frame_of(draw(d), static_cast<std::uint64_t>(i)));
+    EXPECT_FALSE(r.holder.ok) << i;
+    EXPECT_TRUE(r.outer.ok) << i;
+  }
+  d.holder = true;
+  bool found = false;
+  for (int i = 20; i < 32 && !found; ++i) {
+    d.seed = static_cast<unsigned>(i) + 1;
+    found = tracker.process(frame_of(draw(d), static_cast<std::uint64_t>(i))).holder.ok;
+  }
+  EXPECT_TRUE(found);
+}
+
 double thread_ms() {
   timespec t{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);

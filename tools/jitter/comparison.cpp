@@ -105,8 +105,8 @@ tl::expected<Distribution, std::string> read_histogram(std::string_view text) {
       continue;
     }
     std::uint64_t bin = 0, count = 0;
-    const char* const last = line.data() + line.size();
-    const auto [after_bin, bad_bin] = std::from_chars(line.data(), last, bin);
+    const char *const first = line.data(), *const last = first + line.size();
+    const auto [after_bin, bad_bin] = std::from_chars(first, last, bin);
     const char* from = after_bin;
     while (from < last && (*from == ' ' || *from == '\t')) {
       ++from;

@@ -130,11 +130,13 @@ TEST_F(StageTip, tells_that_the_picture_stays_where_the_needle_is_moved_on) {
 
 TEST_F(StageTip, does_not_tell_so_of_a_needle_that_is_seen_late_or_thinly) {
   std::normal_distribution<double> noise(0, 0.5);
+  double one_ago = x_, two_ago = x_;  // where a camera that is two frames late still sees it
   for (int k = 0; k < 400; ++k) {
-    const double speed = k % 100 < 20 ? 8 : 0.3;  // a camera that is two frames late
-    x_ -= speed;
+    const double seen = two_ago;
+    two_ago = one_ago;
+    one_ago = x_ -= k % 100 > 80 ? 8 : 0.3;
     told_.begin(Point(x_ - 40, 103));
-    told_.learn(seen_at({x_ + 2 * speed + noise(random_), 100}, 0.9));
+    told_.learn(seen_at({seen + noise(random_), 100}, 0.9));
     EXPECT_FALSE(told_.picture_stays()) << k;
   }
 }

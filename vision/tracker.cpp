@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
+#include <memory>
+#include <utility>
 
 #include "hal/math/elementary.hpp"
 #include "vision/events/contact.hpp"
@@ -29,12 +30,14 @@ namespace {
 
 constexpr int kHolderEvery = 8;  // frames between two searches for a tube that was not found
 constexpr int kNeedleAtOnce = 6, kNeedleEvery = 8;  // likewise for the needle, after so many tries
-constexpr double kNeedleMargin_px = 2.5;            // the blur reaches so far beyond the needle's edges
-constexpr double kUntouched_px = 12;                // further outside, nothing touches the tip
-constexpr double kLeastDimple_px = 0.7;             // depth from which the width of a dimple can be measured
-constexpr double kNear_px = 8;                      // nearer, the needle may touch the membrane
-constexpr double kClear_px = 3;                     // further away, it does not: its blur ends before
-constexpr double kContactPoint_px = 0.7;            // standard deviation of a membrane on the needle's side
+constexpr int kFirstDoubt = 5;  // frames without the inner membrane; after twice as many again, and so on
+constexpr double kNeedleMargin_px = 2.5;  // the blur reaches so far beyond the needle's edges
+constexpr double kUntouched_px = 12;      // further outside, nothing touches the tip
+constexpr double kLeastDimple_px = 0.7;   // depth from which the width of a dimple can be measured
+constexpr double kNear_px = 8;            // nearer, the needle may touch the membrane
+constexpr double kClear_px = 3;           // further away, it does not: its blur ends before
+constexpr double kContactPoint_px = 0.7;  // standard deviation of a membrane on the needle's side
+constexpr double kHaloAhead_px = 1;       // by which the tip is seen too far ahead in a halo
 constexpr double kAtMembrane_px = 0.6, kInside_px = 1.5;  // to which the picture alone shows the tip there
 // The paper keeps the large variations of the gradient only. Of the usual edge of a membrane: with 0.4 needle
 // and cell merge when they are still 4 px apart, with 0.75 they part again over a deep dimple.
@@ -42,7 +45,7 @@ constexpr double kLargeGradient = 0.6;
 
 Side opposite(Side side) { return side == Side::right ? Side::left : Side::right; }
 
-double rms(const std::vector<double>& values) {
+double rms(const Vector<double>& values) {
   double square = 0;
   for (const double v : values) {
     square += v * v / static_cast<double>(values.size());
@@ -74,6 +77,7 @@ struct Tracker::Impl {
   InjectionPipette::Start needle_search = InjectionPipette::Start::failed;
   int needle_frames = 0, needle_tries = 0;      // that failed
   bool needle_due = false, holder_due = false;  // looked for in this frame
+  bool needle_before_gap = false;               // it is not known yet whether it is still the same
   TipByStage by_stage;
   NeedlePose membrane_needle;  // its tip where the membrane on it is seen
   NeedlePose seen_needle;      // as the picture alone tells it
@@ -84,10 +88,13 @@ struct Tracker::Impl {
   TipMotion tip;
 
   FollowedMembrane outer, inner;
-  std::optional<CellSearch> cell_search;  // while there is more to do
+  std::optional<CellSearch> cell_search;            // while there is more to do
+  int inner_missing = 0, next_doubt = kFirstDoubt;  // frames
   bool first_picture = true;    // of it everything is searched at once; later each frame bears a part
   LearntUndeformed undeformed;  // of the outer one
   bool was_contact = false;
+  bool touches_next = false;  // it was outside, and will not be in this frame, by its speed
+  ContactTest contact;
   Puncture puncture;
   InnerPuncture inner_puncture;
   VelocityReversal reversal, inner_reversal;  // in place of the two, as the paper has it
@@ -106,6 +113,7 @@ struct Tracker::Impl {
     cv::setNumThreads(1);
     // Code for the newest registers gives other last bits, and is no faster here.
     cv::setUseOptimized(false);
+    kept::prepare();
     if (config.surface) {
       net_fit.emplace(rt::MembraneSurface::kControlPoints);
     }
@@ -115,11 +123,15 @@ struct Tracker::Impl {
 
   // A needle that was seen before and is not seen now may be anywhere: it tells neither contact nor its end.
   [[nodiscard]] bool needle_hidden() const { return needle.started() && !result.needle.ok; }
+  // It touches the membrane, or will by its speed.
+  [[nodiscard]] bool at_membrane() const { return !punctured && (was_contact || touches_next); }
   [[nodiscard]] bool must_start() const;
   void decide_searches();
   [[nodiscard]] cv::Rect area_to_search(bool starting) const;
-  [[nodiscard]] std::vector<Side> holder_sides() const;
-  void search_needle();
+  [[nodiscard]] Vector<Side> holder_sides() const;
+  [[nodiscard]] bool search_needle();
+  void forget_needle();
+  void recognise_needle();
   void locate_needle();
   void learn_needle();
   void locate_holder();
@@ -127,12 +139,14 @@ struct Tracker::Impl {
   void clear_picture(double needle_margin);
   [[nodiscard]] std::optional<StartedMembranes> search_cell();
   [[nodiscard]] bool start();
+  void take(StartedMembranes&& begun);
+  void doubt_outer();
   void follow_membranes(Stopwatch& watch);
   [[nodiscard]] Surroundings surroundings();
   void measure();
   [[nodiscard]] int fit_undeformed_membrane();
   void measure_gap(int fitted_points);
-  [[nodiscard]] std::optional<double> look_for_contact();
+  [[nodiscard]] std::optional<double> meet_on_needle();
   [[nodiscard]] std::optional<InnerOnNeedle> inner_on_needle() const;
   void classify_contact(const std::optional<double>& membrane_behind_tip);
   void events_of_the_paper();
@@ -152,6 +166,29 @@ void Tracker::seed_circle(const Circle& circle) { impl_->seed = circle; }
 void Tracker::holder_template(const cv::Mat& pattern) {
   impl_->holder.use_template(pattern);
   impl_->template_given = true;
+}
+void Tracker::after_gap() {
+  Impl& before = *impl_;
+  auto next = std::make_unique<Impl>(before.config, before.width, before.height);
+  next->seed = before.seed;
+  if (before.template_given) {
+    next->holder = std::move(before.holder);
+    next->template_given = true;
+  }
+  if (before.needle.started()) {
+    next->needle = std::move(before.needle);
+    next->tip_on_membrane = before.tip_on_membrane;
+    next->by_stage = before.by_stage;
+    next->by_stage.after_gap();
+    next->needle_before_gap = true;
+    if (before.punctured) {  // it stays so while the tip stays inside
+      next->puncture = before.puncture;
+      next->inner_puncture = before.inner_puncture;
+      next->punctured = true;
+      next->result.phase = before.result.phase;
+    }
+  }
+  impl_ = std::move(next);
 }
 const Result& Tracker::process(const hal::Frame& frame, const std::optional<Point>& stage) {
   return impl_->process(frame, stage);
@@ -177,6 +214,7 @@ const Result& Tracker::Impl::process(const hal::Frame& frame, const std::optiona
   result.us.prepare = watch.lap_us();
 
   if (config.needle) {
+    recognise_needle();
     locate_needle();
     result.us.needle = watch.lap_us();
   }
@@ -205,7 +243,7 @@ const Result& Tracker::Impl::process(const hal::Frame& frame, const std::optiona
     } else {
       std::optional<double> membrane_behind_tip;
       if (result.needle.ok && result.outer.ok && !(result.gap_px && *result.gap_px > kUntouched_px)) {
-        membrane_behind_tip = look_for_contact();
+        membrane_behind_tip = meet_on_needle();
         result.us.contact = watch.lap_us();
       }
       classify_contact(membrane_behind_tip);
@@ -237,9 +275,9 @@ void Tracker::Impl::decide_searches() {
 }
 
 // It enters through the border opposite to the needle's.
-std::vector<Side> Tracker::Impl::holder_sides() const {
-  const Side known = config.needle && needle.started() ? needle.side() : config.needle_from;
-  return known == Side::automatic ? std::vector{Side::left, Side::right} : std::vector{opposite(known)};
+Vector<Side> Tracker::Impl::holder_sides() const {
+  const Side known = config.needle && needle.side_known() ? needle.side() : config.needle_from;
+  return known == Side::automatic ? Vector<Side>{Side::left, Side::right} : Vector<Side>{opposite(known)};
 }
 
 // The whole picture while cell or needle must be found; then their surroundings, and what lies between the
@@ -265,9 +303,10 @@ cv::Rect Tracker::Impl::area_to_search(bool starting) const {
                           static_cast<int>(box.height));
 }
 
-void Tracker::Impl::search_needle() {
+// Whether this frame shows its end.
+bool Tracker::Impl::search_needle() {
   if (!needle_due) {
-    return;
+    return false;
   }
   // A membrane at the tip of a faint needle looks like its end.
   const auto clear_at = [this](const Point& end) {
@@ -278,18 +317,42 @@ void Tracker::Impl::search_needle() {
         needle.advance_start(picture.field, picture.noise, clear_at, needle_tries < kNeedleAtOnce);
   } while (first_picture && needle_search == InjectionPipette::Start::more_to_do);
   needle_tries += needle_search == InjectionPipette::Start::failed ? 1 : 0;
+  return needle_search == InjectionPipette::Start::found;
+}
+
+void Tracker::Impl::forget_needle() {
+  needle = {config.needle_from, config.px(config.c_m)};
+  needle_tries = 0;
+  by_stage.forget();
+  tip_on_membrane = {};
+}
+
+void Tracker::Impl::recognise_needle() {
+  if (!std::exchange(needle_before_gap, false)) {
+    return;
+  }
+  const auto told = by_stage.tip();
+  if (!told || !needle.go_on_at(picture.field, picture.noise, *told)) {
+    forget_needle();
+    puncture = Puncture(config.puncture_px);
+    inner_puncture = {};
+    punctured = false;
+    result.phase = rt::Phase::free;
+    needle_due = true;
+  }
 }
 
 void Tracker::Impl::locate_needle() {
-  search_needle();
   NeedlePose& n = result.needle;
-  n = needle.find(picture.field, picture.noise, by_stage.moved());
-  if (config.method == Method::tracker && n.ok && was_contact && !punctured && outer.known) {
+  n = search_needle() ? needle.as_found(picture.noise)
+                      : needle.find(picture.field, picture.noise, by_stage.moved());
+  if (config.method == Method::tracker && n.ok && at_membrane() && outer.known) {
     n.tip += tip_on_membrane.ahead(picture.field, picture.noise, n).value_or(0) * n.axis;
   }
-  seen_tip_sd_px = n.sd;
+  // Ahead of a tip that touches it, a halo is brighter than what the end of the needle is told by.
+  seen_tip_sd_px = math::hypot(n.sd, at_membrane() && outer.edge.halo ? kHaloAhead_px : 0);
   // A membrane on the tip draws its end aside, granules round it by several pixels.
-  n.sd = math::hypot(n.sd, punctured ? kInside_px : was_contact ? kAtMembrane_px : 0);
+  n.sd = math::hypot(n.sd, punctured ? kInside_px : at_membrane() ? kAtMembrane_px : 0);
   seen_needle = n;
   wall_px = 0;
   if (const auto tip_told = by_stage.tip(); tip_told && !n.ok) {
@@ -299,7 +362,7 @@ void Tracker::Impl::locate_needle() {
     n = by_stage.most_likely(n);
     needle.put(n.tip);
     // In contact the picture shows where the membrane is, on the tip.
-    if (was_contact && !punctured) {
+    if (at_membrane()) {
       constexpr double kThick_px = 1;
       wall_px = std::clamp((seen_needle.tip - n.tip).dot(n.axis), -kThick_px, kThick_px);
     }
@@ -317,10 +380,7 @@ void Tracker::Impl::learn_needle() {
   if (!result.gap_px || *result.gap_px > TipOnMembrane::kClearAhead_px) {
     by_stage.learn(seen_needle);
     if (by_stage.picture_stays()) {
-      by_stage = {};
-      tip_on_membrane = {};
-      needle = {config.needle_from, config.px(config.c_m)};
-      needle_tries = 0;
+      forget_needle();
       return;
     }
   }
@@ -364,7 +424,7 @@ Point Tracker::Impl::end_of_holder() const {
 }
 
 void Tracker::Impl::clear_picture(double needle_margin) {
-  std::vector<Polygon> pipettes;
+  Vector<Polygon> pipettes;
   if (result.needle.ok) {
     pipettes.push_back(needle_polygon(result.needle, picture.grey.size(), needle_margin, 1.5));
   }
@@ -373,7 +433,7 @@ void Tracker::Impl::clear_picture(double needle_margin) {
   }
   picture.cover(pipettes);
 
-  std::vector<Contour> membranes;
+  Vector<Contour> membranes;
   for (const FollowedMembrane* m : {&outer, &inner}) {
     if (m->known) {
       membranes.push_back(m->contour());
@@ -411,15 +471,21 @@ bool Tracker::Impl::start() {
     result.outer.reason = "not found yet";
     return false;
   }
-  const RestOutline outer_rest = std::move(outer.rest), inner_rest = std::move(inner.rest);
-  outer = std::move(begun->outer);
-  inner = std::move(begun->inner);
   result.outer.reason = begun->reason;
+  take(std::move(*begun));
   if (!outer.known && !inner.known) {
     return false;
   }
-  // The learnt rest shape is kept if this is the same cell in the same place. It is learnt anew if only a few
-  // frames told it, or if nothing touches the cell now.
+  clear_picture(kNeedleMargin_px);
+  return true;
+}
+
+// Both membranes as found anew. The learnt rest shape is kept if this is the same cell in the same place. It
+// is learnt anew if only a few frames told it, or if nothing touches the cell now.
+void Tracker::Impl::take(StartedMembranes&& begun) {
+  const RestOutline outer_rest = std::move(outer.rest), inner_rest = std::move(inner.rest);
+  outer = std::move(begun.outer);
+  inner = std::move(begun.inner);
   const bool needed = was_contact || punctured || result.phase != rt::Phase::free;
   if (outer.known && needed && outer_rest.reliable() &&
       undeformed.same_cell(outer.contour(), outer.centre, result.needle)) {
@@ -428,8 +494,25 @@ bool Tracker::Impl::start() {
   } else {
     undeformed.forget();
   }
-  clear_picture(kNeedleMargin_px);
-  return true;
+}
+
+// What is followed as the outer membrane may be another edge for a part of the way, or all of it. Then no
+// inner one is seen; a start in the present picture may show both.
+void Tracker::Impl::doubt_outer() {
+  if (!config.inner || !outer.known || (inner.known && !inner.lost())) {
+    inner_missing = 0;
+    next_doubt = kFirstDoubt;
+    return;
+  }
+  if (++inner_missing < next_doubt) {
+    return;
+  }
+  inner_missing = 0;
+  next_doubt *= 2;
+  CellSearch again(std::nullopt, Circle{outer.centre, median_of(outer.r)});
+  if (auto begun = again.advance(picture, config); begun && begun->outer.known && begun->inner.known) {
+    take(std::move(*begun));
+  }
 }
 
 Surroundings Tracker::Impl::surroundings() {
@@ -455,6 +538,7 @@ void Tracker::Impl::follow_membranes(Stopwatch& watch) {
     }
     return;
   }
+  doubt_outer();
   Surroundings around_outer = surroundings();
   around_outer.within = &inner;
   result.outer = follow(outer, picture, config, around_outer);
@@ -549,15 +633,10 @@ void Tracker::Impl::measure_gap(int fitted_points) {
   result.gap_sd_px = math::hypot(n.sd, entry_sd_px);
 }
 
-// Whether needle and cell touch. Returns how far behind the tip the membrane lies on the needle.
-std::optional<double> Tracker::Impl::look_for_contact() {
-  // The paper's test: needle and cell are two classes until they touch.
-  const Contour& contour = result.outer.contour;
-  result.merged = merging_decides(result.gap_px) &&
-                  needle_merges_with_cell(picture, result.needle, contour, config.dilation_px + 1);
-  result.contact = touches(result.gap_px, result.merged, was_contact);
-  const MembraneOnNeedle on_needle =
-      membrane_on_needle(picture, result.needle, contour, outer.polarity, outer.level);
+// Returns how far behind the tip the membrane lies on the needle.
+std::optional<double> Tracker::Impl::meet_on_needle() {
+  const MembraneOnNeedle on_needle = membrane_on_needle(picture, result.needle, result.outer.contour,
+                                                        outer.polarity_at(-result.needle.axis), outer.level);
   result.points = on_needle.points;
   return on_needle.behind_tip;
 }
@@ -588,7 +667,12 @@ std::optional<InnerOnNeedle> Tracker::Impl::inner_on_needle() const {
 void Tracker::Impl::classify_contact(const std::optional<double>& membrane_behind_tip) {
   PunctureInput in;
   in.t_ns = result.exposure_ns;
-  in.contact = needle_hidden() ? was_contact : result.contact;
+  if (result.gap_px) {
+    result.contact = contact.update(*result.gap_px, result.gap_sd_px);
+  }
+  // A frame that does not show needle and cell changes nothing; a needle that points past the cell is off it.
+  const bool unseen = !(result.needle.ok && result.outer.ok);
+  in.contact = result.contact || (unseen && was_contact);
   in.gap_px = result.gap_px.value_or(0);
   in.radius_px = result.needle.half_width;
   in.points = membrane_behind_tip && result.entry;
@@ -596,6 +680,8 @@ void Tracker::Impl::classify_contact(const std::optional<double>& membrane_behin
     in.tip_px = -in.gap_px;
     in.membrane_px = in.tip_px - *membrane_behind_tip;
     in.depth_px = in.membrane_px;
+    in.sd_px = math::hypot(kContactPoint_px, result.needle.sd);
+    in.free = !outer.held;
   }
   punctured = result.punctured = puncture.update(in);
   result.inner_punctured =
@@ -684,6 +770,8 @@ void Tracker::Impl::reconstruct_surfaces() {
 
 void Tracker::Impl::decide_phase() {
   tip.update(result.needle);
+  touches_next =
+      result.gap_px && *result.gap_px >= 0 && *result.gap_px < kNear_px && *result.gap_px < tip.speed;
   if (needle_hidden()) {
     return;
   }

@@ -1,5 +1,5 @@
 // The paper's vision loop, one frame at a time: what a frame shows of pipettes and cell. It allocates memory
-// and is not for the real-time core.
+// while something is searched, and is not for the real-time core.
 #pragma once
 
 #include <memory>
@@ -21,6 +21,10 @@ class Tracker {
   // replaces the one that is cut from the first frame.
   void seed_circle(const Circle& circle);
   void holder_template(const cv::Mat& pattern);
+
+  // No frame was seen for a while: nothing is where it was, and everything is looked for anew in the next
+  // one. Only the needle is still the same one, if its shaft lies where the stage then tells its tip.
+  void after_gap();
 
   // stage: where the encoders of the manipulator have the needle's tip at the exposure, px; it may be off by
   // any constant, which is learnt. The result is valid until the next call. No pixels make it throw. A frame

@@ -244,8 +244,7 @@ class Station {
   rt::After tick_servo(const rt::Tick& tick) noexcept {
     t_s_ = 1e-9 * static_cast<double>(clock_.now);
     look();
-    rt::TickInfo now{tick.index, tick.release_ns, tick.wake_ns, 1e-9 * static_cast<double>(tick.period_ns),
-                     tick.missed_in_window};
+    rt::TickInfo now = tick.info();
     act(now);
     servo_.tick(now);
     ++seen_.ticks;

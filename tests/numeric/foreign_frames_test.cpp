@@ -16,7 +16,8 @@
 #include <string>
 #include <vector>
 
-#include "tests/support/programs.hpp"
+#include "tests/support/foreign_renderer.hpp"
+#include "tests/support/pictures.hpp"
 #include "vision/tracker.hpp"
 
 namespace {
@@ -24,15 +25,15 @@ namespace {
 namespace fs = std::filesystem;
 using namespace punctum;
 using namespace punctum::vision;
+using e2e::python;
+using e2e::renderer;
+using e2e::renderer_lacks;
+using test::distance;
+using test::frame_of;
 
 constexpr int kFrames = 40;
 constexpr double kPixel_um = 0.825;
 constexpr double kRight_px = 2, kWrong_px = 4;  // nowhere further away; somewhere further away
-
-fs::path renderer() {
-  const char* named = std::getenv("PUNCTUM_DATA");
-  return fs::path(named != nullptr ? named : "../shared/data") / "../frames/render.py";
-}
 
 Contour contour_of(const nlohmann::json& points) {
   Contour contour;
@@ -40,16 +41,6 @@ Contour contour_of(const nlohmann::json& points) {
     contour.emplace_back(p[0].get<double>(), p[1].get<double>());
   }
   return contour;
-}
-
-double distance(const Point& p, const Contour& closed) {
-  double nearest = std::numeric_limits<double>::max();
-  for (std::size_t i = 0; i < closed.size(); ++i) {
-    const Point a = closed[i], d = closed[(i + 1) % closed.size()] - a;
-    const double t = std::clamp((p - a).dot(d) / std::max(d.dot(d), 1e-12), 0.0, 1.0);
-    nearest = std::min(nearest, cv::norm(a + t * d - p));
-  }
-  return nearest;
 }
 
 // Of one membrane in the frames of one phase. A frame in which it is not claimed is not right.
@@ -106,18 +97,11 @@ void expect_near_truth(const char* what, const std::vector<double>& error_px, do
   EXPECT_LT(rms, most_px) << what;
 }
 
-int python(const std::vector<std::string>& arguments) {
-  return e2e::Running(arguments, "/dev/null", "python3").wait();
-}
-
 class ForeignFrames : public testing::TestWithParam<Sequence> {
  protected:
   void SetUp() override {
-    if (!fs::exists(renderer())) {
-      GTEST_SKIP() << renderer() << " is not there: the renderer is not part of this tree";
-    }
-    if (python({"-c", "import numpy, cv2, scipy"}) != 0) {
-      GTEST_SKIP() << "the renderer needs python3-numpy, python3-opencv and python3-scipy";
+    if (const std::string lacks = renderer_lacks(); !lacks.empty()) {
+      GTEST_SKIP() << lacks;
     }
     const auto& [seed, noise, outer_um, inner_um, halo, frames] = GetParam();
     // Its own: the sanitizers' build of this test may run at the same time.
@@ -153,13 +137,7 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
       tracker.emplace(config, picture.cols, picture.rows);
       with_pose.emplace(config, picture.cols, picture.rows);
     }
-    hal::Frame frame;
-    frame.pixels = picture.data;
-    frame.width = picture.cols;
-    frame.height = picture.rows;
-    frame.stride = static_cast<int>(picture.step);
-    frame.sequence = static_cast<std::uint64_t>(k);
-    frame.exposure_ns = k * 40'000'000LL;
+    const hal::Frame frame = frame_of(picture, static_cast<std::uint64_t>(k));
     const Result& seen = tracker->process(frame);
     const nlohmann::json& t = truth[static_cast<std::size_t>(k)];
     const std::string phase = t["phase"];

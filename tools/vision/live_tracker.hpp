@@ -1,13 +1,12 @@
-// The tracker of a live camera, which starts anew after a gap in time. What it knew of needle and cell, and
-// of where they were going, is then of another moment: followed from there, a needle that has moved away may
-// never be found again.
+// The tracker of a live camera, which starts anew after a gap in time. What it knew of the places of needle
+// and cell, and of where they were going, is then of another moment: followed from there, a needle that has
+// moved away may never be found again.
 #pragma once
 
 #include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <opencv2/core.hpp>
-#include <utility>
 
 #include "vision/tracker.hpp"
 
@@ -23,27 +22,29 @@ class LiveTracker {
   static constexpr std::int64_t kLongestGap_intervals = 5;
 
   // An empty template: it is cut from the first frame. The clock is the one that frames are stamped with.
-  LiveTracker(const vision::VisionConfig& config, int width, int height, cv::Mat holder_template,
+  LiveTracker(const vision::VisionConfig& config, int width, int height, const cv::Mat& holder_template,
               hal::Clock& clock)
-      : config_(config),
-        width_(width),
-        height_(height),
-        holder_template_(std::move(holder_template)),
-        clock_(clock),
-        tracker_(begun()) {}
+      : clock_(clock), tracker_(config, width, height) {
+    if (!holder_template.empty()) {
+      tracker_.holder_template(holder_template);
+    }
+  }
 
   // As vision::Tracker::process. The search of a whole frame takes a slow machine seconds, in which it can
   // take no other one: that is no gap, or it would search for ever. Meanwhile the core, without sight, lets
   // the needle only withdraw.
   const vision::Result& process(const hal::Frame& frame,
                                 const std::optional<vision::Point>& stage = std::nullopt) {
+    const std::int64_t begun_ns = clock_.now_ns();
     if (last_ns_ != kNever) {
+      slept_ = slept_ || begun_ns - ready_ns_ > kLongestGap_ns;
       const std::int64_t interval_ns = frame.exposure_ns - last_ns_;
       const std::int64_t waited_ns = frame.exposure_ns - std::max(last_ns_, ready_ns_);
-      if (waited_ns > kLongestGap_ns && interval_ns / kLongestGap_intervals >= shortest_ns_ && found_) {
-        tracker_ = begun();
+      if ((waited_ns > kLongestGap_ns || (slept_ && interval_ns > kLongestGap_ns)) &&
+          interval_ns / kLongestGap_intervals >= shortest_ns_ && found_) {
+        tracker_.after_gap();
         ++restarts_;
-        found_ = false;
+        found_ = following_ = slept_ = false;
       }
       shortest_ns_ = interval_ns > 0 ? std::min(shortest_ns_, interval_ns) : shortest_ns_;
     }
@@ -51,6 +52,8 @@ class LiveTracker {
     const vision::Result& result = tracker_.process(frame, stage);
     found_ = found_ || result.needle.ok || result.outer.ok;
     ready_ns_ = clock_.now_ns();
+    slept_ = slept_ || (following_ && ready_ns_ - begun_ns > kLongestGap_ns);
+    following_ = result.needle.ok && result.outer.ok;
     return result;
   }
   [[nodiscard]] int restarts() const noexcept { return restarts_; }
@@ -58,17 +61,6 @@ class LiveTracker {
  private:
   static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
 
-  [[nodiscard]] vision::Tracker begun() const {
-    vision::Tracker tracker(config_, width_, height_);
-    if (!holder_template_.empty()) {
-      tracker.holder_template(holder_template_);
-    }
-    return tracker;
-  }
-
-  vision::VisionConfig config_;
-  int width_, height_;
-  cv::Mat holder_template_;
   hal::Clock& clock_;
   vision::Tracker tracker_;
   std::int64_t last_ns_ = kNever;   // the last frame's exposure
@@ -76,6 +68,10 @@ class LiveTracker {
   std::int64_t shortest_ns_ = std::numeric_limits<std::int64_t>::max();
   int restarts_ = 0;
   bool found_ = false;  // needle or cell, since it began
+  // The process was stopped while it waited for a picture, or while it looked at one as quickly as always. A
+  // picture of before may still come first.
+  bool slept_ = false;
+  bool following_ = false;  // needle and cell, in the last picture
 };
 
 }  // namespace punctum::tools

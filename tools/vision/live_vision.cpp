@@ -37,6 +37,7 @@
 #include "tools/vision/live_tracker.hpp"
 #include "tools/vision/observation_csv.hpp"
 #include "tools/vision/picture_file.hpp"
+#include "tools/vision/picture_teller.hpp"
 #include "tools/vision/truth_comparison.hpp"
 #include "vision/overlay.hpp"
 
@@ -129,6 +130,7 @@ class LiveVision {
   bool truth_only_ = false;  // no picture is drawn or looked at
   std::optional<hal::Shared<rt::ObservationSegment>> station_;
   std::optional<hal::Shared<const rt::CoreSegment>> core_;  // where a stage moves what the camera sees
+  std::optional<PictureTeller> pictures_;
   std::optional<hal::Shared<const sim::Bench>> bench_;
   std::optional<hal::Shared<sim::CameraAnswers>> answers_;
   rt::MonotonicClock monotonic_;
@@ -207,6 +209,11 @@ Opened LiveVision::join_station() {
     }
     core_ = std::move(*attached);
   }
+  auto pictures = PictureTeller::open(*segments, scene_->vision->pixel_m);
+  if (!pictures) {
+    return tl::unexpected(pictures.error());
+  }
+  pictures_ = std::move(*pictures);
   const int bench = segments->descriptor(kBenchSegment);
   if (!simulated_ && bench < 0) {
     return {};
@@ -478,6 +485,9 @@ LiveVision::Seen LiveVision::look_at(const hal::Frame& frame) {
 void LiveVision::publish(const hal::Frame& frame, const Seen& seen) {
   if (frame.deliver_ns > 0) {
     wait_until(frame.deliver_ns);
+  }
+  if (pictures_) {
+    pictures_->tell(frame, seen.result, monotonic_.now_ns());
   }
   if (seen.surface) {
     (*station_)->surface.push(*seen.surface);

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
-#include <vector>
 
+#include "hal/math/elementary.hpp"
 #include "vision/image/components.hpp"
 
 namespace punctum::vision {
@@ -12,7 +12,7 @@ namespace punctum::vision {
 namespace {
 
 // Label of the component with the largest count, from 1 on. 0 when all counts are 0.
-int largest_label(const std::vector<int>& count) {
+int largest_label(const Vector<int>& count) {
   const auto best = std::max_element(count.begin(), count.end());
   return best != count.end() && *best > 0 ? static_cast<int>(best - count.begin()) + 1 : 0;
 }
@@ -49,7 +49,7 @@ Classes merge_classes(const cv::Mat& binary, const cv::Mat& needle_pixels, const
     return out;
   }
   const Components all = components_of(rows > 1 ? dilated_upright(binary, rows) : binary);
-  std::vector<int> needle(all.box.size(), 0), cell(all.box.size(), 0);
+  Vector<int> needle(all.box.size(), 0), cell(all.box.size(), 0);
   for (const PixelRun& run : all.runs) {
     needle[run.component] += set_pixels(needle_pixels, run);
     cell[run.component] += set_pixels(cell_pixels, run);
@@ -68,7 +68,7 @@ bool needle_merges_with_cell(const ClearedPicture& picture, const NeedlePose& ne
   for (Point& p : polygon) {
     p -= offset;
   }
-  draw_mask(needle_pixels, {polygon});
+  draw_mask(needle_pixels, std::span(&polygon, 1));
   for (const Point& p : outer) {
     if (!picture.hidden(p)) {
       const Point q = p - offset;
@@ -80,22 +80,18 @@ bool needle_merges_with_cell(const ClearedPicture& picture, const NeedlePose& ne
   return merge_classes(picture.strong, needle_pixels, cell_pixels, rows).merged;
 }
 
-namespace {
-
-constexpr double kBegin_px = 0.35, kEnd_px = 1.0;
-constexpr double kCertain_px = -1;  // so far inside they touch whatever the labels say
-
-}  // namespace
-
-bool merging_decides(const std::optional<double>& gap_px) {
-  return !gap_px || (*gap_px >= kCertain_px && *gap_px < kEnd_px);
-}
-
-bool touches(const std::optional<double>& gap_px, bool merged, bool touched_before) {
-  if (!gap_px) {
-    return merged;
-  }
-  return *gap_px < (touched_before ? kEnd_px : kBegin_px) && (merged || *gap_px < kCertain_px);
+bool ContactTest::update(double gap_px, double sd_px) {
+  constexpr double kChanges = 0.05;  // probability that the state changes in a frame: a visit takes some 20
+  constexpr double kSystematic_px = 0.2;  // by which the tip and the outline may be off alike in all frames
+  constexpr double kFarthest = 4;         // standard deviations: what is further off is as certain
+  const double odds = math::exp(log_odds_), stays = 1 - kChanges;
+  const double before = math::log((kChanges + stays * odds) / (stays + kChanges * odds));
+  // While apart any gap > 0 is as likely as another, while touching any < 0; both scatter as the measurement
+  // does. The ratio of the likelihoods is then that of the normal distribution function at -z and at z. Its
+  // logarithm is this cubic, within 6 % up to kFarthest (Bowling et al. 2009).
+  const double z = std::clamp(gap_px / math::hypot(sd_px, kSystematic_px), -kFarthest, kFarthest);
+  log_odds_ = before - (1.5976 + 0.07056 * z * z) * z;
+  return log_odds_ > 0;
 }
 
 }  // namespace punctum::vision

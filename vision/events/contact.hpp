@@ -1,9 +1,9 @@
-// Contact. The injection pipette, and the cell with the holding pipette, are two classes of the thresholded
-// picture after a vertical dilation; contact is when the two classes merge.
+// Contact. In the paper the injection pipette, and the cell with the holding pipette, are two classes of the
+// thresholded picture after a vertical dilation; contact is when the two classes merge. The tracker decides
+// by the gap.
 #pragma once
 
 #include <opencv2/core.hpp>
-#include <optional>
 
 #include "vision/membrane/cleared_picture.hpp"
 
@@ -23,9 +23,16 @@ struct Classes {
 [[nodiscard]] bool needle_merges_with_cell(const ClearedPicture& picture, const NeedlePose& needle,
                                            const Contour& outer, int rows);
 
-// Where the gap is known it decides, with hysteresis, and the merged classes confirm it; otherwise the merged
-// classes decide alone.
-[[nodiscard]] bool merging_decides(const std::optional<double>& gap_px);
-[[nodiscard]] bool touches(const std::optional<double>& gap_px, bool merged, bool touched_before);
+// The tracker's test: whether needle and cell touch, from the gap between the tip and the undeformed membrane
+// in every frame and its standard deviation. Of the two states, apart and touching, the likelier one given
+// all gaps so far (the forward filter of a hidden Markov chain).
+class ContactTest {
+ public:
+  // gap_px > 0 outside; any number, and sd_px is at least 0. True while touching is likelier.
+  bool update(double gap_px, double sd_px);
+
+ private:
+  double log_odds_ = -2.9;  // of touching, after many frames apart
+};
 
 }  // namespace punctum::vision

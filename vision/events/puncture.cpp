@@ -4,6 +4,15 @@
 
 namespace punctum::vision {
 
+namespace {
+constexpr double kDecides =
+    13.8;                        // log of a million: in so many frames a membrane that holds may be mistaken
+constexpr double kOneFrame = 9;  // at most by the contact points of one frame, which may be mistaken ones
+constexpr double kLearnt = 0.2;  // of a frame, of the membrane's share of the tip's depth
+constexpr double kLittle_px2 = 4;  // as much counts the usual share as a frame with the tip 2 px deep
+constexpr double kFree = 5;  // by the picture beside the needle, which says it with log odds of 3 or more
+}  // namespace
+
 bool Puncture::update(const PunctureInput& in) {
   velocity_ = 0;
   ++frames_;
@@ -13,9 +22,9 @@ bool Puncture::update(const PunctureInput& in) {
   if (!in.contact || !in.points) {
     have_last_ = false;
     inside_frames_ = 0;
-    recoil_frames_ = 0;
-    if (!in.contact) {
-      pushing_ = false;
+    if (!in.contact) {  // a frame that shows no contact points changes nothing
+      evidence_ = 0;
+      places_ = 0;
     }
     return punctured_;
   }
@@ -23,43 +32,39 @@ bool Puncture::update(const PunctureInput& in) {
     const double dt = static_cast<double>(in.t_ns - last_ns_) * 1e-9;
     velocity_ = (in.membrane_px - last_membrane_) / dt;
   }
-  if (!pushing_) {
-    pushing_ = true;
-    deepest_ = in.membrane_px;
-    tip_at_deepest_ = in.tip_px;
-  }
-  // The needle pushes the membrane no faster than it moves itself: a place further ahead is a mistaken
-  // contact point.
-  double membrane = in.membrane_px;
-  if (have_last_) {
-    membrane =
-        std::min(membrane, std::max(last_membrane_, deepest_) + std::max(0.0, in.tip_px - last_tip_) + 0.7);
-  }
-  if (membrane >= deepest_) {
-    deepest_ = membrane;
-    tip_at_deepest_ = in.tip_px;
-  }
-  const bool recoil = has_recoiled(in, membrane);
-  punctured_ = punctured_ || recoil;
+  weigh_recoil(in);
   const bool through = is_through_undented_membrane(in);
-  punctured_ = punctured_ || through;
+  punctured_ = punctured_ || evidence_ > kDecides || through;
   have_last_ = true;
   last_ns_ = in.t_ns;
-  last_membrane_ = membrane;
-  last_tip_ = in.tip_px;
+  last_membrane_ = in.membrane_px;
   return punctured_;
 }
 
-// Both signs of fig. 9: the membrane moves back in the picture, and further back than the needle was
-// withdrawn. A punctured membrane gives up most of its dimple at once. A quarter of the dimple in two frames,
-// or three quarters in one, is more than the scatter of the contact points.
-bool Puncture::has_recoiled(const PunctureInput& in, double membrane_px) {
-  const double back = deepest_ - membrane_px;
-  const double needle_back = std::max(0.0, tip_at_deepest_ - in.tip_px);
-  const double recoil = back - needle_back;
-  const double dimple = std::max(0.0, deepest_ - (in.membrane_px - in.depth_px));
-  recoil_frames_ = recoil > std::max(recoil_px_, 0.25 * dimple) ? recoil_frames_ + 1 : 0;
-  return recoil_frames_ >= 2 || recoil > std::max(3 * recoil_px_, 0.75 * dimple);
+// Both signs of fig. 9: the membrane goes back in the picture, and it is not where the tip would have it. A
+// membrane that holds lies at the same share of the tip's depth from frame to frame; a punctured one gives up
+// a quarter of that at least.
+void Puncture::weigh_recoil(const PunctureInput& in) {
+  const double pushed = share_ * in.tip_px;
+  const double least = std::max(recoil_px_, 0.25 * pushed);
+  const double off = pushed - in.membrane_px;
+  const auto known = std::min(places_, before_.size());
+  const double deepest =
+      known > 0 ? *std::max_element(before_.begin(), before_.begin() + static_cast<std::ptrdiff_t>(known))
+                : in.membrane_px;
+  const double recoil = std::min(off, deepest - in.membrane_px);
+  const double ratio = least * (recoil - 0.5 * least) / (in.sd_px * in.sd_px);
+  evidence_ = std::max(0.0, evidence_ + std::clamp(ratio, -kOneFrame, kOneFrame));
+  if (in.free && ratio > 0) {
+    evidence_ += kFree;
+  }
+  before_[places_++ % before_.size()] = in.membrane_px;
+  if (evidence_ == 0) {
+    const double seen = pushed - std::clamp(off, -2 * in.sd_px, 2 * in.sd_px);
+    tip_square_ += kLearnt * (in.tip_px * in.tip_px - tip_square_);
+    tip_membrane_ += kLearnt * (in.tip_px * seen - tip_membrane_);
+    share_ = (tip_membrane_ + kUsualShare * kLittle_px2) / (tip_square_ + kLittle_px2);
+  }
 }
 
 // A tip far inside a membrane that is hardly dented is through it, whether or not the recoil was seen. One

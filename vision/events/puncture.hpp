@@ -1,6 +1,8 @@
 // Puncture: the membrane, which the needle pushed until now, recoils against it (fig. 9).
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 
@@ -15,8 +17,11 @@ struct PunctureInput {
   double depth_px = 0;     // of the contact points past the undeformed membrane
   double gap_px = 0;       // tip to undeformed membrane, > 0 outside
   double radius_px = 0;    // of the needle
+  double sd_px = 0.7;      // of membrane_px
+  bool free = false;       // the picture beside the needle shows the membrane off the tip
 };
 
+// Page's sequential test (CUSUM) on the way that the membrane has gone back further than the needle.
 class Puncture {
  public:
   // recoil_px: least distance that the membrane has recoiled against the needle.
@@ -28,20 +33,22 @@ class Puncture {
   [[nodiscard]] double membrane_velocity_px_s() const noexcept { return velocity_; }
 
  private:
-  [[nodiscard]] bool has_recoiled(const PunctureInput& in, double membrane_px);
+  static constexpr double kUsualShare = 0.9;  // contact points lie beside the needle, a little behind its tip
+  void weigh_recoil(const PunctureInput& in);
   [[nodiscard]] bool is_through_undented_membrane(const PunctureInput& in);
 
   double recoil_px_;
   bool punctured_ = false;
   bool have_last_ = false;
   std::int64_t last_ns_ = 0;
-  double last_membrane_ = 0, last_tip_ = 0;
+  double last_membrane_ = 0;
   double velocity_ = 0;
-  double deepest_ = 0;  // of the membrane since contact began
-  double tip_at_deepest_ = 0;
-  bool pushing_ = false;     // the needle has touched the membrane since it was last away from it
+  double share_ = kUsualShare;                // of the tip's depth to which the membrane is pushed
+  double tip_square_ = 0, tip_membrane_ = 0;  // means over the frames: tip^2, tip times membrane
+  std::array<double, 4> before_{};            // membrane_px of the frames before, the newest at places_ - 1
+  std::size_t places_ = 0;
   int inside_frames_ = 0;    // in a row with the tip inside a membrane that is hardly dented
-  int recoil_frames_ = 0;    // in a row with a recoil
+  double evidence_ = 0;      // log odds of a recoil against none, over the frames since there was none
   std::int64_t frames_ = 0;  // since the start or the last reset
 };
 

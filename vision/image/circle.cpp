@@ -5,22 +5,22 @@
 #include <cstddef>
 #include <numbers>
 #include <opencv2/core.hpp>
-#include <vector>
 
-#include "hal/math/elementary.hpp"
 #include "vision/image/median.hpp"
+#include "vision/image/polar_contour.hpp"
 
 namespace punctum::vision {
 
 namespace {
 
 constexpr int kReweightings = 4;
-constexpr int kNewtonSteps = 3;
+constexpr int kNewtonSteps = 3,
+              kNewtonStepsAgain = 1;  // of the first round, and of those that begin at its circle
 constexpr double kTukeyScales = 4.7;  // times the scale: 95 % efficiency for normally distributed errors
 constexpr double kLeastScale = 0.05;  // px
 
 // Kasa's algebraic fit, from its normal equations about `mean`. The centre is relative to `mean`.
-std::optional<Circle> algebraic_circle(std::span<const Point> points, const std::vector<double>& w,
+std::optional<Circle> algebraic_circle(std::span<const Point> points, const Vector<double>& w,
                                        const Point& mean) {
   double sxx = 0, sxy = 0, syy = 0, sx = 0, sy = 0, s1 = 0, sxz = 0, syz = 0, sz = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -52,20 +52,28 @@ std::optional<Circle> algebraic_circle(std::span<const Point> points, const std:
 }
 
 // Gauss-Newton steps that make the fit geometric: the squared distances from the circle are minimised.
-void refine(std::span<const Point> points, const std::vector<double>& w, const Point& mean, Circle& c) {
-  for (int step = 0; step < kNewtonSteps; ++step) {
-    cv::Matx33d a = cv::Matx33d::zeros();
-    cv::Vec3d b(0, 0, 0);
+void refine(std::span<const Point> points, const Vector<double>& w, const Point& mean, int steps, Circle& c) {
+  for (int step = 0; step < steps; ++step) {
+    double xx = 0, xy = 0, yy = 0, x1 = 0, y1 = 0, one = 0, bx = 0, by = 0, b1 = 0;
     for (std::size_t i = 0; i < points.size(); ++i) {
       const Point d = points[i] - mean - c.centre;
-      const double l = cv::norm(d);
+      const double l = std::sqrt(d.dot(d));
       if (l < 1e-9) {
         continue;
       }
-      const cv::Vec3d j(d.x / l, d.y / l, 1);
-      a += w[i] * (j * j.t());
-      b += w[i] * (l - c.r) * j;
+      const double x = d.x / l, y = d.y / l, wx = w[i] * x, wy = w[i] * y, off = l - c.r;
+      xx += wx * x;
+      xy += wx * y;
+      yy += wy * y;
+      x1 += wx;
+      y1 += wy;
+      one += w[i];
+      bx += wx * off;
+      by += wy * off;
+      b1 += w[i] * off;
     }
+    const cv::Matx33d a(xx, xy, x1, xy, yy, y1, x1, y1, one);
+    const cv::Vec3d b(bx, by, b1);
     const cv::Vec3d s = a.solve(b, cv::DECOMP_LU);
     if (!std::isfinite(s[0] + s[1] + s[2])) {
       return;
@@ -76,7 +84,7 @@ void refine(std::span<const Point> points, const std::vector<double>& w, const P
 }
 
 // From the normal matrix of the fit and the rms distance; `part` of the points was fitted.
-double radius_sd(std::span<const Point> points, const std::vector<double>& w, const Circle& c, double part) {
+double radius_sd(std::span<const Point> points, const Vector<double>& w, const Circle& c, double part) {
   cv::Matx33d a = cv::Matx33d::zeros();
   double sum = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -94,21 +102,15 @@ double radius_sd(std::span<const Point> points, const std::vector<double>& w, co
 }  // namespace
 
 Contour circle_contour(const Circle& circle, int points) {
-  Contour out;
-  out.reserve(static_cast<std::size_t>(std::max(points, 0)));
-  for (int i = 0; i < points; ++i) {
-    const double t = 2 * std::numbers::pi * i / points;
-    out.push_back(circle.centre + circle.r * Point(math::cos(t), math::sin(t)));
-  }
-  return out;
+  return from_polar(circle.centre, Vector<double>(static_cast<std::size_t>(std::max(points, 0)), circle.r));
 }
 
 std::optional<Circle> fit_circle(std::span<const Point> points, std::span<const double> weights) {
-  std::vector<double> w(points.size(), 1.0);
+  Vector<double> w(points.size(), 1.0);
   if (weights.size() == points.size()) {
     w.assign(weights.begin(), weights.end());
   }
-  const std::vector<double> given = w;
+  const Vector<double> given = w;
   Point mean;
   double total = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -120,18 +122,20 @@ std::optional<Circle> fit_circle(std::span<const Point> points, std::span<const 
   }
   mean *= 1 / total;
   Circle out;
+  Vector<double> distances;
+  distances.reserve(points.size());
+  std::optional<Circle> c = algebraic_circle(points, w, mean);
   for (int round = 0; round < kReweightings; ++round) {
-    std::optional<Circle> c = algebraic_circle(points, w, mean);
     if (!c) {
       return std::nullopt;
     }
-    refine(points, w, mean, *c);
+    refine(points, w, mean, round == 0 ? kNewtonSteps : kNewtonStepsAgain, *c);
     if (!std::isfinite(c->centre.x + c->centre.y + c->r) || c->r <= 0) {
       return std::nullopt;
     }
     out.centre = c->centre + mean;
     out.r = c->r;
-    std::vector<double> distances;
+    distances.clear();
     double se = 0, sw = 0;
     for (std::size_t i = 0; i < points.size(); ++i) {
       const double d = cv::norm(points[i] - out.centre) - out.r;
@@ -142,7 +146,7 @@ std::optional<Circle> fit_circle(std::span<const Point> points, std::span<const 
       sw += w[i];
     }
     out.rms = std::sqrt(se / std::max(sw, 1e-12));
-    const double scale = std::max(kSdOfMedian * median_of(std::move(distances)), kLeastScale);
+    const double scale = std::max(kSdOfMedian * median_in_place(distances), kLeastScale);
     for (std::size_t i = 0; i < points.size(); ++i) {
       const double t = (cv::norm(points[i] - out.centre) - out.r) / (kTukeyScales * scale);
       w[i] = std::abs(t) < 1 ? given[i] * std::pow(1 - t * t, 2) : 0;

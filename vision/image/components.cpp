@@ -54,7 +54,7 @@ class Trees {
   }
 
  private:
-  std::vector<std::size_t> parent_;
+  Vector<std::size_t> parent_;
 };
 
 void join_neighbouring_rows(const Components& c, Trees& trees) {
@@ -75,6 +75,12 @@ void join_neighbouring_rows(const Components& c, Trees& trees) {
 
 Components components_of(const cv::Mat& binary) {
   Components out;
+  constexpr std::size_t kRunsPerRow = 8, kRunsPerComponent = 2;  // of a usual picture: more need more memory
+  const std::size_t rows = static_cast<std::size_t>(binary.rows), usual = kRunsPerRow * rows;
+  out.row.reserve(rows + 1);
+  out.runs.reserve(usual);
+  out.box.reserve(usual / kRunsPerComponent);
+  out.pixels.reserve(usual / kRunsPerComponent);
   find_runs(binary, out);
   Trees trees(out.runs.size());
   join_neighbouring_rows(out, trees);

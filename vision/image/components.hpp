@@ -3,7 +3,8 @@
 
 #include <opencv2/core.hpp>
 #include <span>
-#include <vector>
+
+#include "vision/image/kept_vector.hpp"
 
 namespace punctum::vision {
 
@@ -14,10 +15,10 @@ struct PixelRun {
 };
 
 struct Components {
-  std::vector<PixelRun> runs;    // row by row, from left to right
-  std::vector<std::size_t> row;  // first run of each row; one more for the end
-  std::vector<cv::Rect> box;     // of each component
-  std::vector<int> pixels;       // likewise
+  Vector<PixelRun> runs;    // row by row, from left to right
+  Vector<std::size_t> row;  // first run of each row; one more for the end
+  Vector<cv::Rect> box;     // of each component
+  Vector<int> pixels;       // likewise
 
   [[nodiscard]] std::span<const PixelRun> in_row(int y) const {
     const std::size_t k = static_cast<std::size_t>(y);

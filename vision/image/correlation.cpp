@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
-#include <vector>
 
+#include "vision/image/kept_memory.hpp"
 #include "vision/image/parabola.hpp"
 
 namespace punctum::vision {
@@ -46,13 +46,17 @@ double correlation_at(const cv::Mat& window, const cv::Mat& pattern, double powe
 
 // Of floats. Column by column, of which a compiler makes several at once, and then over the columns.
 cv::Mat centred_correlations(const cv::Mat& window, const cv::Mat& pattern, const cv::Size& places) {
-  cv::Mat map(places, CV_32F), centred;
-  cv::subtract(pattern, cv::mean(pattern), centred);
+  cv::Mat map = kept_picture(places, CV_32F), centred = kept_picture(pattern.size(), CV_32F);
+  const auto mean = static_cast<float>(cv::mean(pattern)[0]);
+  for (int y = 0; y < pattern.rows; ++y) {
+    std::transform(pattern.ptr<float>(y), pattern.ptr<float>(y) + pattern.cols, centred.ptr<float>(y),
+                   [mean](float v) { return v - mean; });
+  }
   const double power = cv::norm(centred, cv::NORM_L2SQR), count = static_cast<double>(pattern.total());
   const float usual = window.at<float>(0, 0);  // taken off: squares of small numbers lose fewer digits
   const auto n = static_cast<std::size_t>(pattern.cols), all = static_cast<std::size_t>(window.cols);
-  std::vector<float> sum(all), squares(all), dot(n);
-  const auto total = [n](const std::vector<float>& v, int from) {
+  Vector<float> sum(all), squares(all), dot(n);
+  const auto total = [n](const Vector<float>& v, int from) {
     return std::accumulate(v.begin() + from, v.begin() + from + static_cast<std::ptrdiff_t>(n), 0.0);
   };
   for (int top = 0; top < places.height; ++top) {
@@ -86,7 +90,8 @@ cv::Mat centred_correlations(const cv::Mat& window, const cv::Mat& pattern, cons
 cv::Mat correlation_map(const cv::Mat& window, const cv::Mat& pattern) {
   const cv::Size places(window.cols - pattern.cols + 1, window.rows - pattern.rows + 1);
   if (!pattern.empty() && places.width > 0 && places.height > 0 && places.area() <= kFewPlaces) {
-    cv::Mat map(places, CV_32F), in, of;
+    cv::Mat map = kept_picture(places, CV_32F), in = kept_picture(window.size(), CV_16S),
+            of = kept_picture(pattern.size(), CV_16S);
     window.convertTo(in, CV_16S);
     pattern.convertTo(of, CV_16S);
     const double power = cv::norm(pattern, cv::NORM_L2SQR);

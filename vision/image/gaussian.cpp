@@ -4,7 +4,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <vector>
 
 #include "hal/math/elementary.hpp"
 #include "vision/image/dispatched.hpp"
@@ -38,14 +37,22 @@ PUNCTUM_WIDE_LOOP void blend(const Rows& r, const Weights& w, int n, float* out)
   }
 }
 
+PUNCTUM_WIDE_LOOP void widen(const std::uint8_t* in, int n, float* out) {
+  for (int x = 0; x < n; ++x) {
+    out[x] = in[x];
+  }
+}
+
 }  // namespace
 
-void smooth_part(const cv::Mat& grey, const cv::Rect& part, double sigma_px, cv::Mat& out) {
+void smooth_part(const cv::Mat& grey, const cv::Rect& part, double sigma_px, SmoothingRows& kept,
+                 cv::Mat& out) {
   const Weights weights = weights_of(sigma_px);
   const int n = part.width;
   out.create(part.size(), CV_32F);
-  std::vector<float> wide(static_cast<std::size_t>(n + 2 * kReach));
-  std::vector<float> across(static_cast<std::size_t>(n) * (2 * kReach + 1));  // of the last nine rows
+  auto& [wide, across] = kept;  // across: of the last nine rows
+  wide.resize(static_cast<std::size_t>(n + 2 * kReach));
+  across.resize(static_cast<std::size_t>(n) * (2 * kReach + 1));
   const auto row_of = [&](int y) {
     return across.data() +
            static_cast<std::size_t>((y + kReach) % (2 * kReach + 1)) * static_cast<std::size_t>(n);
@@ -54,7 +61,7 @@ void smooth_part(const cv::Mat& grey, const cv::Rect& part, double sigma_px, cv:
   for (int y = -kReach; y < part.height + kReach; ++y) {
     const std::uint8_t* in = grey.ptr(std::clamp(part.y + y, 0, grey.rows - 1));
     const auto first = wide.begin() + (from - part.x + kReach), last = first + (to - from);
-    std::copy(in + from, in + to, first);
+    widen(in + from, to - from, &*first);
     std::fill(wide.begin(), first, *first);
     std::fill(last, wide.end(), *(last - 1));
     Rows rows{};

@@ -38,19 +38,24 @@ void CircleSearch::vote(const GradientField& field, const cv::Mat& blocked, doub
     return;
   }
   const cv::Rect a = field.area;
-  std::vector<Vote> votes;
+  Vector<Vote> votes;
   const int first = std::max(rows.start, 1), end = std::min(rows.end, a.height - 1);
+  if (first >= end) {
+    return;
+  }
+  const cv::Mat lengths = field.magnitude(cv::Range(first - 1, end + 1));
   for (int y = first; y < end; ++y) {
-    const float *gx = field.gx.ptr<float>(y), *gy = field.gy.ptr<float>(y), *m = field.sobel.ptr<float>(y);
+    const auto* slope = field.slope.ptr<cv::Vec2f>(y);
+    const float* m = lengths.ptr<float>(y - first + 1);
     for (int x = 1; x + 1 < a.width; ++x) {
       const double g = static_cast<double>(m[x]);
       if (g <= threshold || (!blocked.empty() && blocked.at<std::uint8_t>(y + a.y, x + a.x) > 0)) {
         continue;
       }
-      const double nx = static_cast<double>(gx[x]) / g, ny = static_cast<double>(gy[x]) / g;
+      const double nx = static_cast<double>(slope[x][0]) / g, ny = static_cast<double>(slope[x][1]) / g;
       const int sx = static_cast<int>(std::lround(nx)), sy = static_cast<int>(std::lround(ny));
-      if (static_cast<double>(field.sobel.at<float>(y + sy, x + sx)) > g ||
-          static_cast<double>(field.sobel.at<float>(y - sy, x - sx)) > g) {
+      if (static_cast<double>(lengths.at<float>(y - first + 1 + sy, x + sx)) > g ||
+          static_cast<double>(lengths.at<float>(y - first + 1 - sy, x - sx)) > g) {
         continue;
       }
       votes.push_back({Point(x + a.x, y + a.y), Point(nx, ny)});
@@ -86,7 +91,7 @@ void CircleSearch::count(const Vote& v) {
 
 // In shares of the circumference. Neighbouring layers are added up, since a membrane is not a perfect circle.
 void CircleSearch::smooth() {
-  std::vector<cv::Mat> smoothed(layers_.size());
+  Vector<cv::Mat> smoothed(layers_.size());
   for (std::size_t k = 0; k < layers_.size(); ++k) {
     layers_[k] *= 1 / radius(k);
   }
@@ -136,7 +141,7 @@ void CircleSearch::refine(CircleCandidate& c) const {
   constexpr int kSectors = 72;
   for (int round = 0; round < 3; ++round) {
     const double tolerance = std::max(2.5, 0.06 * c.circle.r / (1 + round));
-    std::vector<Point> near;
+    Vector<Point> near;
     bool voted[kSectors] = {};
     for (const Vote& v : votes_) {
       const Point d = v.p - c.circle.centre;
@@ -160,7 +165,7 @@ void CircleSearch::refine(CircleCandidate& c) const {
   }
 }
 
-std::vector<CircleCandidate> CircleSearch::best(int wanted) {
+Vector<CircleCandidate> CircleSearch::best(int wanted) {
   if (votes_.size() < 16) {
     return {};
   }
@@ -169,7 +174,7 @@ std::vector<CircleCandidate> CircleSearch::best(int wanted) {
   for (const cv::Mat& layer : layers_) {
     top_.push_back(highest_of(layer));
   }
-  std::vector<CircleCandidate> out;
+  Vector<CircleCandidate> out;
   for (int n = 0; n < wanted; ++n) {
     const std::optional<Circle> highest = take_highest();
     if (!highest) {
@@ -185,8 +190,8 @@ std::vector<CircleCandidate> CircleSearch::best(int wanted) {
   return out;
 }
 
-std::vector<CircleCandidate> find_circles(const GradientField& field, const cv::Mat& blocked,
-                                          double threshold, double r_min, double r_max, int wanted) {
+Vector<CircleCandidate> find_circles(const GradientField& field, const cv::Mat& blocked, double threshold,
+                                     double r_min, double r_max, int wanted) {
   CircleSearch search(field.area, r_min, r_max);
   search.vote(field, blocked, threshold, cv::Range::all());
   return search.best(wanted);

@@ -3,10 +3,10 @@
 
 #include <opencv2/core.hpp>
 #include <optional>
-#include <vector>
 
 #include "vision/image/circle.hpp"
 #include "vision/image/gradient.hpp"
+#include "vision/image/kept_vector.hpp"
 
 namespace punctum::vision {
 
@@ -27,7 +27,7 @@ class CircleSearch {
 
   // Once all have voted. At most `wanted` candidates, the best first, whose centres differ by more than
   // r_min / 3 or whose radii differ by more than 15 %.
-  [[nodiscard]] std::vector<CircleCandidate> best(int wanted);
+  [[nodiscard]] Vector<CircleCandidate> best(int wanted);
 
  private:
   struct Vote {
@@ -47,15 +47,14 @@ class CircleSearch {
   void refine(CircleCandidate& c) const;
 
   cv::Rect area_;
-  double r_min_, cell_;          // px; the cells over centre and radius are cubes
-  std::vector<cv::Mat> layers_;  // CV_32F, one per radius
-  std::vector<Top> top_;         // of each layer
-  std::vector<Vote> votes_;
+  double r_min_, cell_;     // px; the cells over centre and radius are cubes
+  Vector<cv::Mat> layers_;  // CV_32F, one per radius
+  Vector<Top> top_;         // of each layer
+  Vector<Vote> votes_;
 };
 
 // The whole field at once.
-[[nodiscard]] std::vector<CircleCandidate> find_circles(const GradientField& field, const cv::Mat& blocked,
-                                                        double threshold, double r_min, double r_max,
-                                                        int wanted);
+[[nodiscard]] Vector<CircleCandidate> find_circles(const GradientField& field, const cv::Mat& blocked,
+                                                   double threshold, double r_min, double r_max, int wanted);
 
 }  // namespace punctum::vision

@@ -8,11 +8,13 @@ namespace punctum::vision {
 namespace {
 
 // Drops the components that have a pixel in the square of `reach` px round a point of a membrane.
-void drop_near_membranes(const Components& all, const std::vector<Contour>& membranes, int reach,
-                         std::vector<bool>& chosen) {
+void drop_near_membranes(const Components& all, const Vector<Contour>& membranes, int reach,
+                         Vector<bool>& chosen) {
   // Most runs belong to components that are not chosen anyhow.
-  std::vector<PixelRun> runs;
-  std::vector<std::size_t> row;
+  Vector<PixelRun> runs;
+  Vector<std::size_t> row;
+  runs.reserve(all.runs.size());
+  row.reserve(all.row.size());
   for (std::size_t y = 0; y + 1 < all.row.size(); ++y) {
     row.push_back(runs.size());
     std::copy_if(all.runs.begin() + static_cast<std::ptrdiff_t>(all.row[y]),
@@ -38,11 +40,11 @@ void drop_near_membranes(const Components& all, const std::vector<Contour>& memb
 
 }  // namespace
 
-int find_impurities(const cv::Mat& binary, const std::vector<Contour>& membranes, double max_side,
-                    int min_area, double keep, std::vector<PixelRun>& pixels) {
+int find_impurities(const cv::Mat& binary, const Vector<Contour>& membranes, double max_side, int min_area,
+                    double keep, Vector<PixelRun>& pixels) {
   pixels.clear();
   const Components all = components_of(binary);
-  std::vector<bool> chosen(all.box.size());
+  Vector<bool> chosen(all.box.size());
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     chosen[i] = all.pixels[i] >= min_area && all.box[i].width <= max_side && all.box[i].height <= max_side;
   }

@@ -3,7 +3,8 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <vector>
+
+#include "vision/image/kept_vector.hpp"
 
 namespace punctum::vision {
 
@@ -13,7 +14,7 @@ inline constexpr double kSdOfMedian = 1.4826;
 // The upper one of the two middle values of an even number of values; 0 if there are none. The order of the
 // values is lost.
 template <class T>
-[[nodiscard]] double median_in_place(std::vector<T>& v) {
+[[nodiscard]] double median_in_place(Vector<T>& v) {
   if (v.empty()) {
     return 0;
   }
@@ -38,7 +39,7 @@ template <class T>
 }
 
 template <class T>
-[[nodiscard]] double median_of(std::vector<T> v) {
+[[nodiscard]] double median_of(Vector<T> v) {
   return median_in_place(v);
 }
 

@@ -3,15 +3,18 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <vector>
+
+#include "vision/image/dispatched.hpp"
+#include "vision/image/kept_vector.hpp"
 
 namespace punctum::vision {
 
 namespace {
 
 // Absolute values; of every pixel, since the compiler vectorises that.
-void second_differences(const std::uint8_t* above, const std::uint8_t* here, const std::uint8_t* below, int n,
-                        std::int16_t* upright, std::int16_t* both) {
+PUNCTUM_WIDE_LOOP void second_differences(const std::uint8_t* above, const std::uint8_t* here,
+                                          const std::uint8_t* below, int n, std::int16_t* upright,
+                                          std::int16_t* both) {
   for (int x = 0; x < n; ++x) {
     upright[x] = static_cast<std::int16_t>(above[x] - 2 * here[x] + below[x]);
   }
@@ -31,7 +34,7 @@ double noise_level(const cv::Mat& grey, int stride) {
   const int cols = grey.cols;
   std::array<int, 2041> count{};  // |1 -2 1; -2 4 -2; 1 -2 1| <= 2040
   std::int64_t total = 0;
-  std::vector<std::int16_t> upright(static_cast<std::size_t>(cols)), both(upright);
+  Vector<std::int16_t> upright(static_cast<std::size_t>(cols)), both(upright);
   for (int y = 1; y + 1 < grey.rows; y += stride) {
     second_differences(grey.ptr(y - 1), grey.ptr(y), grey.ptr(y + 1), cols, upright.data(), both.data());
     for (int x = 1; x + 1 < cols; x += stride) {

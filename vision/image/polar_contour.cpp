@@ -8,11 +8,9 @@
 
 namespace punctum::vision {
 
-namespace {
-
-// Unit vectors along the rays. Almost every contour has the same number of them.
-const std::vector<Point>& rays(int angles) {
-  thread_local std::vector<Point> of_last;
+// Almost every contour has the same number of them.
+std::span<const Point> unit_rays(int angles) {
+  thread_local Vector<Point> of_last;
   if (of_last.size() != static_cast<std::size_t>(angles)) {
     of_last.clear();
     for (int i = 0; i < angles; ++i) {
@@ -23,12 +21,10 @@ const std::vector<Point>& rays(int angles) {
   return of_last;
 }
 
-}  // namespace
-
-std::vector<double> polar_radii(std::span<const Point> contour, const Point& centre, int angles) {
+Vector<double> polar_radii(std::span<const Point> contour, const Point& centre, int angles) {
   const std::size_t n = static_cast<std::size_t>(angles);
-  std::vector<double> out(n, -1.0);
-  const std::vector<Point>& ray = rays(angles);
+  Vector<double> out(n, -1.0);
+  const std::span<const Point> ray = unit_rays(angles);
   const auto next = [n](std::size_t k) { return k + 1 < n ? k + 1 : 0; };
   if (contour.empty() || n < 3) {
     return {};
@@ -88,7 +84,7 @@ std::vector<double> polar_radii(std::span<const Point> contour, const Point& cen
 Contour from_polar(const Point& centre, std::span<const double> radii) {
   Contour out;
   out.reserve(radii.size());
-  const std::vector<Point>& ray = rays(static_cast<int>(radii.size()));
+  const std::span<const Point> ray = unit_rays(static_cast<int>(radii.size()));
   for (std::size_t i = 0; i < radii.size(); ++i) {
     out.push_back(centre + radii[i] * ray[i]);
   }
@@ -103,7 +99,7 @@ int polar_index(const Point& direction, int angles) {
 }
 
 Point on_ray(const Point& centre, int i, int angles, double r) {
-  return centre + r * rays(angles)[static_cast<std::size_t>(i)];
+  return centre + r * unit_rays(angles)[static_cast<std::size_t>(i)];
 }
 
 double angle_between(double a, double b) {

@@ -3,18 +3,19 @@
 #pragma once
 
 #include <span>
-#include <vector>
 
 #include "vision/image/contour.hpp"
+#include "vision/image/kept_vector.hpp"
 
 namespace punctum::vision {
 
 // The radii of a contour seen from `centre`. Where a wall overhangs, the outermost crossing counts. Empty if
 // fewer than half of the rays cross the contour.
-[[nodiscard]] std::vector<double> polar_radii(std::span<const Point> contour, const Point& centre,
-                                              int angles);
+[[nodiscard]] Vector<double> polar_radii(std::span<const Point> contour, const Point& centre, int angles);
 [[nodiscard]] Contour from_polar(const Point& centre, std::span<const double> radii);
 
+// Along each of the rays; valid until the next call for another number of them in this thread.
+[[nodiscard]] std::span<const Point> unit_rays(int angles);
 [[nodiscard]] double polar_angle(int i, int angles);                // of the i-th ray, rad
 [[nodiscard]] int polar_index(const Point& direction, int angles);  // of the nearest ray
 [[nodiscard]] Point on_ray(const Point& centre, int i, int angles, double r);

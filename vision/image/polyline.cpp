@@ -23,7 +23,7 @@ double squared_distance(const Point& p, const Point& a, const Point& b) {
 
 }  // namespace
 
-Polyline::Polyline(std::vector<Point> points, bool closed) : points_(std::move(points)) {
+Polyline::Polyline(Vector<Point> points, bool closed) : points_(std::move(points)) {
   if (points_.size() < 2) {
     throw std::invalid_argument("a line needs two points");
   }

@@ -2,16 +2,16 @@
 #pragma once
 
 #include <cstddef>
-#include <vector>
 
 #include "vision/image/contour.hpp"
+#include "vision/image/kept_vector.hpp"
 
 namespace punctum::vision {
 
 class Polyline {
  public:
   // At least two points. closed: the last is joined to the first.
-  explicit Polyline(std::vector<Point> points, bool closed = false);
+  explicit Polyline(Vector<Point> points, bool closed = false);
   [[nodiscard]] double distance(const Point& p) const;  // to the nearest place on the line, >= 0
 
  private:
@@ -21,8 +21,8 @@ class Polyline {
     Point centre;
     double radius;
   };
-  std::vector<Point> points_;  // when closed, the first is repeated at the end
-  std::vector<Run> runs_;
+  Vector<Point> points_;  // when closed, the first is repeated at the end
+  Vector<Run> runs_;
 };
 
 }  // namespace punctum::vision

@@ -19,17 +19,19 @@ class Registration {
     double sd = 0;  // px, in the direction in which the pattern tells least
   };
   // In a CV_8U picture, near `corner`. Empty where it is not within 2.5 px of it, or reaches over the border.
-  [[nodiscard]] std::optional<Place> place(const cv::Mat& grey, const Point& corner) const;
+  [[nodiscard]] std::optional<Place> place(const cv::Mat& grey, const Point& corner);
 
   // Centred correlation of the smoothed grey levels with the corner there, which must be in the picture; -1
   // .. 1.
-  [[nodiscard]] double similarity(const cv::Mat& grey, const cv::Point& corner) const;
+  [[nodiscard]] double similarity(const cv::Mat& grey, const cv::Point& corner);
 
  private:
   GradientField pattern_;
   double mean_ = 0, power_ = 0;      // of its smoothed grey levels
   double xx_ = 0, xy_ = 0, yy_ = 0;  // sums of products of its gradient
   double least_ = 0;  // of the sum over squared gradients in one direction, without the noise's share
+  KeptMemory kept_, kept_shifted_;  // of place()
+  SmoothingRows rows_;
 };
 
 }  // namespace punctum::vision

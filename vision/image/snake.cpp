@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <vector>
 
 namespace punctum::vision {
 
@@ -27,8 +26,8 @@ namespace {
 
 // The square of whole pixels round a node that is searched in one step.
 struct Neighbourhood {
-  std::vector<Point> at;
-  std::vector<double> elastic, bending, gradient;
+  Vector<Point> at;
+  Vector<double> elastic, bending, gradient;
   double elastic_max = 0, bending_max = 0, gradient_min = 0, gradient_max = 0;
   std::size_t here = 0;  // where the node is now
 

@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <opencv2/core.hpp>
 #include <utility>
-#include <vector>
 
 namespace punctum::vision {
 
@@ -12,9 +11,9 @@ namespace {
 
 // Second derivatives of the periodic cubic spline with knot spacing h through y: cyclic tridiagonal system,
 // solved by the Sherman-Morrison correction of the Thomas algorithm.
-std::vector<double> second_derivatives(const std::vector<double>& y, const std::vector<double>& h) {
+Vector<double> second_derivatives(const Vector<double>& y, const Vector<double>& h) {
   const std::size_t n = y.size();
-  std::vector<double> a(n), b(n), c(n), d(n);
+  Vector<double> a(n), b(n), c(n), d(n);
   for (std::size_t i = 0; i < n; ++i) {
     const std::size_t p = (i + n - 1) % n, q = (i + 1) % n;
     a[i] = h[p];
@@ -23,13 +22,13 @@ std::vector<double> second_derivatives(const std::vector<double>& y, const std::
     d[i] = 6 * ((y[q] - y[i]) / h[i] - (y[i] - y[p]) / h[p]);
   }
   const double gamma = -b[0];
-  std::vector<double> bb = b, u(n, 0.0);
+  Vector<double> bb = b, u(n, 0.0);
   bb[0] = b[0] - gamma;
   bb[n - 1] = b[n - 1] - a[0] * c[n - 1] / gamma;
   u[0] = gamma;
   u[n - 1] = c[n - 1];
-  const auto solve = [&](std::vector<double> r) {
-    std::vector<double> cp(n);
+  const auto solve = [&](Vector<double> r) {
+    Vector<double> cp(n);
     double beta = bb[0];
     r[0] /= beta;
     for (std::size_t i = 1; i < n; ++i) {
@@ -42,8 +41,8 @@ std::vector<double> second_derivatives(const std::vector<double>& y, const std::
     }
     return r;
   };
-  std::vector<double> x = solve(d);
-  const std::vector<double> z = solve(u);
+  Vector<double> x = solve(d);
+  const Vector<double> z = solve(u);
   const double f = (x[0] + x[n - 1] * a[0] / gamma) / (1 + z[0] + z[n - 1] * a[0] / gamma);
   for (std::size_t i = 0; i < n; ++i) {
     x[i] -= f * z[i];
@@ -86,7 +85,7 @@ class PeriodicSpline {
   }
 
  private:
-  std::vector<double> h_, x_, y_, mx_, my_;
+  Vector<double> h_, x_, y_, mx_, my_;
 };
 
 }  // namespace
@@ -100,7 +99,7 @@ Contour spline_through(std::span<const Point> nodes, int points) {
   const std::size_t n = spline.segments();
   // The length is measured along a dense polygon.
   const int per_segment = std::max(8, 4 * points / static_cast<int>(n));
-  std::vector<Point> dense;
+  Vector<Point> dense;
   dense.reserve(n * static_cast<std::size_t>(per_segment) + 1);
   for (std::size_t i = 0; i < n; ++i) {
     for (int j = 0; j < per_segment; ++j) {
@@ -108,7 +107,7 @@ Contour spline_through(std::span<const Point> nodes, int points) {
     }
   }
   dense.push_back(dense.front());
-  std::vector<double> length(dense.size(), 0.0);
+  Vector<double> length(dense.size(), 0.0);
   for (std::size_t i = 1; i < dense.size(); ++i) {
     length[i] = length[i - 1] + cv::norm(dense[i] - dense[i - 1]);
   }

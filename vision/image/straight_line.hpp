@@ -4,7 +4,8 @@
 #include <cmath>
 #include <cstddef>
 #include <optional>
-#include <vector>
+
+#include "vision/image/kept_vector.hpp"
 
 namespace punctum::vision {
 
@@ -14,9 +15,8 @@ struct StraightLine {
 };
 
 // Empty when the points do not determine a line.
-[[nodiscard]] inline std::optional<StraightLine> fit_line(const std::vector<double>& x,
-                                                          const std::vector<double>& y,
-                                                          const std::vector<double>& weight) {
+[[nodiscard]] inline std::optional<StraightLine> fit_line(const Vector<double>& x, const Vector<double>& y,
+                                                          const Vector<double>& weight) {
   double s0 = 0, s1 = 0, s2 = 0, y0 = 0, y1 = 0;
   for (std::size_t i = 0; i < x.size(); ++i) {
     s0 += weight[i];

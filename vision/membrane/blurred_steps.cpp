@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
+#include <utility>
 
 #include "hal/math/elementary.hpp"
 #include "vision/image/blurred_step.hpp"
@@ -28,7 +29,7 @@ double place_of(const EdgeShape& edge, std::size_t sample) {  // px from the con
 
 // Whether it is brighter beside the outer face of a wall than further out: the halo of a cell out of
 // perfect focus.
-bool BlurredSteps::bright_outside(const std::vector<double>& shape, const EdgeShape& edge) {
+bool BlurredSteps::bright_outside(const Vector<double>& shape, const EdgeShape& edge) {
   constexpr double kShare = 0.15;  // of what the shape spans
   constexpr std::ptrdiff_t kFarOut = 3;
   if (!edge.nearby || edge.nearby->at > 0) {
@@ -40,9 +41,17 @@ bool BlurredSteps::bright_outside(const std::vector<double>& shape, const EdgeSh
          place_of(edge, static_cast<std::size_t>(most - shape.begin())) > -kFurthestStep_px;
 }
 
-std::optional<BlurredSteps::Fit> BlurredSteps::fit() {
-  cv::Vec4d x(0, kBlurFirst_px, edge_.nearby ? edge_.nearby->at : 0, 1.5);
+std::optional<BlurredSteps::Fit> BlurredSteps::fit(const std::optional<cv::Vec4d>& last) {
+  auto found = last ? fit_from(*last) : std::nullopt;
+  return found ? found : fit_from({0, kBlurFirst_px, edge_.nearby ? edge_.nearby->at : 0, 1.5});
+}
+
+std::optional<BlurredSteps::Fit> BlurredSteps::fit_from(cv::Vec4d x) {
+  if (edge_.nearby && !free(2)) {
+    x[2] = edge_.nearby->at;
+  }
   double cost = residuals(x, now_), damping = 1e-3;
+  cv::Vec4d heights = heights_;
   for (int round = 0; round < 25 && damping < 1e4; ++round) {
     const cv::Vec4d y = x + step(x, damping);
     const double next = residuals(y, ahead_);
@@ -53,7 +62,8 @@ std::optional<BlurredSteps::Fit> BlurredSteps::fit() {
     const bool settled = cost - next < 1e-4 * cost;
     x = y;
     cost = next;
-    now_ = ahead_;
+    heights = heights_;
+    std::swap(now_, ahead_);
     damping = std::max(damping / 5, 1e-6);
     if (settled) {
       break;
@@ -63,14 +73,14 @@ std::optional<BlurredSteps::Fit> BlurredSteps::fit() {
   if (!plausible) {
     return std::nullopt;
   }
-  (void)residuals(x, now_);
-  return Fit{x[0], x[1], heights_[2], halo_};
+  return Fit{x[0], x[1], heights[2], halo_, x};
 }
 
 // Returns the sum of their squares.
-double BlurredSteps::residuals(const cv::Vec4d& x, std::vector<double>& out) {
+double BlurredSteps::residuals(const cv::Vec4d& x, Vector<double>& out) {
   const double blur = std::clamp(x[1], 0.3, 8.0) * std::numbers::sqrt2;
-  std::vector<cv::Vec4d> column(shape_.size());
+  Vector<cv::Vec4d>& column = column_;
+  column.resize(shape_.size());
   cv::Matx44d a = cv::Matx44d::zeros();
   cv::Vec4d b = cv::Vec4d::all(0);
   for (std::size_t j = 0; j < shape_.size(); ++j) {
@@ -105,7 +115,7 @@ double BlurredSteps::residuals(const cv::Vec4d& x, std::vector<double>& out) {
 // Of Levenberg and Marquardt, with differences.
 cv::Vec4d BlurredSteps::step(const cv::Vec4d& x, double damping) {
   constexpr double kDifference = 1e-4;
-  std::array<std::vector<double>, kUnknown> slope;
+  auto& slope = ahead_of_;
   cv::Matx44d a = cv::Matx44d::eye();
   cv::Vec4d b = cv::Vec4d::all(0);
   for (int p = 0; p < kUnknown; ++p) {

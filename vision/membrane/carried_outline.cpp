@@ -24,10 +24,10 @@ constexpr double kChange_px = 0.05, kLeastChange_px = 0.01, kMostChange_px = 0.3
 
 }  // namespace
 
-void CarriedOutline::update(const SeenOutline& seen, const std::vector<double>& pushed) {
+void CarriedOutline::update(const SeenOutline& seen, const Vector<double>& pushed) {
   const std::size_t n = seen.contour.size();
-  const std::vector<double> now =
-      r_.size() == n ? polar_radii(seen.contour, centre_, static_cast<int>(n)) : std::vector<double>();
+  const Vector<double> now =
+      r_.size() == n ? polar_radii(seen.contour, centre_, static_cast<int>(n)) : Vector<double>();
   lasting_ = seen.lasting;
   if (now.empty()) {
     centre_ = centroid(seen.contour);
@@ -40,12 +40,12 @@ void CarriedOutline::update(const SeenOutline& seen, const std::vector<double>& 
     return;
   }
   move_with_cell(now, seen, pushed);
-  const std::vector<double> moved = polar_radii(seen.contour, centre_, static_cast<int>(n));
+  const Vector<double> moved = polar_radii(seen.contour, centre_, static_cast<int>(n));
   if (moved.empty()) {
     return;
   }
   // What differs by more than both may err has changed its shape.
-  std::vector<double> surprise(n), told(n);
+  Vector<double> surprise(n), told(n);
   double more_than_expected = 0, still = 0;
   for (std::size_t i = 0; i < n; ++i) {
     told[i] = seen.variance[i] - seen.lasting[i];
@@ -63,7 +63,7 @@ void CarriedOutline::update(const SeenOutline& seen, const std::vector<double>& 
   for (std::size_t k = n - kReach; k <= n + kReach; ++k) {
     sum += surprise[k % n];
   }
-  std::vector<double> more(n, 0.0);
+  Vector<double> more(n, 0.0);
   for (std::size_t i = 0; i < n; ++i) {
     const double mean = sum / (2 * kReach + 1);
     if (mean > kBroken) {
@@ -79,18 +79,20 @@ void CarriedOutline::update(const SeenOutline& seen, const std::vector<double>& 
 }
 
 // Weighted least squares for drift and turn, from what the needle does not change.
-void CarriedOutline::move_with_cell(const std::vector<double>& now, const SeenOutline& seen,
-                                    const std::vector<double>& pushed) {
+void CarriedOutline::move_with_cell(const Vector<double>& now, const SeenOutline& seen,
+                                    const Vector<double>& pushed) {
   const std::size_t n = now.size();
   cv::Vec3d motion = cv::Vec3d::all(0);
   cv::Matx33d a;
   // Of a px of drift to the right, of drift down, and of turn.
-  const auto effect = [&](std::size_t i) {
-    const Point d = on_ray(Point(0, 0), static_cast<int>(i), static_cast<int>(n), 1);
+  const std::span<const Point> ray = unit_rays(static_cast<int>(n));
+  Vector<cv::Vec3d> effect(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const Point& d = ray[i];
     const double slope = (r_[(i + 1) % n] - r_[(i + n - 1) % n]) * static_cast<double>(n) /
                          (4 * std::numbers::pi * std::max(r_[i], 1.0));
-    return cv::Vec3d(d.x + slope * d.y, d.y - slope * d.x, -slope);
-  };
+    effect[i] = cv::Vec3d(d.x + slope * d.y, d.y - slope * d.x, -slope);
+  }
   for (int round = 0; round < 3; ++round) {
     a = cv::Matx33d::eye() * (1 / (kDrift_px * kDrift_px));
     cv::Vec3d b = cv::Vec3d::all(0);
@@ -98,7 +100,7 @@ void CarriedOutline::move_with_cell(const std::vector<double>& now, const SeenOu
       if (pushed[i] > kPushed_px) {
         continue;
       }
-      const cv::Vec3d f = effect(i);
+      const cv::Vec3d& f = effect[i];
       const double e = now[i] - r_[i], variance = variance_[i] + seen.variance[i] - seen.lasting[i];
       const double off = std::abs(e - f.dot(motion)) / (2 * std::sqrt(variance));
       const double w = 1 / (kJoined * variance * std::max(1.0, off));
@@ -108,9 +110,9 @@ void CarriedOutline::move_with_cell(const std::vector<double>& now, const SeenOu
     motion = a.solve(b, cv::DECOMP_CHOLESKY);
   }
   const cv::Matx33d covariance = a.inv(cv::DECOMP_CHOLESKY);
-  std::vector<double> turned(n);
+  Vector<double> turned(n);
   for (std::size_t i = 0; i < n; ++i) {
-    const cv::Vec3d f = effect(i);
+    const cv::Vec3d& f = effect[i];
     turned[i] = r_[i] + motion[2] * f[2];
     variance_[i] += f.dot(covariance * f);
   }
@@ -120,8 +122,8 @@ void CarriedOutline::move_with_cell(const std::vector<double>& now, const SeenOu
 
 Contour CarriedOutline::contour() const { return from_polar(centre_, r_); }
 
-std::vector<double> CarriedOutline::sd() const {
-  std::vector<double> out(r_.size());
+Vector<double> CarriedOutline::sd() const {
+  Vector<double> out(r_.size());
   for (std::size_t i = 0; i < out.size(); ++i) {
     out[i] = std::sqrt(variance_[i] + lasting_[i]);
   }

@@ -2,8 +2,7 @@
 // frames before it showed, angle by angle as a Kalman filter does. Meanwhile the cell may drift and turn.
 #pragma once
 
-#include <vector>
-
+#include "vision/image/kept_vector.hpp"
 #include "vision/membrane/seen_outline.hpp"
 
 namespace punctum::vision {
@@ -11,18 +10,17 @@ namespace punctum::vision {
 class CarriedOutline {
  public:
   // pushed: sd of what a needle may change since the last frame, px per point.
-  void update(const SeenOutline& seen, const std::vector<double>& pushed);
+  void update(const SeenOutline& seen, const Vector<double>& pushed);
 
   [[nodiscard]] Contour contour() const;
-  [[nodiscard]] std::vector<double> sd() const;  // px, per point of the contour
+  [[nodiscard]] Vector<double> sd() const;  // px, per point of the contour
 
  private:
-  void move_with_cell(const std::vector<double>& now, const SeenOutline& seen,
-                      const std::vector<double>& pushed);
+  void move_with_cell(const Vector<double>& now, const SeenOutline& seen, const Vector<double>& pushed);
 
   Point centre_;
   double change_ = 0;  // variance by which the shape changes in a frame where no needle pushes, px^2
-  std::vector<double> r_, variance_, lasting_;  // per angle
+  Vector<double> r_, variance_, lasting_;  // per angle
 };
 
 }  // namespace punctum::vision

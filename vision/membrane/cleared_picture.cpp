@@ -22,16 +22,27 @@ constexpr double kImpurityKeep_px = 4;  // nearer to a membrane, it belongs to t
 constexpr double kFaceReach_px =
     6.5;  // nearer to the face of the holding pipette, an edge is blurred into it
 
+struct RowSums {
+  std::uint32_t values = 0, squares = 0;  // of fewer than 66000 pixels
+};
+PUNCTUM_WIDE_LOOP RowSums sums_of(const std::uint8_t* row, int n) {
+  RowSums out;
+  for (int x = 0; x < n; ++x) {
+    const std::uint32_t v = row[x];
+    out.values += v;
+    out.squares += v * v;
+  }
+  return out;
+}
+
 // The first rows that vary enough for the whole picture decide.
 bool has_contrast(const cv::Mat& grey) {
   const double least = kLeastContrast * kLeastContrast * static_cast<double>(grey.total());
   double sum = 0, squares = 0, n = 0;
   for (int y = 0; y < grey.rows; ++y) {
-    const std::uint8_t* row = grey.ptr(y);
-    for (int x = 0; x < grey.cols; ++x) {
-      sum += row[x];
-      squares += row[x] * row[x];
-    }
+    const RowSums row = sums_of(grey.ptr(y), grey.cols);
+    sum += row.values;
+    squares += row.squares;
     n += grey.cols;
     if (squares - sum * sum / n >= least) {
       return true;
@@ -41,9 +52,9 @@ bool has_contrast(const cv::Mat& grey) {
 }
 
 // Rows of n pixels; short loops, which the compiler vectorises.
-PUNCTUM_WIDE_LOOP void above(const float* v, int n, float limit, std::uint8_t* out) {
+PUNCTUM_WIDE_LOOP void longer(const float* slope, int n, float square, std::uint8_t* out) {
   for (int i = 0; i < n; ++i) {
-    out[i] = v[i] > limit ? 255 : 0;
+    out[i] = slope[2 * i] * slope[2 * i] + slope[2 * i + 1] * slope[2 * i + 1] > square ? 255 : 0;
   }
 }
 
@@ -51,13 +62,6 @@ PUNCTUM_WIDE_LOOP void without(const std::uint8_t* v, const std::uint8_t* hidden
   for (int i = 0; i < n; ++i) {
     const std::uint8_t here = v[i];
     out[i] = hidden[i] > 0 ? std::uint8_t{0} : here;
-  }
-}
-
-PUNCTUM_WIDE_LOOP void without(const float* v, const std::uint8_t* hidden, int n, float* out) {
-  for (int i = 0; i < n; ++i) {
-    const float here = v[i];
-    out[i] = hidden[i] > 0 ? 0.0F : here;
   }
 }
 
@@ -74,10 +78,9 @@ std::string ClearedPicture::load(const hal::Frame& frame, int width, int height)
   if (width < kSmallest_px || height < kSmallest_px) {
     return "picture too small: at least " + size(kSmallest_px, kSmallest_px) + " is needed";
   }
-  // A copy, since the camera may reuse its buffer. OpenCV has no matrix over constant data.
-  cv::Mat(height, width, CV_8U, const_cast<std::uint8_t*>(frame.pixels),
-          static_cast<std::size_t>(frame.stride))
-      .copyTo(grey);
+  // OpenCV has no matrix over constant data.
+  grey = cv::Mat(height, width, CV_8U, const_cast<std::uint8_t*>(frame.pixels),
+                 static_cast<std::size_t>(frame.stride));
   if (!has_contrast(grey)) {
     return "no contrast: every pixel is about " + std::to_string(std::lround(cv::mean(grey)[0]));
   }
@@ -90,53 +93,70 @@ void ClearedPicture::compute_gradient(const cv::Rect& area) {
   gradient_noise = field.noise_of_gradient(noise);
 }
 
-void ClearedPicture::cover(const std::vector<Polygon>& pipettes) {
-  covered.create(grey.size(), CV_8U);
-  covered.setTo(0);
+void ClearedPicture::cover(const Vector<Polygon>& pipettes) {
+  if (covered.size() != grey.size()) {
+    covered = cv::Mat::zeros(grey.size(), CV_8U);
+    rows_covered_ = {0, 0};
+  }
+  for (int y = rows_covered_.start; y < rows_covered_.end; ++y) {  // most rows have nothing that is covered
+    std::fill_n(covered.ptr(y), covered.cols, std::uint8_t{0});
+  }
+  rows_covered_ = {0, 0};
+  for (const Polygon& p : pipettes) {
+    const auto [highest, lowest] =
+        std::minmax_element(p.begin(), p.end(), [](const Point& a, const Point& b) { return a.y < b.y; });
+    const auto row_of = [this](double y) {
+      return static_cast<int>(std::clamp(y, 0.0, static_cast<double>(grey.rows)));
+    };
+    cover_rows({row_of(highest->y) - 1, row_of(lowest->y) + 3});
+  }
   draw_mask(covered, pipettes);
 }
 
-int ClearedPicture::cover_impurities(const std::vector<Contour>& membranes, double threshold,
-                                     double max_side) {
+void ClearedPicture::cover_rows(const cv::Range& rows) {
+  const cv::Range within(std::clamp(rows.start, 0, grey.rows), std::clamp(rows.end, 0, grey.rows));
+  rows_covered_ = rows_covered_.empty() ? within
+                                        : cv::Range(std::min(rows_covered_.start, within.start),
+                                                    std::max(rows_covered_.end, within.end));
+}
+
+int ClearedPicture::cover_impurities(const Vector<Contour>& membranes, double threshold, double max_side) {
   find_strong(threshold);
   if (membranes.empty()) {
     return 0;
   }
-  std::vector<Contour> local = membranes;
+  Vector<Contour> local = membranes;
   for (Contour& c : local) {
     for (Point& p : c) {
       p -= Point(field.area.x, field.area.y);
     }
   }
-  std::vector<PixelRun> pixels;
+  Vector<PixelRun> pixels;
   const int count = find_impurities(open_, local, max_side, kImpurityLeast_px, kImpurityKeep_px, pixels);
   for (const PixelRun& run : pixels) {  // and the pixels round it
+    cover_rows({field.area.y + run.y - 1, field.area.y + run.y + 2});
     const int from = std::max(run.from - 1, 0), n = std::min(run.to + 1, field.area.width) - from;
     for (int y = std::max(run.y - 1, 0); y <= std::min(run.y + 1, field.area.height - 1); ++y) {
       std::fill_n(covered.ptr(field.area.y + y) + field.area.x + from, n, std::uint8_t{255});
       std::fill_n(strong.ptr(y) + from, n, std::uint8_t{0});
-      std::fill_n(edge.ptr<float>(y) + from, n, 0.0F);
     }
   }
   return count;
 }
 
-// Sets strong, edge, and open_: what is strong and not covered.
+// Sets strong, and open_: what is strong and not covered.
 void ClearedPicture::find_strong(double threshold) {
   const cv::Rect& a = field.area;
   strong = kept_strong_.part(grey.size(), a.size(), CV_8U);
   open_ = kept_open_.part(grey.size(), a.size(), CV_8U);
-  edge = kept_edge_.part(grey.size(), a.size(), CV_32F);
+  const auto square = static_cast<float>(threshold * threshold);
   for (int y = 0; y < a.height; ++y) {
-    const float* sobel = field.sobel.ptr<float>(y);
-    const std::uint8_t* hides = covered.ptr(a.y + y) + a.x;
-    above(sobel, a.width, static_cast<float>(threshold), strong.ptr(y));
-    without(strong.ptr(y), hides, a.width, open_.ptr(y));
-    without(sobel, hides, a.width, edge.ptr<float>(y));
+    longer(field.slope.ptr<float>(y), a.width, square, strong.ptr(y));
+    without(strong.ptr(y), covered.ptr(a.y + y) + a.x, a.width, open_.ptr(y));
   }
 }
 
-void ClearedPicture::exclude_holder(EdgeBand& band, const std::vector<double>& expected) const {
+void ClearedPicture::exclude_holder(EdgeBand& band, const Vector<double>& expected, bool limits) const {
   if (!holder_face) {
     return;
   }
@@ -160,7 +180,9 @@ void ClearedPicture::exclude_holder(EdgeBand& band, const std::vector<double>& e
       continue;
     }
     const std::size_t k = static_cast<std::size_t>(i);
-    band.upper[k] = std::min(band.upper[k], r);
+    if (limits) {
+      band.upper[k] = std::min(band.upper[k], r);
+    }
     if (expected[k] > r - kFaceReach_px) {
       band.hidden[k] = 1;
     }

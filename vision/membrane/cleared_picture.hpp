@@ -4,11 +4,11 @@
 #include <opencv2/core.hpp>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "hal/devices.hpp"
 #include "vision/image/closed_path.hpp"
 #include "vision/image/gradient.hpp"
+#include "vision/image/kept_vector.hpp"
 #include "vision/pipettes/holding_pipette.hpp"
 #include "vision/pipettes/pipette_mask.hpp"
 
@@ -23,18 +23,18 @@ struct ClearedPicture {
 
   cv::Mat covered;  // CV_8U, the whole picture: 255 = pipette or impurity
   cv::Mat strong;   // CV_8U, field.area: 255 = strong gradient, with the pipettes, without the impurities
-  cv::Mat edge;     // CV_32F, field.area: Sobel magnitude, 0 where covered
 
-  // Copies the frame, which must have this size. Returns why it cannot be used; empty when it can.
+  // The frame, which must have this size; `grey` lies on its pixels. Returns why it cannot be used; empty
+  // when it can.
   [[nodiscard]] std::string load(const hal::Frame& frame, int width, int height);
   void compute_gradient(const cv::Rect& area);  // after load()
 
   // Covers the pipettes, and nothing else.
-  void cover(const std::vector<Polygon>& pipettes);
-  // Covers what is strong, smaller than max_side px and away from the membranes, and sets `strong` and
-  // `edge`. Strong: above `threshold`, grey levels per px. Returns the number of impurities; 0 without
+  void cover(const Vector<Polygon>& pipettes);
+  // Covers what is strong, smaller than max_side px and away from the membranes, and sets `strong`.
+  // Strong: above `threshold`, grey levels per px. Returns the number of impurities; 0 without
   // membranes.
-  int cover_impurities(const std::vector<Contour>& membranes, double threshold, double max_side);
+  int cover_impurities(const Vector<Contour>& membranes, double threshold, double max_side);
 
   [[nodiscard]] double edge_floor() const noexcept { return 3 * gradient_noise; }  // less is no edge
   [[nodiscard]] double snake_floor() const noexcept {
@@ -48,13 +48,16 @@ struct ClearedPicture {
   // For a membrane that is pressed against the holding pipette. Behind the face of the pipette the membrane
   // cannot be; along the face it is not visible, because of the dark line of the face. expected: radius of
   // the membrane per angle of the band.
-  void exclude_holder(EdgeBand& band, const std::vector<double>& expected) const;
+  // limits: false where the place of the face is uncertain.
+  void exclude_holder(EdgeBand& band, const Vector<double>& expected, bool limits = true) const;
 
  private:
   void find_strong(double threshold);
+  void cover_rows(const cv::Range& rows);
 
-  cv::Mat open_;  // CV_8U, field.area: 255 = strong gradient that is not covered
-  KeptMemory kept_strong_, kept_open_, kept_edge_;
+  cv::Range rows_covered_{0, 0};  // those of `covered` that are not all 0 lie in it
+  cv::Mat open_;                  // CV_8U, field.area: 255 = strong gradient that is not covered
+  KeptMemory kept_strong_, kept_open_;
 };
 
 }  // namespace punctum::vision

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "hal/math/elementary.hpp"
+#include "vision/image/dispatched.hpp"
 #include "vision/image/median.hpp"
 #include "vision/image/periodic_smoothing.hpp"
 
@@ -14,17 +15,20 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr int kRounds = 2;  // shape and places in turn; a third makes no contour measurably better
+// Shape and places in turn; a third round makes no contour measurably better, nor a second one that begins
+// with the shape of the last frame.
+constexpr int kRounds = 2, kRoundsFromLast = 1;
+constexpr double kNear_px = 0.5;
 constexpr double kFurthestPlace_px = 2.5;  // a place further from the contour is another edge's
 constexpr int kLeastSamples = 12;          // of a profile
 constexpr std::ptrdiff_t kPadding = 8;     // samples beyond either end of the shape that a place may reach
 constexpr double kLeastShare = 0.35;       // of the points must be seen
-constexpr double kLeastLikeness = 0.5;     // median share of a profile's variance that the shape explains
+constexpr double kLeastLikeness = 0.48;    // median share of a profile's variance that the shape explains
 constexpr double kTukey = 4.7;             // times the scale: 95 % efficiency for normally distributed errors
 constexpr double kLeastScale_px = 0.05;
 constexpr double kGainReach = 0.04;  // of the circumference to either side, over which contrast is averaged
 // A place follows the samples that tell it, so that little is left of what they err by.
-constexpr double kMostTrust = 3;
+constexpr double kMostTrust = 2;
 constexpr double kGrain = 0.6;  // per point, for granules of about 2 px
 // Of the variance of the noise: samples between pixels and the weights of the places leave so much.
 constexpr double kSampledNoise = 0.5;
@@ -34,7 +38,7 @@ constexpr double kCommon_px = 0.03;  // sd of what is wrong alike all round: the
 constexpr double kSoft = 0.02;       // of the stiffness, where the membrane may have any shape
 
 // Mean of the middle half: as robust as is needed against impurities, and less noisy than the median.
-double middle_mean(std::vector<double>& v) {
+double middle_mean(Vector<double>& v) {
   if (v.size() < 8) {
     return 0;
   }
@@ -48,16 +52,98 @@ double middle_mean(std::vector<double>& v) {
   return sum / static_cast<double>(v.end() - v.begin() - 2 * quarter);
 }
 
-float sum_of(const Lanes& v) { return (v[0] + v[1]) + (v[2] + v[3]); }
+// y = even + turning x, weighted.
+struct FittedLine {
+  double w = 0, x = 0, xx = 0, y = 0, xy = 0;
+
+  void add(double weight, double at, double value) {
+    w += weight;
+    x += weight * at;
+    xx += weight * at * at;
+    y += weight * value;
+    xy += weight * at * value;
+  }
+  void solve(double& even, double& turning) const {
+    const double det = w * xx - x * x;
+    turning = det > 1e-6 * w * w ? (w * xy - x * y) / det : 0;
+    even = w > 0 ? (y - turning * x) / w : 0;
+  }
+};
+
+float sum_of(const Lanes& v) {
+  static_assert(kSideBySide == 8);
+  return ((v[0] + v[1]) + (v[2] + v[3])) + ((v[4] + v[5]) + (v[6] + v[7]));
+}
+
+PUNCTUM_WIDE_LOOP void add_products(const Lanes* grey, const Lanes* seen, const float* trust,
+                                    const float* shape, const float* slope, std::size_t samples,
+                                    ProfileProducts& out) {
+  ProfileProducts p{};
+  for (std::size_t j = 0; j < samples; ++j) {
+    const float w = trust[j], t = shape[j], s = slope[j], wt = w * t, ws = w * s;
+    p.one += w * seen[j];
+    p.shape += wt * seen[j];
+    p.slope += ws * seen[j];
+    p.shape_shape += wt * t * seen[j];
+    p.shape_slope += wt * s * seen[j];
+    p.slope_slope += ws * s * seen[j];
+    p.untrusted += s * s * seen[j];
+    p.grey += w * grey[j];
+    p.grey_shape += wt * grey[j];
+    p.grey_slope += ws * grey[j];
+    p.grey_grey += w * grey[j] * grey[j];
+  }
+  out = p;
+}
+
+// Of one group, lane by lane: the profiles are level + gain shape - gain_step slope, and what is left.
+struct PlacedLanes {
+  Lanes used{}, level{}, gain{}, gain_step{}, mean_slope{};
+};
+PUNCTUM_WIDE_LOOP void add_what_is_left(const PlacedLanes& of, const Lanes* grey, const Lanes* seen,
+                                        const float* trust, const float* shape, const float* slope,
+                                        std::size_t samples, Lanes* square, Lanes* count, Lanes& pulled) {
+  const PlacedLanes p = of;
+  Lanes sum{};
+  for (std::size_t j = 0; j < samples; ++j) {
+    const Lanes here = p.used * seen[j];
+    const Lanes rest = grey[j] - p.level - p.gain * shape[j] + p.gain_step * slope[j];
+    square[j] += here * rest * rest;
+    count[j] += here;
+    const Lanes pull = here * trust[j] * (slope[j] - p.mean_slope);
+    sum += pull * pull;
+  }
+  pulled = sum;
+}
+
+// A group, moved by whole + u samples, scaled and cut off at low and high, to the sums over all groups.
+struct MovedLanes {
+  int whole;
+  float u;
+  double by;
+  Lanes scale, use;
+};
+PUNCTUM_WIDE_LOOP void add_moved(const MovedLanes& of, const Lanes* row, int samples, const Lanes* low,
+                                 const Lanes* high, Lanes* sum) {
+  const MovedLanes m = of;
+  const double last = samples - 1.001;
+  for (int j = 0; j < samples; ++j) {
+    const int at = std::clamp(j + m.whole, 0, samples - 2);
+    const float part = j + m.by <= 0 ? 0 : j + m.by >= last ? 1 : m.u;
+    const Lanes x = m.scale * (row[at] + part * (row[at + 1] - row[at]));
+    sum[j] += m.use * (x < low[j] ? low[j] : x > high[j] ? high[j] : x);
+  }
+}
 
 }  // namespace
 
 double stiffness_of(double modes, double soft, std::size_t points) {
   const double wave = static_cast<double>(points) / (2 * std::numbers::pi * modes);
-  return wave * wave * (wave * wave) * math::pow(kSoft, soft);
+  const double usual = wave * wave * (wave * wave);  // of most points
+  return soft == 0 ? usual : usual * math::pow(kSoft, soft);
 }
 
-CommonShape::CommonShape(const EdgeProfiles& profiles, const std::vector<double>& soft, const EdgeShape& edge)
+CommonShape::CommonShape(const EdgeProfiles& profiles, const Vector<double>& soft, const EdgeShape& edge)
     : profiles_(profiles),
       soft_(soft),
       beside_(edge.beside),
@@ -75,15 +161,67 @@ CommonShape::CommonShape(const EdgeProfiles& profiles, const std::vector<double>
       padded_(profiles.samples + 2 * kPadding),
       padded_slope_(padded_.size()),
       moved_shape_(profiles.samples),
-      moved_slope_(profiles.samples) {}
+      moved_slope_(profiles.samples) {
+  if (edge.relief != Point(0, 0)) {
+    for (const Point& n : profiles.normal) {
+      lit_.push_back(n.dot(edge.relief));
+    }
+    turning_.resize(profiles.samples);
+    padded_turning_.resize(padded_.size());
+    padded_turning_slope_.resize(padded_.size());
+  }
+}
 
-bool CommonShape::find() {
-  average_first();
-  for (int round = 0; round < kRounds; ++round) {
+bool CommonShape::find(EdgeLearnt& learnt) {
+  bool found = false;
+  if (!lit_.empty()) {
+    average_first_in_relief();
+    return find_from(kRounds);
+  }
+  if (learnt.shape.size() == profiles_.samples) {
+    shape_ = learnt.shape;
+    spread_ = learnt.spread;
+    trust_samples();
+    found = find_from(kRoundsFromLast);
+  }
+  if (!found) {
+    std::fill(place_.begin(), place_.end(), 0.0);
+    std::fill(gain_.begin(), gain_.end(), 1.0);
+    std::fill(trust_.begin(), trust_.end(), 1.0F);
+    average_first();
+    found = find_from(kRounds);
+  }
+  learnt.shape.clear();
+  if (found) {
+    learn(learnt);
+  }
+  return found;
+}
+
+// Put where it lies about the contour on average, as the first shape of a picture does: what a place errs by
+// would add up over the frames.
+void CommonShape::learn(EdgeLearnt& learnt) {
+  double at = 0, weight = 0;
+  for (std::size_t i = 0; i < profiles_.points; ++i) {
+    const double w = soft_[i] < 0.5 ? robust_[i] : 0;
+    at += w * place_[i];
+    weight += w;
+  }
+  pad(shape_, padded_, padded_slope_);
+  move_shape(weight > 0 ? at / weight : 0, 0);
+  learnt.shape.assign(moved_shape_.begin(), moved_shape_.end());
+  learnt.spread = spread_;
+}
+
+bool CommonShape::find_from(int rounds) {
+  for (int round = 0; round < rounds; ++round) {
     if (!place_all()) {
       return false;
     }
     smooth_places();
+    if (rounds == kRoundsFromLast && place_again()) {
+      smooth_places();
+    }
     average();
   }
   values_.clear();
@@ -110,11 +248,43 @@ void CommonShape::average_first() {
   }
 }
 
+// Least squares per sample, twice: what is far off the first line counts as if it lay nearer.
+void CommonShape::average_first_in_relief() {
+  shape_.assign(profiles_.samples, 0.0);
+  Vector<double> off(profiles_.points);
+  for (std::size_t j = 0; j < profiles_.samples; ++j) {
+    double scale = 0;
+    for (int round = 0; round < 3; ++round) {
+      FittedLine line;
+      values_.clear();
+      for (std::size_t i = 0; i < profiles_.points; ++i) {
+        if (profiles_.whole(i) && soft_[i] < 0.5) {
+          const auto grey =
+              static_cast<double>(profiles_.grey_of(i / kSideBySide)[j][static_cast<int>(i % kSideBySide)]);
+          const double w = round > 0 && off[i] > kClip * scale ? kClip * scale / off[i] : 1;
+          line.add(w, lit_[i], grey);
+        }
+      }
+      line.solve(shape_[j], turning_[j]);
+      for (std::size_t i = 0; i < profiles_.points; ++i) {
+        if (profiles_.whole(i) && soft_[i] < 0.5) {
+          const auto grey =
+              static_cast<double>(profiles_.grey_of(i / kSideBySide)[j][static_cast<int>(i % kSideBySide)]);
+          values_.push_back(off[i] = std::abs(grey - shape_[j] - lit_[i] * turning_[j]));
+        }
+      }
+      scale = std::max(kSdOfMedian * median_in_place(values_), 1e-3);
+    }
+  }
+}
+
 // Of the profiles put where the shape is, level and gain taken off, and of what is within the usual spread;
 // what lies further out counts as if it lay there.
 void CommonShape::average() {
   const auto m = static_cast<int>(profiles_.samples);
-  std::vector<Lanes> sum(profiles_.samples, Lanes{}), low(sum), high(sum);
+  Vector<Lanes> sum(profiles_.samples, Lanes{}), low(sum), high(sum), by_lit;
+  FittedLine line;
+  by_lit.resize(turning_.size(), Lanes{});
   for (std::size_t j = 0; j < profiles_.samples; ++j) {
     const double most = kClip * spread_[j];
     low[j] = static_cast<float>(shape_[j] - most) + Lanes{};
@@ -130,20 +300,38 @@ void CommonShape::average() {
       }
     }
     used += sum_of(use);
+    Lanes turned{};
+    for (std::size_t l = 0, i = g * kSideBySide; l < kSideBySide && i < lit_.size(); ++l, ++i) {
+      const auto lane = static_cast<int>(l);
+      turned[lane] = static_cast<float>(lit_[i]);
+      line.add(static_cast<double>(use[lane]), lit_[i], 0);
+    }
     const double by = place_of_group(g) / EdgeProfiles::kStep_px, last = m - 1.001;
     const int whole = static_cast<int>(std::floor(by));
     const float u = static_cast<float>(by - whole);
     const Lanes* row = profiles_.grey_of(g);
+    if (by_lit.empty()) {
+      add_moved({whole, u, by, scale, use}, row, m, low.data(), high.data(), sum.data());
+      continue;
+    }
     for (int j = 0; j < m; ++j) {
       const int low_sample = std::clamp(j + whole, 0, m - 2);
       const float part = j + by <= 0 ? 0 : j + by >= last ? 1 : u;
       const Lanes x = scale * (row[low_sample] + part * (row[low_sample + 1] - row[low_sample]));
       const auto k = static_cast<std::size_t>(j);
-      sum[k] += use * (x < low[k] ? low[k] : x > high[k] ? high[k] : x);
+      const Lanes more = turned * static_cast<float>(turning_[k]), rest = x - more;
+      const Lanes kept = use * (more + (rest < low[k] ? low[k] : rest > high[k] ? high[k] : rest));
+      sum[k] += kept;
+      by_lit[k] += turned * kept;
     }
   }
   for (std::size_t j = 0; j < profiles_.samples; ++j) {
     shape_[j] = used > 0 ? static_cast<double>(sum_of(sum[j]) / used) : 0;
+    if (!by_lit.empty()) {
+      line.y = static_cast<double>(sum_of(sum[j]));
+      line.xy = static_cast<double>(sum_of(by_lit[j]));
+      line.solve(shape_[j], turning_[j]);
+    }
   }
 }
 
@@ -165,8 +353,25 @@ double CommonShape::place_of_group(std::size_t group) const {
   return std::accumulate(from, to, 0.0) / static_cast<double>(to - from);
 }
 
+double CommonShape::lit(std::size_t group) const {
+  const std::size_t middle = std::min(group * kSideBySide + kSideBySide / 2, profiles_.points - 1);
+  return lit_.empty() ? 0 : lit_[middle];
+}
+
+void CommonShape::pad(const Vector<double>& shape, Vector<float>& padded, Vector<float>& slope) const {
+  const auto end = padded.begin() + kPadding + static_cast<std::ptrdiff_t>(shape.size());
+  std::fill_n(padded.begin(), kPadding, static_cast<float>(shape.front()));
+  std::transform(shape.begin(), shape.end(), padded.begin() + kPadding,
+                 [](double v) { return static_cast<float>(v); });
+  std::fill(end, padded.end(), static_cast<float>(shape.back()));
+  constexpr float kPerTwoSamples = 0.5F / static_cast<float>(EdgeProfiles::kStep_px);
+  for (std::size_t k = 1; k + 1 < padded.size(); ++k) {
+    slope[k] = kPerTwoSamples * (padded[k + 1] - padded[k - 1]);
+  }
+}
+
 // The shape and its slope (per px) at the samples of a profile whose place that is.
-void CommonShape::move_shape(double place_px) {
+void CommonShape::move_shape(double place_px, double lit) {
   const double shift = place_px / EdgeProfiles::kStep_px, whole = std::ceil(shift);
   const auto u = static_cast<float>(whole - shift);
   const std::ptrdiff_t from = kPadding - static_cast<std::ptrdiff_t>(whole);
@@ -175,61 +380,54 @@ void CommonShape::move_shape(double place_px) {
     moved_shape_[j] = shape[j] + u * (shape[j + 1] - shape[j]);
     moved_slope_[j] = slope[j] + u * (slope[j + 1] - slope[j]);
   }
+  if (!lit_.empty()) {
+    const float *turn = padded_turning_.data() + from, *turn_slope = padded_turning_slope_.data() + from;
+    const auto by = static_cast<float>(lit);
+    for (std::size_t j = 0; j < profiles_.samples; ++j) {
+      moved_shape_[j] += by * (turn[j] + u * (turn[j + 1] - turn[j]));
+      moved_slope_[j] += by * (turn_slope[j] + u * (turn_slope[j + 1] - turn_slope[j]));
+    }
+  }
 }
 
-CommonShape::Products CommonShape::products(std::size_t group) const {
-  const Lanes *grey = profiles_.grey_of(group), *seen = profiles_.seen_in(group);
-  Products p{};
-  for (std::size_t j = 0; j < profiles_.samples; ++j) {
-    const float w = trust_[j], t = moved_shape_[j], s = moved_slope_[j], wt = w * t, ws = w * s;
-    p.one += w * seen[j];
-    p.shape += wt * seen[j];
-    p.slope += ws * seen[j];
-    p.shape_shape += wt * t * seen[j];
-    p.shape_slope += wt * s * seen[j];
-    p.slope_slope += ws * s * seen[j];
-    p.untrusted += s * s * seen[j];
-    p.grey += w * grey[j];
-    p.grey_shape += wt * grey[j];
-    p.grey_slope += ws * grey[j];
-    p.grey_grey += w * grey[j] * grey[j];
-  }
-  return p;
+void CommonShape::multiply(std::size_t group, ProfileProducts& out) const {
+  add_products(profiles_.grey_of(group), profiles_.seen_in(group), trust_.data(), moved_shape_.data(),
+               moved_slope_.data(), profiles_.samples, out);
 }
 
 // Places all profiles, each with its neighbourhood's contrast: of one profile alone contrast and place are
 // hard to tell apart. False: too little of the edge is seen, or it is another one.
 bool CommonShape::place_all() {
   const std::size_t n = profiles_.samples;
-  const auto end = padded_.begin() + kPadding + static_cast<std::ptrdiff_t>(n);
-  std::fill_n(padded_.begin(), kPadding, static_cast<float>(shape_.front()));
-  std::transform(shape_.begin(), shape_.end(), padded_.begin() + kPadding,
-                 [](double v) { return static_cast<float>(v); });
-  std::fill(end, padded_.end(), static_cast<float>(shape_.back()));
-  constexpr float kPerTwoSamples = 0.5F / static_cast<float>(EdgeProfiles::kStep_px);
-  for (std::size_t k = 1; k + 1 < padded_.size(); ++k) {
-    padded_slope_[k] = kPerTwoSamples * (padded_[k + 1] - padded_[k - 1]);
+  pad(shape_, padded_, padded_slope_);
+  if (!lit_.empty()) {
+    pad(turning_, padded_turning_, padded_turning_slope_);
   }
-  double shape_energy = 0;
-  for (const float slope : padded_slope_) {
-    shape_energy += static_cast<double>(slope * slope);
+  double even_energy = 0, both_energy = 0, turning_energy = 0;
+  for (std::size_t k = 0; k < padded_slope_.size(); ++k) {
+    const float even = padded_slope_[k], turn = lit_.empty() ? 0 : padded_turning_slope_[k];
+    even_energy += static_cast<double>(even * even);
+    both_energy += static_cast<double>(even * turn);
+    turning_energy += static_cast<double>(turn * turn);
   }
-  if (!(shape_energy > 0)) {
+  const double full_energy = even_energy + turning_energy;
+  if (!(full_energy > 0)) {
     return false;
   }
   std::size_t used = 0;
-  std::vector<Products> sums(profiles_.groups);
+  Vector<ProfileProducts> sums(profiles_.groups);
   for (std::size_t g = 0; g < profiles_.groups; ++g) {
-    move_shape(place_of_group(g));
-    sums[g] = products(g);
+    const double c = lit(g), energy = even_energy + c * (2 * both_energy + c * turning_energy);
+    move_shape(place_of_group(g), c);
+    multiply(g, sums[g]);
     for (std::size_t i = g * kSideBySide; i < std::min((g + 1) * kSideBySide, profiles_.points); ++i) {
-      const bool seen = compare(i, sums[g], shape_energy);
-      weight_[i] = seen ? 1 : 0;
+      const bool seen = compare(i, sums[g], energy);
+      weight_[i] = seen ? std::min(1.0, energy / full_energy) : 0;
       used += seen ? 1 : 0;
     }
   }
   average_gains();
-  std::vector<Lanes> square(n, Lanes{}), count(square);  // of what the shape leaves, per sample
+  Vector<Lanes> square(n, Lanes{}), count(square);  // of what the shape leaves, per sample
   for (std::size_t g = 0; g < profiles_.groups; ++g) {
     place(g, sums[g], square, count);
   }
@@ -242,8 +440,25 @@ bool CommonShape::place_all() {
   return static_cast<double>(used) >= kLeastShare * static_cast<double>(profiles_.points);
 }
 
+// Those that came to lie far from where they were compared: there a second step leads on. False: none did.
+bool CommonShape::place_again() {
+  bool any = false;
+  Vector<Lanes> square(profiles_.samples, Lanes{}), count(square);
+  for (std::size_t g = 0; g < profiles_.groups; ++g) {
+    if (std::abs(place_of_group(g)) > kNear_px) {
+      const double c = lit(g);
+      move_shape(place_of_group(g), c);
+      ProfileProducts sums;
+      multiply(g, sums);
+      place(g, sums, square, count);
+      any = true;
+    }
+  }
+  return any;
+}
+
 // Level, gain and place of one profile that fit best, all at once. False: too little of the edge is seen.
-bool CommonShape::compare(std::size_t i, const Products& sums, double shape_energy) {
+bool CommonShape::compare(std::size_t i, const ProfileProducts& sums, double shape_energy) {
   const auto of = [l = static_cast<int>(i % kSideBySide)](const Lanes& v) {
     return static_cast<double>(v[l]);
   };
@@ -271,10 +486,10 @@ bool CommonShape::compare(std::size_t i, const Products& sums, double shape_ener
 }
 
 // With the gain that is given: one step, and what the shape then leaves.
-void CommonShape::place(std::size_t group, const Products& sums, std::vector<Lanes>& square,
-                        std::vector<Lanes>& count) {
+void CommonShape::place(std::size_t group, const ProfileProducts& sums, Vector<Lanes>& square,
+                        Vector<Lanes>& count) {
   const double at = place_of_group(group);
-  Lanes used{}, level{}, gain{}, gain_step{}, mean_slope{};
+  PlacedLanes placed;
   const std::size_t first = group * kSideBySide;
   for (std::size_t i = first; i < std::min(first + kSideBySide, profiles_.points); ++i) {
     const int l = static_cast<int>(i - first);
@@ -287,25 +502,19 @@ void CommonShape::place(std::size_t group, const Products& sums, std::vector<Lan
           of(sums.grey_slope) - of(sums.grey) * s - g * (of(sums.shape_slope) - of(sums.shape) * s);
       const double step = -rest / (g * ss);
       raw_[i] = std::clamp(at + step, -kFurthestPlace_px, kFurthestPlace_px);
-      used[l] = 1;
-      gain[l] = static_cast<float>(g);
-      gain_step[l] = static_cast<float>(g * step);
-      level[l] = static_cast<float>((of(sums.grey) - g * of(sums.shape)) / n + g * step * s);
-      mean_slope[l] = static_cast<float>(s);
+      placed.used[l] = 1;
+      placed.gain[l] = static_cast<float>(g);
+      placed.gain_step[l] = static_cast<float>(g * step);
+      placed.level[l] = static_cast<float>((of(sums.grey) - g * of(sums.shape)) / n + g * step * s);
+      placed.mean_slope[l] = static_cast<float>(s);
       noise_[i] = kSampledNoise / (EdgeProfiles::kStep_px * g * g * ss * ss);
     }
   }
-  move_shape(at);
-  const Lanes *grey = profiles_.grey_of(group), *seen = profiles_.seen_in(group);
+  move_shape(at, lit(group));
   Lanes pulled{};
-  for (std::size_t j = 0; j < profiles_.samples; ++j) {
-    const Lanes here = used * seen[j];
-    const Lanes rest = grey[j] - level - gain * moved_shape_[j] + gain_step * moved_slope_[j];
-    square[j] += here * rest * rest;
-    count[j] += here;
-    const Lanes pull = here * trust_[j] * (moved_slope_[j] - mean_slope);
-    pulled += pull * pull;
-  }
+  add_what_is_left(placed, profiles_.grey_of(group), profiles_.seen_in(group), trust_.data(),
+                   moved_shape_.data(), moved_slope_.data(), profiles_.samples, square.data(), count.data(),
+                   pulled);
   for (std::size_t i = first; i < std::min(first + kSideBySide, profiles_.points); ++i) {
     noise_[i] *= static_cast<double>(pulled[static_cast<int>(i - first)]);
   }
@@ -404,7 +613,7 @@ CommonShape::Variance CommonShape::variance(double noise, EdgeLearnt& mean) cons
   scatter *= together;
   by_noise = std::min(scatter, by_noise);
   const double lasting = std::max(scatter - by_noise, least_lasting_ * scatter);
-  Variance out{variance_of_smoothing(robust_, stiffness_), std::vector<double>(n)};
+  Variance out{variance_of_smoothing(robust_, stiffness_), Vector<double>(n)};
   for (std::size_t i = 0; i < n; ++i) {
     out.all[i] += 1 / points;  // of the steps in the mean profile
     out.lasting[i] = lasting * out.all[i] + kCommon_px * kCommon_px;

@@ -2,8 +2,8 @@
 #pragma once
 
 #include <optional>
-#include <vector>
 
+#include "vision/image/kept_vector.hpp"
 #include "vision/membrane/undeformed.hpp"
 
 namespace punctum::vision {
@@ -14,8 +14,8 @@ struct ProfilePoint {
   double u = 0;
   double depth = 0;
 };
-[[nodiscard]] std::vector<ProfilePoint> depth_profile(const Contour& contour, const Contour& shape,
-                                                      const Point& entry, const Point& axis, double reach);
+[[nodiscard]] Vector<ProfilePoint> depth_profile(const Contour& contour, const Contour& shape,
+                                                 const Point& entry, const Point& axis, double reach);
 
 struct HalfWidth {
   double a = 0;
@@ -24,8 +24,8 @@ struct HalfWidth {
 // a: the half-width at which the depth has fallen to 1 % of w_d, mean of both sides. c: radius of the needle,
 // R: radius of the cell. depth_sd: standard deviation of the profile. Empty when the depth falls so far on
 // neither side.
-[[nodiscard]] std::optional<HalfWidth> half_width(const std::vector<ProfilePoint>& profile, double wd,
-                                                  double c, double R, double depth_sd);
+[[nodiscard]] std::optional<HalfWidth> half_width(const Vector<ProfilePoint>& profile, double wd, double c,
+                                                  double R, double depth_sd);
 
 // The same from the contour, about the membrane's own normal at the entry: the axis of a needle that enters
 // off the middle is not the axis of the dimple.

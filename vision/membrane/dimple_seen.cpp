@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <numbers>
-#include <vector>
 
 #include "hal/math/elementary.hpp"
 #include "vision/image/polar_contour.hpp"
@@ -78,16 +78,20 @@ class Dimples {
       entry_ = polar_index(*entry - s_.band.centre, s_.angles);
       reach_ =
           std::clamp(static_cast<int>(kDimpleReach * n.half_width / spacing_), kLeastReach, s_.angles / 8);
+      for (int i = entry_ - reach_; i <= entry_ + reach_; ++i) {
+        turn_.emplace_back(outline_[index(i + 1)] - outline_[index(i - 1)]);
+      }
     }
   }
 
   [[nodiscard]] bool meets_the_cell() const { return meets_the_cell_; }
   [[nodiscard]] double depth_of_tip() const { return depth_of_tip_; }
+  void look(double deepest);  // before evidence()
   // For evidence(): of this shape.
   void choose(const Shape& shape) {
     share_.clear();
     for (int i = entry_ - reach_ - 1; i <= entry_ + reach_ + 1; ++i) {
-      share_.push_back(share_of_depth(shape, from_entry(i)));
+      share_.push_back(static_cast<float>(share_of_depth(shape, from_entry(i))));
     }
   }
   [[nodiscard]] std::optional<double> evidence(double depth) const;
@@ -118,36 +122,86 @@ class Dimples {
   bool meets_the_cell_ = false;
   int entry_ = 0;  // index of the angle
   int reach_ = 0;
-  std::vector<double> share_;  // of the depth, from the ray before those that tell to the one after them
+  Vector<float> share_;  // of the depth, from the ray before those that tell to the one after them
+  // At the places along the ways of the rays that tell, from the first depth on.
+  enum class Tells : std::uint8_t { edge, nothing, against };
+  static constexpr double kPlace_px = 0.5;
+  double first_depth_ = 0;
+  std::size_t places_ = 0;
+  Vector<float> gx_, gy_;  // grey levels per px
+  Vector<Tells> tells_;
+  Vector<cv::Point2f> turn_;  // per ray, of the outline at rest from the ray before to the one after, px
 };
 
+// The picture along each ray's way.
+void Dimples::look(double deepest) {
+  first_depth_ = -kAbove_px;
+  places_ = static_cast<std::size_t>((deepest - first_depth_) / kPlace_px) + 3;
+  const std::size_t rays = static_cast<std::size_t>(2 * reach_ + 1), room = places_ + GradientField::kAtOnce;
+  gx_.resize(rays * room);
+  gy_.resize(gx_.size());
+  tells_.resize(gx_.size());
+  const GradientField& field = s_.picture.field;
+  const Point& axis = s_.surroundings.needle.axis;
+  for (std::size_t k = 0; k < rays; ++k) {
+    const std::size_t i = index(entry_ - reach_ + static_cast<int>(k));
+    const Point from = outline_[i] + first_depth_ * axis, step = kPlace_px * axis;
+    float *gx = gx_.data() + k * room, *gy = gy_.data() + k * room;
+    const bool whole = field.contains(from, step, static_cast<int>(places_));
+    if (whole) {
+      field.gradients(from, step, static_cast<int>(places_), gx, gy);
+    }
+    for (std::size_t q = 0; q < places_; ++q) {
+      const Point p = from + static_cast<double>(q) * step;
+      if (!whole) {
+        const Point g = field.gradient(p);
+        gx[q] = static_cast<float>(g.x);
+        gy[q] = static_cast<float>(g.y);
+      }
+      const bool beyond = !s_.band.upper.empty() && cv::norm(p - s_.band.centre) > s_.band.upper[i];
+      tells_[k * room + q] = beyond ? Tells::against : s_.picture.hidden(p) ? Tells::nothing : Tells::edge;
+    }
+  }
+}
+
 std::optional<double> Dimples::evidence(double depth) const {
-  const double sign = s_.m.polarity == Polarity::darker_out ? -1 : 1;
-  double sum = 0;
+  const bool any = s_.m.polarity == Polarity::any, relief = s_.m.polarity == Polarity::relief;
+  const float scale = static_cast<float>((s_.m.polarity == Polarity::darker_out ? -1 : 1) / s_.m.level);
+  const auto d = static_cast<float>(depth);
+  const cv::Point2f by = cv::Point2f(s_.surroundings.needle.axis) * d;
+  const std::size_t room = places_ + GradientField::kAtOnce;
+  float sum = 0;
   int rays = 0;
-  const double* share = share_.data();
-  Point last = point(*share++, depth, entry_ - reach_ - 1), here = point(*share++, depth, entry_ - reach_);
-  for (int i = entry_ - reach_; i <= entry_ + reach_; ++i) {
-    const Point next = point(*share++, depth, i + 1);
-    if (!s_.band.upper.empty() && cv::norm(here - s_.band.centre) > s_.band.upper[index(i)]) {
-      sum -= 0.5;
+  for (std::size_t k = 0; k < turn_.size(); ++k) {
+    const float place =
+        (d * share_[k + 1] - static_cast<float>(first_depth_)) / static_cast<float>(kPlace_px);
+    const auto q = static_cast<std::size_t>(static_cast<int>(place));
+    const float u = place - static_cast<float>(q);
+    const std::size_t at = k * room + q;
+    const Tells tells = tells_[u < 0.5F ? at : at + 1];
+    if (tells == Tells::against) {
+      sum -= 0.5F;
       ++rays;
-    } else if (!s_.picture.hidden(here)) {
+    } else if (tells == Tells::edge) {
       // The outside is on the left of a contour of rising angle, with y down.
-      const Point along = next - last;
-      const double edge =
-          s_.picture.field.gradient(here).dot(Point(along.y, -along.x)) / (cv::norm(along) * s_.m.level);
-      sum += std::clamp(s_.m.polarity == Polarity::any ? std::abs(edge) : sign * edge, -1.0, 1.2) - 0.5;
+      const cv::Point2f along = turn_[k] + (share_[k + 2] - share_[k]) * by;
+      const float length = std::sqrt(along.x * along.x + along.y * along.y);
+      const float gx = gx_[at] + u * (gx_[at + 1] - gx_[at]), gy = gy_[at] + u * (gy_[at + 1] - gy_[at]);
+      const float edge = scale * (gx * along.y - gy * along.x) / length;
+      if (relief) {
+        const auto sign = static_cast<float>(s_.m.relief.sign_at(cv::Point2f(along.y, -along.x) / length));
+        sum += std::clamp(sign * edge, -1.0F, 1.2F) - 0.5F * std::abs(sign);
+      } else {
+        sum += std::clamp(any ? std::abs(edge) : edge, -1.0F, 1.2F) - 0.5F;
+      }
       ++rays;
     }
-    last = here;
-    here = next;
   }
   if (rays < kLeastRays) {
     return std::nullopt;
   }
   const double noise = s_.picture.gradient_noise / s_.m.level;
-  return sum * std::min(1.0, spacing_ / kOneSample_px) / (kModel + noise * noise);
+  return static_cast<double>(sum) * std::min(1.0, spacing_ / kOneSample_px) / (kModel + noise * noise);
 }
 
 }  // namespace
@@ -171,6 +225,7 @@ std::optional<SeenDimple> likeliest_dimple(const MembraneSearch& search) {
   if (deepest < 1) {
     return std::nullopt;
   }
+  dimples.look(deepest + kPast_px);
   std::optional<SeenDimple> pushed, free;
   std::array<double, kDimpleShapes> best;
   best.fill(-1e9);
@@ -216,7 +271,7 @@ std::optional<SeenDimple> likeliest_dimple(const MembraneSearch& search) {
 
 EdgeBand band_along(const MembraneSearch& search, const SeenDimple& dimple) {
   EdgeBand out = search.band;
-  const std::vector<double> r =
+  const Vector<double> r =
       polar_radii(Dimples(search).contour(kShapes[dimple.shape], dimple.depth), out.centre, search.angles);
   for (int i = 0; i < search.angles && !r.empty(); ++i) {
     const std::size_t k = static_cast<std::size_t>(i);

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <utility>
 
 #include "hal/math/elementary.hpp"
 #include "vision/image/median.hpp"
 #include "vision/image/polar_contour.hpp"
+#include "vision/membrane/edge_profiles.hpp"
 
 namespace punctum::vision {
 
@@ -26,6 +28,7 @@ constexpr double kCoarse_px = 1;
 // tell.
 constexpr int kFineAngles = 256;
 constexpr double kFine_px = 0.5;
+constexpr double kAsGood = 0.93;        // of the mean strength of the edge whatever its sign is
 constexpr double kSameCentre_px = 1.5;  // the edge round it is the same
 
 struct Radii {
@@ -50,14 +53,14 @@ EdgeBand band_round(const Point& centre, const Radii& radii, int angles, double 
   band.stiffness = 0.5;
   band.covered = picture.covered;
   band.measures_background = true;
-  picture.exclude_holder(band, std::vector<double>(band.middle.size(), 1.08 * radii.expected));
+  picture.exclude_holder(band, Vector<double>(band.middle.size(), 1.08 * radii.expected));
   return band;
 }
 
 ClosedEdge edge_in(const EdgeBand& band, const ClearedPicture& picture, Polarity polarity,
                    double saturation) {
-  return {closed_path(picture.field, band, polarity, picture.edge_floor(), saturation), band.centre,
-          polarity};
+  return {closed_path(picture.field, band, polarity, picture.edge_floor(), saturation), band.centre, polarity,
+          band.relief};
 }
 
 bool stands_out(const EdgePath& path, const ClearedPicture& picture) {
@@ -65,16 +68,30 @@ bool stands_out(const EdgePath& path, const ClearedPicture& picture) {
          path.level >= 1.8 * path.background && path.level >= kPathClear_noise * picture.gradient_noise;
 }
 
-// Share of the angles that are visible and have less than half of the saturated edge.
-double weak_share(const EdgePath& p) {
-  const double angles = static_cast<double>(p.strength.size());
-  const auto weak = std::count_if(p.strength.begin(), p.strength.end(),
-                                  [&](float e) { return static_cast<double>(e) < 0.5 * p.saturation; });
-  return (static_cast<double>(weak) - (1 - p.visible) * angles) / angles;
+// Share of the angles that have less than half of the saturated edge, where nothing else lies beside the
+// path.
+double weak_share(const ClosedEdge& edge, const ClearedPicture& picture) {
+  constexpr int kBeside_px = 8;
+  const EdgePath& p = edge.path;
+  const int angles = static_cast<int>(p.strength.size());
+  const cv::Rect all(0, 0, picture.covered.cols, picture.covered.rows);
+  int weak = 0;
+  for (int i = 0; i < angles; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    if (p.strength[k] != 0 && static_cast<double>(p.strength[k]) < 0.5 * p.saturation) {
+      const Point at = on_ray(edge.centre, i, angles, p.r[k]);
+      const cv::Rect beside =
+          all & cv::Rect(static_cast<int>(at.x) - kBeside_px, static_cast<int>(at.y) - kBeside_px,
+                         2 * kBeside_px + 1, 2 * kBeside_px + 1);
+      weak += beside.empty() || cv::countNonZero(picture.covered(beside)) > 0 ? 0 : 1;
+    }
+  }
+  return static_cast<double>(weak) / angles;
 }
 
-// Whether the radii differ little from r(t) = c0 + c1 cos t + c2 sin t + c3 cos 2t + c4 sin 2t.
-bool nearly_oval(const std::vector<double>& r) {
+// By how much the radii differ, rms and of the mean radius, from r(t) = c0 + c1 cos t + c2 sin t + c3 cos 2t
+// + c4 sin 2t.
+double off_an_oval(const Vector<double>& r) {
   constexpr int kTerms = 5;
   const int n = static_cast<int>(r.size());
   const auto f = [n](int i, int k) {
@@ -106,13 +123,205 @@ bool nearly_oval(const std::vector<double>& r) {
     }
     mean_square += e * e / n;
   }
-  return std::sqrt(mean_square) < kOvalDeviation * c[0];
+  return std::sqrt(mean_square) / c[0];
+}
+
+// Share of the places round which a tenth of the contour is nearly straight: bent outwards by less than a
+// third of what a circle is.
+double straight_share(const Contour& contour) {
+  constexpr double kPart = 0.1, kOfCircle = 0.35;
+  const std::size_t n = contour.size();
+  Vector<double> length(n);
+  double all = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    all += length[i] = cv::norm(contour[(i + 1) % n] - contour[i]);
+  }
+  const double sagitta = kOfCircle * kPart * kPart * all * 2 * std::numbers::pi / 8;
+  int straight = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    std::size_t end = i;
+    for (double along = 0; along < kPart * all; ++end) {
+      along += length[end % n];
+    }
+    const Point chord = contour[end % n] - contour[i];
+    double bent = 0;
+    for (std::size_t k = i; k < end; ++k) {
+      bent = std::max(bent, (contour[k % n] - contour[i]).cross(chord) / std::max(cv::norm(chord), 1e-9));
+    }
+    straight += bent < sagitta ? 1 : 0;
+  }
+  return straight / static_cast<double>(n);
+}
+
+// Glass, its shadows and dirt have closed paths of strong gradient as well. Round a cell the edge stands out
+// of what is beside it, single places of it lie on one curve, and that bends nearly everywhere and fades
+// nowhere.
+bool bounds_a_cell(const ClosedEdge& edge) {
+  constexpr double kAboveBackground = 3.5, kMostScatter_px = 1.1, kMostOff = 0.075;
+  constexpr double kStraight = 0.155, kOff = 0.045, kWeak = 0.25, kWeakOf = 0.4;
+  const EdgePath& path = edge.path;
+  const double off = off_an_oval(path.r);
+  if (path.level < kAboveBackground * path.background || path.residual > kMostScatter_px || off > kMostOff) {
+    return false;
+  }
+  int shown = 0, weak = 0;
+  for (const float e : path.strength) {
+    shown += e != 0 ? 1 : 0;
+    weak += e != 0 && static_cast<double>(e) < kWeakOf * path.level ? 1 : 0;
+  }
+  return straight_share(from_polar(edge.centre, path.r)) < kStraight || (off < kOff && weak < kWeak * shown);
+}
+
+// Where light comes from one side, the picture across an edge changes its sign round the cell: what turns
+// with the direction of the edge is more than what is the same all round. Least squares for each distance.
+struct ReliefSeen {
+  Relief relief;
+  double even = 0, turning = 0;  // mean squares of the two, summed over the distances
+};
+
+std::optional<ReliefSeen> relief_across(const ClosedEdge& edge, const ClearedPicture& picture) {
+  constexpr double kAcross_px = 6;
+  constexpr int kLeastPoints = 48;
+  const EdgeProfiles profiles(picture, from_polar(edge.centre, edge.path.r), kAcross_px, kAcross_px);
+  Vector<cv::Vec3d> sum(profiles.samples, cv::Vec3d::all(0));
+  cv::Matx33d a = cv::Matx33d::eye() * 1e-6;
+  int points = 0;
+  for (std::size_t i = 0; i < profiles.points; ++i) {
+    if (profiles.whole(i)) {
+      const cv::Vec3d by(1, profiles.normal[i].x, profiles.normal[i].y);
+      a += by * by.t();
+      ++points;
+      for (std::size_t j = 0; j < profiles.samples; ++j) {
+        const Lanes& grey = profiles.grey_of(i / kSideBySide)[j];
+        sum[j] += static_cast<double>(grey[static_cast<int>(i % kSideBySide)]) * by;
+      }
+    }
+  }
+  if (points < kLeastPoints) {
+    return std::nullopt;
+  }
+  double even = 0, xx = 0, xy = 0, yy = 0;
+  for (const cv::Vec3d& b : sum) {
+    const cv::Vec3d x = a.solve(b, cv::DECOMP_CHOLESKY);
+    even += x[0] * x[0];
+    xx += x[1] * x[1];
+    xy += x[1] * x[2];
+    yy += x[2] * x[2];
+  }
+  const double turning = 0.5 * (xx + yy + math::hypot(xx - yy, 2 * xy));  // along its direction
+  Point along(xy, turning - xx);
+  if (cv::norm(along) < 1e-6 * turning) {
+    along = Point(1, 0);
+  }
+  return ReliefSeen{{0, along / std::max(cv::norm(along), 1e-9)}, even, 0.5 * turning};
+}
+
+// The edge followed in relief, where the picture is lit from one side. A path of any sign, or of one, runs
+// along other faces on either side of the cell there, and one in relief does so where it is not; of the two
+// that is right which shows less of the other.
+std::optional<ClosedEdge> edge_in_relief(const ClosedEdge& any, EdgeBand band,
+                                         const ClearedPicture& picture) {
+  constexpr double kSuspected = 0.1, kStrength = 0.8;
+  auto seen = relief_across(any, picture);
+  std::optional<ClosedEdge> best;
+  for (int round = 0; round < 2 && seen && seen->turning > kSuspected * seen->even; ++round) {
+    best.reset();
+    for (const Relief& r : {seen->relief, seen->relief.opposite()}) {
+      band.relief = r;
+      ClosedEdge e = edge_in(band, picture, Polarity::relief, any.path.saturation);
+      if (!e.path.r.empty() && (!best || e.path.mean_strength > best->path.mean_strength)) {
+        best = std::move(e);
+      }
+    }
+    if (!best) {
+      return std::nullopt;
+    }
+    seen = relief_across(*best, picture);
+  }
+  if (!best || !seen || seen->turning < seen->even ||
+      best->path.mean_strength < kStrength * any.path.mean_strength) {
+    return std::nullopt;
+  }
+  for (const Polarity sign : {Polarity::brighter_out, Polarity::darker_out}) {
+    const ClosedEdge e = edge_in(band, picture, sign, any.path.saturation);
+    const auto otherwise = e.path.r.empty() ? std::nullopt : relief_across(e, picture);
+    if (otherwise && seen->turning * otherwise->turning < seen->even * otherwise->even) {
+      return std::nullopt;
+    }
+  }
+  return best;
+}
+
+// Of an edge followed by its sign: per angle, how far out the outermost edge of that sign is which is about
+// as strong, where such edges make an arc that lies outside of the followed one. 0 elsewhere.
+Vector<double> arcs_further_out(const ClosedEdge& edge, const EdgeBand& band, const ClearedPicture& picture) {
+  constexpr double kAsStrong = 0.6, kOutside_px = 3, kStep_px = 2;  // of the saturated edge
+  constexpr int kArc = kFineAngles / 32;                            // the rays of an arc, at least
+  const EdgeSamples samples(picture.field, band, edge.polarity);
+  Vector<double> out(band.middle.size(), 0.0);
+  if (samples.empty() || edge.path.r.size() != out.size()) {
+    return out;
+  }
+  const float strong = static_cast<float>(kAsStrong * edge.path.saturation);
+  const auto at = [&](int i) { return static_cast<std::size_t>(i % samples.angles); };
+  const auto outermost = [&](int i) {
+    const std::size_t a = at(i);
+    for (int j = samples.samples - 1; j >= 0; --j) {
+      const double r = band.middle[a] + (j - samples.half) * band.step;
+      if (r < edge.path.r[a] + kOutside_px) {
+        break;
+      }
+      if (samples.edge[samples.id(static_cast<int>(a), j)] > strong) {
+        return r;
+      }
+    }
+    return 0.0;
+  };
+  Vector<double> r(out.size());
+  for (int i = 0; i < samples.angles; ++i) {
+    r[at(i)] = outermost(i);
+  }
+  const auto goes_on = [&](int i) {
+    return r[at(i)] > 0 && r[at(i + 1)] > 0 && std::abs(r[at(i + 1)] - r[at(i)]) < kStep_px;
+  };
+  for (int from = 0; from < samples.angles; ++from) {
+    int length = 0;
+    while (length < kArc && goes_on(from + length)) {
+      ++length;
+    }
+    for (int k = 0; length == kArc && k <= kArc; ++k) {
+      out[at(from + k)] = r[at(from + k)];
+    }
+  }
+  return out;
+}
+
+// Where two edges of one sign are about as strong, one inside the other, as those of a wall and of what it
+// holds, a path may change from one to the other. Keeps to the outer one if that is a closed edge as good as
+// the followed one.
+void keep_to_the_outermost(ClosedEdge& edge, const ClosedEdge& any, EdgeBand band,
+                           const ClearedPicture& picture) {
+  constexpr double kLeastShare = 0.05, kBlur_px = 2, kAsOval = 0.01;
+  const Vector<double> further = arcs_further_out(edge, band, picture);
+  const auto out = std::count_if(further.begin(), further.end(), [](double r) { return r > 0; });
+  if (static_cast<double>(out) < kLeastShare * static_cast<double>(further.size())) {
+    return;
+  }
+  band.lower.assign(further.size(), 0.0);
+  for (std::size_t i = 0; i < further.size(); ++i) {
+    band.lower[i] = std::max(0.0, further[i] - kBlur_px);
+  }
+  ClosedEdge outer = edge_in(band, picture, edge.polarity, edge.path.saturation);
+  if (!outer.path.r.empty() && outer.path.mean_strength > kAsGood * any.path.mean_strength &&
+      off_an_oval(outer.path.r) < off_an_oval(edge.path.r) + kAsOval) {
+    edge = std::move(outer);
+  }
 }
 
 }  // namespace
 
 std::optional<ClosedEdge> closed_edge_round(const Circle& circle, bool seeded, double saturation,
-                                            std::vector<Point>& tried, const ClearedPicture& picture,
+                                            Vector<Point>& tried, const ClearedPicture& picture,
                                             const VisionConfig& config) {
   constexpr int kCentrings = 6;
   constexpr double kSettled_px = 0.5;
@@ -146,18 +355,27 @@ std::optional<MainEdge> edge_by_its_sign(const ClosedEdge& any, const Circle& ci
   // noise single rays are, too, and a path of any sign finds some other edge there: at a noise of 0.28 of the
   // edge's level on up to 0.05 of the rays.
   const double noise = picture.gradient_noise / std::max(any.path.level, 1e-6);
-  const double weak_most = weak_share(any.path) + 0.015 + 2.5 * noise * noise * noise;
+  const double weak_most = weak_share(any, picture) + 0.015 + 2.5 * noise * noise * noise;
   const auto follow_signs = [&](const EdgeBand& band) {
     for (const Polarity sign : {Polarity::brighter_out, Polarity::darker_out}) {
       ClosedEdge e = edge_in(band, picture, sign, any.path.saturation);
-      if (!e.path.r.empty() && e.path.mean_strength > 0.93 * any.path.mean_strength &&
-          weak_share(e.path) < weak_most &&
+      if (e.path.r.empty() || e.path.mean_strength <= kAsGood * any.path.mean_strength) {
+        continue;
+      }
+      keep_to_the_outermost(e, any, band, picture);
+      if (weak_share(e, picture) < weak_most &&
           (best.edge.polarity == Polarity::any || e.path.mean_strength > best.edge.path.mean_strength)) {
         best.edge = std::move(e);
       }
     }
   };
   EdgeBand band = band_round(any.centre, Radii(circle, seeded, config), kFineAngles, kFine_px, picture);
+  if (auto relief = edge_in_relief(any, band, picture)) {
+    best.edge = *std::move(relief);
+    return stands_out(best.edge.path, picture) && (seeded || bounds_a_cell(best.edge))
+               ? std::optional(std::move(best))
+               : std::nullopt;
+  }
   follow_signs(band);
   if (best.edge.polarity == Polarity::any) {  // another edge has more of one sign: near this one alone
     constexpr double kNear_px = 6;
@@ -166,13 +384,15 @@ std::optional<MainEdge> edge_by_its_sign(const ClosedEdge& any, const Circle& ci
     follow_signs(band);
     best.edge.path.background = any.path.background;
   }
-  return stands_out(best.edge.path, picture) ? std::optional(std::move(best)) : std::nullopt;
+  return stands_out(best.edge.path, picture) && (seeded || bounds_a_cell(best.edge))
+             ? std::optional(std::move(best))
+             : std::nullopt;
 }
 
-SecondEdge find_second(const std::vector<double>& r1, const Point& centre, Polarity known_sign, bool outside,
+SecondEdge find_second(const Vector<double>& r1, const Point& centre, Polarity known_sign, bool outside,
                        const ClearedPicture& picture, const VisionConfig& config) {
   const double r_max = config.px(config.R_max_m), mean = median_of(r1);
-  const std::vector<double> first = polar_radii(from_polar(centre, r1), centre, kStartAngles);
+  const Vector<double> first = polar_radii(from_polar(centre, r1), centre, kStartAngles);
   SecondEdge best;
   if (first.empty()) {
     return best;
@@ -192,7 +412,7 @@ SecondEdge find_second(const std::vector<double>& r1, const Point& centre, Polar
     band.half_width = (to - from) / 2;
     band.step = std::max(kCoarse_px, (to - from) / 120);
     band.middle = first;
-    picture.exclude_holder(band, outside ? std::vector<double>(first.size(), mean + gap) : first);
+    picture.exclude_holder(band, outside ? Vector<double>(first.size(), mean + gap) : first);
     for (double& r : band.middle) {
       r += (from + to) / 2;
     }
@@ -205,7 +425,7 @@ SecondEdge find_second(const std::vector<double>& r1, const Point& centre, Polar
       continue;
     }
     // Along the limit of the band it is the flank of the first edge.
-    std::vector<double> offsets;
+    Vector<double> offsets;
     for (std::size_t i = 0; i < p.r.size(); ++i) {
       offsets.push_back(std::abs(p.r[i] - first[i]));
     }
@@ -216,7 +436,7 @@ SecondEdge find_second(const std::vector<double>& r1, const Point& centre, Polar
     const double quality = preference * p.level * p.support * std::min(1.0, p.visible / 0.8) /
                            std::max({p.background, picture.gradient_noise, 0.02});
     if (quality > best.quality) {
-      best = {std::move(p), q, quality};
+      best = {std::move(p), q, {}, quality};
     }
   }
   if (!best.path.r.empty()) {
@@ -225,10 +445,40 @@ SecondEdge find_second(const std::vector<double>& r1, const Point& centre, Polar
   return best;
 }
 
+SecondEdge find_in_relief(const Vector<double>& r1, const Point& centre, const Relief& relief, double from,
+                          double to, const ClearedPicture& picture) {
+  SecondEdge out;
+  const Vector<double> first = polar_radii(from_polar(centre, r1), centre, kFineAngles);
+  if (first.empty() || to - from < 4) {
+    return out;
+  }
+  EdgeBand band;
+  band.centre = centre;
+  band.half_width = (to - from) / 2;
+  band.middle = first;
+  picture.exclude_holder(band, first, false);
+  for (double& r : band.middle) {
+    r += (from + to) / 2;
+  }
+  band.stiffness = 0.8;
+  band.covered = picture.covered;
+  band.measures_background = true;
+  band.relief = relief;
+  out.path = closed_path(picture.field, band, Polarity::relief, picture.edge_floor(), 0);
+  out.polarity = Polarity::relief;
+  out.relief = relief;
+  if (!out.path.r.empty()) {
+    out.quality = out.path.level * out.path.support * std::min(1.0, out.path.visible / 0.8) /
+                  std::max({out.path.background, picture.gradient_noise, 0.02});
+    out.path.r = polar_radii(from_polar(centre, out.path.r), centre, static_cast<int>(r1.size()));
+  }
+  return out;
+}
+
 bool clear_enough(const SecondEdge& edge, double first_level, const ClearedPicture& picture) {
   // A path that is not nearly an oval has followed something else.
   return edge.quality >= kContrast && edge.path.level >= kPathClear_noise * picture.gradient_noise &&
-         edge.path.level >= 0.12 * first_level && nearly_oval(edge.path.r);
+         edge.path.level >= 0.12 * first_level && off_an_oval(edge.path.r) < kOvalDeviation;
 }
 
 }  // namespace punctum::vision

@@ -2,10 +2,10 @@
 #pragma once
 
 #include <optional>
-#include <vector>
 
 #include "vision/config.hpp"
 #include "vision/image/circle.hpp"
+#include "vision/image/kept_vector.hpp"
 #include "vision/membrane/cleared_picture.hpp"
 
 namespace punctum::vision {
@@ -17,6 +17,7 @@ struct ClosedEdge {
   EdgePath path;
   Point centre;
   Polarity polarity = Polarity::any;
+  Relief relief;
 };
 
 struct MainEdge {
@@ -27,6 +28,7 @@ struct MainEdge {
 struct SecondEdge {
   EdgePath path;  // about the centre of the first edge
   Polarity polarity = Polarity::any;
+  Relief relief;
   double quality = 0;
 };
 
@@ -35,7 +37,7 @@ struct SecondEdge {
 // by the picture. tried: centres of edges that are known already. Empty when it is one of those, or when no
 // edge stands out.
 [[nodiscard]] std::optional<ClosedEdge> closed_edge_round(const Circle& circle, bool seeded,
-                                                          double saturation, std::vector<Point>& tried,
+                                                          double saturation, Vector<Point>& tried,
                                                           const ClearedPicture& picture,
                                                           const VisionConfig& config);
 
@@ -44,9 +46,14 @@ struct SecondEdge {
                                                        bool seeded, const ClearedPicture& picture,
                                                        const VisionConfig& config);
 
+// A second closed edge of an opposite (or the same) sign in relief, between two distances outside of a known
+// one (inside: negative), px.
+[[nodiscard]] SecondEdge find_in_relief(const Vector<double>& r1, const Point& centre, const Relief& relief,
+                                        double from, double to, const ClearedPicture& picture);
+
 // A second closed edge, at some distance outside or inside of one that is known: `r1`, per angle round the
 // centre, of the sign `known_sign`. Its path is empty when there is none.
-[[nodiscard]] SecondEdge find_second(const std::vector<double>& r1, const Point& centre, Polarity known_sign,
+[[nodiscard]] SecondEdge find_second(const Vector<double>& r1, const Point& centre, Polarity known_sign,
                                      bool outside, const ClearedPicture& picture, const VisionConfig& config);
 
 // Whether a second edge is a membrane. first_level: level of the first edge, grey levels per px.

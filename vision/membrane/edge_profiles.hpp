@@ -2,27 +2,28 @@
 #pragma once
 
 #include <cstddef>
-#include <vector>
 
 #include "vision/image/contour.hpp"
+#include "vision/image/kept_vector.hpp"
 #include "vision/membrane/cleared_picture.hpp"
 
 namespace punctum::vision {
 
-// Neighbouring points lie side by side, sample by sample: every processor computes four at once.
-inline constexpr std::size_t kSideBySide = 4;
+// Neighbouring points lie side by side, sample by sample: a processor with wide registers computes all at
+// once.
+inline constexpr std::size_t kSideBySide = 8;
 using Lanes = float __attribute__((vector_size(kSideBySide * sizeof(float))));
 
 struct EdgeProfiles {
   static constexpr double kStep_px = 0.5;  // between two samples
 
   std::size_t points, samples, groups;
-  double inside;              // px of the first sample within the contour
-  std::vector<Point> normal;  // outwards
+  double inside;         // px of the first sample within the contour
+  Vector<Point> normal;  // outwards
   // Of a group's points sample by sample. What lies beyond the last point is not seen.
-  std::vector<Lanes> grey;   // without the point's mean; 0 where it is not seen
-  std::vector<Lanes> seen;   // 1, or 0
-  std::vector<int> seen_of;  // per point: samples that are seen
+  Vector<Lanes> grey;   // without the point's mean; 0 where it is not seen
+  Vector<Lanes> seen;   // 1, or 0
+  Vector<int> seen_of;  // per point: samples that are seen
 
   // inside, outside: px of the picture that are looked at on either side of the contour.
   EdgeProfiles(const ClearedPicture& picture, const Contour& contour, double inside_px, double outside_px);
@@ -37,11 +38,8 @@ struct EdgeProfiles {
   // Where the membrane is soft (1, per point) and another edge beside it nearer or further than elsewhere,
   // that is moved to its usual distance. face: where it lies, per point; height: half of its change of grey,
   // outwards. contour: of the profiles.
-  void move_nearby(const Contour& contour, const std::vector<double>& soft, const Contour& face,
-                   double height, double blur_px);
-
- private:
-  void take_off_means();
+  void move_nearby(const Contour& contour, const Vector<double>& soft, const Contour& face, double height,
+                   double blur_px);
 };
 
 }  // namespace punctum::vision

@@ -6,27 +6,31 @@
 #include <opencv2/core.hpp>
 #include <utility>
 
+#include "hal/math/elementary.hpp"
 #include "vision/image/periodic_smoothing.hpp"
 #include "vision/membrane/blurred_steps.hpp"
 #include "vision/membrane/common_shape.hpp"
 #include "vision/membrane/edge_profiles.hpp"
+#include "vision/membrane/relief_steps.hpp"
 
 namespace punctum::vision {
 
 namespace {
 
-constexpr double kHalo_px = 0.1;  // sd by which a halo may shift the whole contour
+constexpr double kHalo_px = 0.1;     // sd by which a halo may shift the whole contour
+constexpr double kFocus_px = 1.6;    // blur, with the pixels' own, of a picture that is in focus
+constexpr double kRelief_px = 0.15;  // sd by which relief may: the form of a face is known only roughly
 
 // The contour without finer waves, moved along the rays from its centre.
-Contour smoothed(const Contour& contour, const std::vector<double>& soft, double modes) {
+Contour smoothed(const Contour& contour, const Vector<double>& soft, double modes) {
   const std::size_t n = contour.size();
   const Point centre = centroid(contour);
-  std::vector<double> stiffness(n), r(n);
+  Vector<double> stiffness(n), r(n);
   for (std::size_t i = 0; i < n; ++i) {
     stiffness[i] = stiffness_of(modes, soft[i], n);
     r[i] = cv::norm(contour[i] - centre);
   }
-  const std::vector<double> smooth = smooth_periodic(r, std::vector<double>(n, 1.0), stiffness);
+  const Vector<double> smooth = smooth_periodic(r, Vector<double>(n, 1.0), stiffness);
   Contour out(n);
   for (std::size_t i = 0; i < n; ++i) {
     out[i] = centre + smooth[i] / std::max(r[i], 1e-9) * (contour[i] - centre);
@@ -34,10 +38,23 @@ Contour smoothed(const Contour& contour, const std::vector<double>& soft, double
   return out;
 }
 
+// own: where the edge lies in the common shape, px; own_sd: by which that may be wrong all round.
+SeenOutline outline(const Contour& base, const EdgeProfiles& profiles, const CommonShape& common, double own,
+                    double own_sd, double noise, EdgeLearnt& learnt) {
+  CommonShape::Variance variance = common.variance(noise, learnt);
+  SeenOutline out{Contour(base.size()), std::move(variance.all), std::move(variance.lasting)};
+  for (std::size_t i = 0; i < base.size(); ++i) {
+    out.variance[i] += own_sd * own_sd;
+    out.lasting[i] += own_sd * own_sd;
+    out.contour[i] = base[i] + (common.places()[i] + own) * profiles.normal[i];
+  }
+  return out;
+}
+
 }  // namespace
 
 std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Contour& contour,
-                                       const std::vector<double>& soft, const EdgeShape& edge,
+                                       const Vector<double>& soft, const EdgeShape& edge,
                                        EdgeLearnt& learnt) {
   if (contour.size() < 64 || soft.size() != contour.size()) {
     return std::nullopt;
@@ -49,7 +66,17 @@ std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Cont
     profiles.move_nearby(base, soft, edge.nearby_face, learnt.nearby_height, learnt.blur_px);
   }
   CommonShape common(profiles, soft, edge);
-  const auto steps = common.find() ? BlurredSteps(common.shape(), edge).fit() : std::nullopt;
+  if (!common.find(learnt)) {
+    return std::nullopt;
+  }
+  if (edge.relief != Point(0, 0)) {
+    const auto steps = ReliefSteps(common.turning(), edge, picture.noise).fit();
+    if (!steps) {
+      return std::nullopt;
+    }
+    return outline(base, profiles, common, steps->own, kRelief_px, picture.noise, learnt);
+  }
+  const auto steps = BlurredSteps(common.shape(), edge).fit(learnt.steps);
   if (!steps) {
     return std::nullopt;
   }
@@ -59,16 +86,11 @@ std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Cont
     learnt.nearby_height += part * (steps->nearby_height - learnt.nearby_height);
     learnt.blur_px += part * (steps->blur_px - learnt.blur_px);
   }
-  CommonShape::Variance variance = common.variance(picture.noise, learnt);
-  SeenOutline out{Contour(base.size()), std::move(variance.all), std::move(variance.lasting)};
-  for (std::size_t i = 0; i < base.size(); ++i) {
-    if (steps->halo) {  // its shape is not known
-      out.variance[i] += kHalo_px * kHalo_px;
-      out.lasting[i] += kHalo_px * kHalo_px;
-    }
-    out.contour[i] = base[i] + (common.places()[i] + steps->own) * profiles.normal[i];
-  }
-  return out;
+  learnt.halo = steps->halo;
+  learnt.steps = steps->unknowns;
+  const double blurred = edge.per_blur * std::max(0.0, steps->blur_px - kFocus_px);
+  return outline(base, profiles, common, steps->own, math::hypot(steps->halo ? kHalo_px : 0, blurred),
+                 picture.noise, learnt);
 }
 
 }  // namespace punctum::vision

@@ -5,8 +5,8 @@
 
 #include <cstdint>
 #include <optional>
-#include <vector>
 
+#include "vision/image/kept_vector.hpp"
 #include "vision/membrane/cleared_picture.hpp"
 #include "vision/membrane/seen_outline.hpp"
 
@@ -21,10 +21,12 @@ struct NearbyEdge {
 struct EdgeShape {
   double inside = 8, outside = 6;  // px of the picture that are looked at on either side of the contour
   double modes = 12;               // finer waves round the contour are noise
-  double lasting = 0;  // of the places' scatter at least this share is the same in the next frames
+  double lasting = 0;      // of the places' scatter at least this share is the same in the next frames
+  double per_blur = 0.25;  // px by which the own step may be off for each px of blur beyond focus: sd
   std::optional<NearbyEdge> nearby;
-  Contour nearby_face;  // where it lies, per point, if it is not equally far everywhere; or empty
-  std::vector<std::uint8_t> beside;  // per point, 1: beside a line that is not its own; or empty
+  Contour nearby_face;          // where it lies, per point, if it is not equally far everywhere; or empty
+  Point relief;                 // unit, from where the light seems to come: see CommonShape; or zero
+  Vector<std::uint8_t> beside;  // per point, 1: beside a line that is not its own; or empty
 };
 
 // What is learnt of an edge over the frames.
@@ -33,14 +35,18 @@ struct EdgeLearnt {
   // of half of what neighbours differ by, px^2.
   double square = 0, difference = 0;
   int frames = 0;                         // of these two
+  bool halo = false;                      // in the last frame
   double nearby_height = 0, blur_px = 0;  // of the nearby edge: half of its change of grey, outwards
+  // What all profiles had in common in the last frame, and how single ones differed from it; empty in relief.
+  Vector<double> shape, spread;
+  std::optional<cv::Vec4d> steps;  // in it: see BlurredSteps
 };
 
 // soft: per point of the contour, 1 where the membrane may have any shape (beside the needle), 0 elsewhere.
 // Empty where too little is seen, or where the edge does not look alike all round. learnt: takes this frame
 // in.
 [[nodiscard]] std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Contour& contour,
-                                                     const std::vector<double>& soft, const EdgeShape& edge,
+                                                     const Vector<double>& soft, const EdgeShape& edge,
                                                      EdgeLearnt& learnt);
 
 }  // namespace punctum::vision

@@ -3,9 +3,9 @@
 
 #include <array>
 #include <cstddef>
-#include <vector>
 
 #include "vision/image/closed_path.hpp"
+#include "vision/image/kept_vector.hpp"
 #include "vision/image/polar_contour.hpp"
 #include "vision/membrane/carried_outline.hpp"
 #include "vision/membrane/edge_shape.hpp"
@@ -18,8 +18,9 @@ constexpr std::size_t kDimpleShapes = 10;
 struct FollowedMembrane {
   bool known = false;
   Point centre;
-  std::vector<double> r;  // px per angle
+  Vector<double> r;  // px per angle
   Polarity polarity = Polarity::any;
+  Relief relief;     // for Polarity::relief
   double level = 0;  // usual edge along it, grey levels per px
   Contour nodes;     // of the paper's snake
   RestOutline rest;
@@ -30,6 +31,15 @@ struct FollowedMembrane {
   std::array<double, kDimpleShapes> dimple_odds{};  // log odds of the shape of its dimple
   int lost_frames = 0;                              // in a row
 
+  // Of an edge of that direction, outwards.
+  [[nodiscard]] Polarity polarity_at(const Point& normal) const {
+    constexpr double kTold = 0.6;
+    const double sign = polarity == Polarity::relief ? relief.sign_at(normal) : 0;
+    return polarity != Polarity::relief ? polarity
+           : sign > kTold               ? Polarity::brighter_out
+           : sign < -kTold              ? Polarity::darker_out
+                                        : Polarity::any;
+  }
   [[nodiscard]] Contour contour() const { return from_polar(centre, r); }
   [[nodiscard]] bool lost() const noexcept { return lost_frames >= 2; }  // one frame may fail
 };

@@ -29,11 +29,12 @@ double thin_wall_bias(const MembraneSearch& search, const EdgePath& path, double
   constexpr double kStep = 0.25;      // px
   const GradientField& field = search.picture.field;
   const double sigma = std::sqrt(field.sigma * field.sigma + kPsf_px * kPsf_px + kPixelling);
-  if (search.m.polarity == Polarity::any || !(thickness > 0) || thickness > 2 * sigma) {
+  if (search.m.polarity == Polarity::any || search.m.polarity == Polarity::relief || !(thickness > 0) ||
+      thickness > 2 * sigma) {
     return 0;
   }
   const double sign = search.m.polarity == Polarity::brighter_out ? 1 : -1;
-  std::vector<double> apart;
+  Vector<double> apart;
   for (int i = 0; i < search.angles; ++i) {
     const std::size_t k = static_cast<std::size_t>(i);
     if (!path.seen[k]) {
@@ -64,7 +65,7 @@ SeenOutline seen_by_path(const MembraneSearch& search, const EdgePath& path, Con
   constexpr double kShare = 0.3;  // of the variance of a single edge, after the smoothing
   constexpr double kUnseen = 9;   // times as much where no edge is seen
   const double least = std::max(path.residual, 0.1);
-  SeenOutline out{std::move(contour), std::vector<double>(path.r.size()), {}};
+  SeenOutline out{std::move(contour), Vector<double>(path.r.size()), {}};
   for (int i = 0; i < search.angles; ++i) {
     const auto k = static_cast<std::size_t>(i);
     out.variance[k] = kShare * least * least * (path.seen[k] != 0 ? 1 : kUnseen);
@@ -75,25 +76,31 @@ SeenOutline seen_by_path(const MembraneSearch& search, const EdgePath& path, Con
 
 // Of the wall of the membrane around, seen from the centre of the band; empty where that is not known.
 Contour inner_face(const MembraneSearch& search, const FollowedMembrane& around, double wall) {
-  std::vector<double> r = polar_radii(around.carried.contour(), search.band.centre, search.angles);
+  Vector<double> r = polar_radii(around.carried.contour(), search.band.centre, search.angles);
   for (double& x : r) {
     x -= wall;
   }
   return from_polar(search.band.centre, r);
 }
 
-// The path moved to where the edge looks as it does all round.
-SeenOutline refined(const MembraneSearch& search, const EdgePath& path, const VisionConfig& config,
-                    const Surroundings& surroundings, EdgeLearnt& learnt) {
+// The path moved to where the edge looks as it does all round. Empty for an edge in relief that does not: its
+// path alone is off by more than a pixel.
+std::optional<SeenOutline> refined(const MembraneSearch& search, const EdgePath& path,
+                                   const VisionConfig& config, const Surroundings& surroundings,
+                                   EdgeLearnt& learnt) {
   Contour contour = from_polar(search.band.centre, path.r);
   if (search.m.polarity != Polarity::any) {
-    std::vector<double> soft(contour.size(), 0.0);
+    Vector<double> soft(contour.size(), 0.0);
     for (int i = 0; i < search.angles && search.needle; ++i) {
       soft[static_cast<std::size_t>(i)] = std::clamp((kSoftHalf - search.from_needle(i)) / 0.6, 0.0, 1.0);
     }
     const double wall = config.px(config.h_m);
     EdgeShape edge;
     edge.beside = search.band.hidden;
+    if (search.m.polarity == Polarity::relief) {
+      const Point along = search.m.relief.along;
+      edge.relief = along / cv::norm(along);
+    }
     if (surroundings.outermost) {
       edge.modes = kOuterModes;
       edge.nearby = {-wall, kWallTolerance * wall};
@@ -102,6 +109,7 @@ SeenOutline refined(const MembraneSearch& search, const EdgePath& path, const Vi
       edge.outside = 5;
       edge.modes = kInnerModes;
       edge.lasting = kGranules;
+      edge.per_blur = 0.8;  // granules and the wall blur into it
       if (surroundings.around) {
         const double gap = mean_radius(surroundings.around->contour()) - mean_radius(contour) - wall;
         if (gap > 1) {
@@ -114,12 +122,15 @@ SeenOutline refined(const MembraneSearch& search, const EdgePath& path, const Vi
       }
     }
     if (auto shaped = shaped_edge(search.picture, contour, soft, edge, learnt)) {
-      return *std::move(shaped);
+      return shaped;
+    }
+    if (search.m.polarity == Polarity::relief && edge.nearby) {
+      return std::nullopt;
     }
   }
   if (surroundings.outermost) {
     const double bias = thin_wall_bias(search, path, config.px(config.h_m));
-    std::vector<double> face = path.r;
+    Vector<double> face = path.r;
     for (double& r : face) {
       r -= bias;
     }
@@ -129,12 +140,12 @@ SeenOutline refined(const MembraneSearch& search, const EdgePath& path, const Vi
 }
 
 // By how much a needle that touches it may change its shape in a frame, px per angle.
-std::vector<double> pushed_per_frame(const MembraneSearch& search) {
+Vector<double> pushed_per_frame(const MembraneSearch& search) {
   constexpr double kNearNeedle_px = 2;
   constexpr double kDentHalf = 0.8, kBlend = 0.4;  // rad to either side of the entry
   constexpr double kNear_px = 3;                   // of the tip above the outline at rest
   const bool near = search.needle && (search.rest.empty() || search.depth_of_tip() > -kNear_px);
-  std::vector<double> out(static_cast<std::size_t>(search.angles), 0.0);
+  Vector<double> out(static_cast<std::size_t>(search.angles), 0.0);
   for (int i = 0; i < search.angles && near; ++i) {
     out[static_cast<std::size_t>(i)] =
         kNearNeedle_px * std::clamp((kDentHalf - search.from_needle(i)) / kBlend, 0.0, 1.0);
@@ -162,7 +173,7 @@ bool left_outline(const MembraneSearch& s, const EdgePath& path) {
 // Empty when it is still the same edge.
 std::string why_not_the_same_edge(const MembraneSearch& s, const EdgeFound& found) {
   const EdgePath& path = found.path;
-  std::vector<double> jump;
+  Vector<double> jump;
   for (int i = 0; i < s.angles; ++i) {
     const std::size_t k = static_cast<std::size_t>(i);
     if (!found.is_free || s.from_needle(i) >= kNeedleHalf) {
@@ -208,7 +219,13 @@ Membrane follow(FollowedMembrane& m, const ClearedPicture& picture, const Vision
     ++m.lost_frames;
     return out;
   }
-  const SeenOutline seen = refined(search, path, config, surroundings, m.edge);
+  const auto shown = refined(search, path, config, surroundings, m.edge);
+  if (!shown) {
+    out.reason = "edge does not look alike all round";
+    ++m.lost_frames;
+    return out;
+  }
+  const SeenOutline& seen = *shown;
   out.contour = seen.contour;
   out.support = path.support;
   out.visible = path.visible;
@@ -220,7 +237,9 @@ Membrane follow(FollowedMembrane& m, const ClearedPicture& picture, const Vision
   }
   m.level += 0.1 * (path.level - m.level);
   const Point centre = centroid(seen.contour);
-  const std::vector<double> r = polar_radii(seen.contour, centre, search.angles);
+  // The centre stays while it is well inside the contour, since resampling costs accuracy.
+  const bool moves = cv::norm(centre - search.band.centre) > 0.06 * search.usual_r;
+  const Vector<double> r = moves ? polar_radii(seen.contour, centre, search.angles) : path.r;
   if (r.empty()) {
     out.reason = "contour crosses itself";
     ++m.lost_frames;
@@ -234,14 +253,8 @@ Membrane follow(FollowedMembrane& m, const ClearedPicture& picture, const Vision
   m.dimple_px = found.dimple_px;
   m.dimple_odds = found.dimple_odds;
   m.lost_frames = 0;
-  // The centre stays while it is well inside the contour, since resampling costs accuracy.
-  if (cv::norm(centre - search.band.centre) > 0.06 * search.usual_r) {
-    m.centre = centre;
-    m.r = r;
-  } else {
-    m.centre = search.band.centre;
-    m.r = path.r;
-  }
+  m.centre = moves ? centre : search.band.centre;
+  m.r = r;
   return out;
 }
 

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
-#include <vector>
 
 #include "vision/image/blurred_step.hpp"
 #include "vision/image/parabola.hpp"
@@ -34,7 +33,7 @@ double face_strength(double along_axis, Polarity polarity) {
 std::optional<double> contact_beside_edge(const GradientField& field, const NeedlePose& needle,
                                           Polarity polarity, double floor, double side, double expected) {
   constexpr double kStep_px = 0.5;
-  std::vector<double> g, at;
+  Vector<double> g, at;
   for (double s = expected + kContourReach_px; s >= expected - kContourReach_px; s -= kStep_px) {
     const Point p = needle.at(s, side * (needle.half_width_at(s) + kBesideEdge_px));
     if (!field.area.contains(cv::Point(static_cast<int>(p.x), static_cast<int>(p.y)))) {

@@ -16,7 +16,9 @@ namespace {
 
 constexpr double kSaturation = 0.7;  // times the usual edge: a stronger one is not better
 constexpr double kTouching_px = 1;   // a tip that is deeper pushes the membrane, or is through it
-constexpr double kFreeHalf_px = 7;   // a free membrane is looked for so near to its outline at rest
+constexpr double kStep_px = 0.75, kFineStep_px = 0.5;  // between samples of a clear edge, of a faint one
+constexpr double kClearEdge = 5;                       // times the noise of the gradient
+constexpr double kFreeHalf_px = 7;  // a free membrane is looked for so near to its outline at rest
 
 }  // namespace
 
@@ -31,20 +33,22 @@ MembraneSearch::MembraneSearch(const FollowedMembrane& followed, const ClearedPi
   band.centre = m.centre;
   band.middle = m.r;
   band.half_width = std::clamp(0.11 * usual_r, 6.0, 14.0);
+  band.step = m.level > kClearEdge * picture.gradient_noise ? kStep_px : kFineStep_px;
   band.slope = 1.0;
   band.covered = picture.covered;
+  band.relief = m.relief;
   rest = m.rest.seen_from(band.centre);
   keep_membranes_apart();
 
-  std::vector<double> expected = m.r;
+  Vector<double> expected = m.r;
   if (s.outermost && s.undeformed && s.undeformed->round) {
     // A contour that has slipped inwards along the holding pipette comes back.
-    const std::vector<double> free = polar_radii(s.undeformed->shape, band.centre, angles);
+    const Vector<double> free = polar_radii(s.undeformed->shape, band.centre, angles);
     for (std::size_t i = 0; i < free.size(); ++i) {
       expected[i] = std::max(expected[i], free[i]);
     }
   }
-  picture.exclude_holder(band, expected);
+  picture.exclude_holder(band, expected, m.polarity != Polarity::relief);
 
   if (s.needle.ok) {
     const Point tip = s.needle.tip - band.centre;
@@ -111,10 +115,10 @@ EdgePath MembraneSearch::path_free() const {
 }
 
 // The membrane lies flat against the end face of the needle; a pierced one reaches to the tip at most.
-std::vector<std::pair<int, double>> MembraneSearch::end_face() const {
+Vector<std::pair<int, double>> MembraneSearch::end_face() const {
   const NeedlePose& n = surroundings.needle;
   const double ahead = (n.tip - band.centre).dot(n.axis);
-  std::vector<std::pair<int, double>> face;
+  Vector<std::pair<int, double>> face;
   for (int i = 0; i < angles && ahead < 0 && !surroundings.punctured; ++i) {
     const Point ray = on_ray(Point(0, 0), i, angles, 1);
     const double towards = ray.dot(n.axis);
@@ -123,7 +127,7 @@ std::vector<std::pair<int, double>> MembraneSearch::end_face() const {
       face.emplace_back(i, ahead / towards);
     }
   }
-  return face.empty() ? std::vector{std::make_pair(needle->tip_index, needle->tip_r)} : face;
+  return face.empty() ? Vector<std::pair<int, double>>{{needle->tip_index, needle->tip_r}} : face;
 }
 
 // For a membrane that lies on the tip: the dimple moves with the needle.

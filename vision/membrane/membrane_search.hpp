@@ -4,8 +4,8 @@
 
 #include <optional>
 #include <utility>
-#include <vector>
 
+#include "vision/image/kept_vector.hpp"
 #include "vision/membrane/cleared_picture.hpp"
 #include "vision/membrane/followed_membrane.hpp"
 
@@ -35,10 +35,10 @@ struct MembraneSearch {
   const ClearedPicture& picture;
   const Surroundings& surroundings;
   int angles;
-  double usual_r;            // px
-  double saturation;         // grey levels per px
-  EdgeBand band;             // round the last contour
-  std::vector<double> rest;  // rest outline, seen from the centre of the band; empty: not known
+  double usual_r;       // px
+  double saturation;    // grey levels per px
+  EdgeBand band;        // round the last contour
+  Vector<double> rest;  // rest outline, seen from the centre of the band; empty: not known
   std::optional<NeedleSeen> needle;
 
   MembraneSearch(const FollowedMembrane& followed, const ClearedPicture& cleared, const Surroundings& s);
@@ -52,7 +52,7 @@ struct MembraneSearch {
   }
   [[nodiscard]] EdgePath path_free() const;
   [[nodiscard]] EdgePath path_pushed() const;
-  [[nodiscard]] std::vector<std::pair<int, double>> end_face() const;
+  [[nodiscard]] Vector<std::pair<int, double>> end_face() const;
   [[nodiscard]] double depth_of_tip() const;  // px below the rest outline
 
  private:

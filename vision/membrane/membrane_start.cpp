@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <opencv2/imgproc.hpp>
 #include <utility>
-#include <vector>
 
 #include "vision/image/hough_circles.hpp"
 #include "vision/image/median.hpp"
@@ -25,7 +25,7 @@ constexpr double kCircleScore = 0.35;  // share of a circumference that must hav
 
 // For a dark line with a face on either side and no other edge. It is the zona, with a brighter space inside
 // and an ooplasm too faint to be seen; or else the rim of the ooplasm itself, which is as dark inside.
-bool brighter_space_inside(const std::vector<double>& outer_face, const std::vector<double>& inner_face,
+bool brighter_space_inside(const Vector<double>& outer_face, const Vector<double>& inner_face,
                            const Point& centre, const GradientField& field) {
   const int angles = static_cast<int>(outer_face.size());
   double near = 0, deep = 0, wall = 0, outside = 0;  // grey levels
@@ -40,23 +40,140 @@ bool brighter_space_inside(const std::vector<double>& outer_face, const std::vec
   return near - deep > 0.25 * std::abs(outside - wall);
 }
 
-FollowedMembrane started(const Point& centre, const std::vector<double>& r, Polarity polarity, double level) {
+// Of one dark line: the two belong to one membrane.
+bool other_face(const SecondEdge& edge, const Vector<double>& r, Polarity sign) {
+  constexpr double kWall = 0.13;  // of the radius, at most
+  const double mean = median_of(r);
+  return sign != Polarity::any && edge.polarity != Polarity::any && edge.polarity != sign &&
+         std::abs(median_of(edge.path.r) - mean) < kWall * mean;
+}
+
+// Inside the inner face of a wall, where the space behind it ends: an edge of the sign of the outer face. Its
+// path is empty when there is none.
+SecondEdge second_of_a_wall(const SecondEdge& inner_face, const Point& centre, Polarity sign, double level,
+                            const ClearedPicture& picture, const VisionConfig& config) {
+  SecondEdge behind = find_second(inner_face.path.r, centre, inner_face.polarity, false, picture, config);
+  return behind.polarity == sign && clear_enough(behind, level, picture) ? std::move(behind) : SecondEdge{};
+}
+
+FollowedMembrane started(const Point& centre, const Vector<double>& r, Polarity polarity, double level,
+                         const Relief& relief = {}) {
   FollowedMembrane m;
   m.known = true;
   m.centre = centre;
   m.r = r;
   m.polarity = polarity;
   m.level = level;
+  m.relief = relief;
   return m;
+}
+
+bool clear_in_relief(const SecondEdge& inside, const FollowedMembrane& outer, const ClearedPicture& picture) {
+  constexpr double kInsideContrast = 2.2, kOfOuter = 0.4, kSupport = 0.7;
+  return inside.quality >= kInsideContrast && inside.path.level >= kOfOuter * outer.level &&
+         inside.path.support > kSupport && inside.path.level >= kEdgeClear_noise * picture.gradient_noise;
+}
+
+// The two faces of a wall: about as clear as each other, and equally far apart all round.
+bool parallel_in_relief(const SecondEdge& edge, const Vector<double>& r, double level,
+                        const ClearedPicture& picture) {
+  constexpr double kLevel = 0.4, kApart_px = 1;  // of the other one; sd
+  if (edge.path.r.size() != r.size() || edge.path.level < kLevel * level ||
+      edge.path.level < kEdgeClear_noise * picture.gradient_noise) {
+    return false;
+  }
+  Vector<double> apart(r.size());
+  std::transform(edge.path.r.begin(), edge.path.r.end(), r.begin(), apart.begin(), std::minus<>());
+  const double usual = median_of(apart);
+  std::transform(apart.begin(), apart.end(), apart.begin(),
+                 [usual](double a) { return std::abs(a - usual); });
+  return kSdOfMedian * median_of(apart) < kApart_px;
+}
+
+// Inside the wall of an outer membrane in relief, the edge at which what the light crosses grows again. Of a
+// thin sheet the wall's inner face has an edge of that sign, too: a clear one further in counts.
+std::optional<FollowedMembrane> ooplasm_in_relief(const FollowedMembrane& outer,
+                                                  const ClearedPicture& picture, const VisionConfig& config) {
+  constexpr double kWalls = 1.3, kDeepest = 0.3;  // wall thicknesses; of the radius
+  constexpr double kSheet_px = 4, kAsClear = 0.7;
+  const double from = -kDeepest * median_of(outer.r), to = -kWalls * config.px(config.h_m);
+  SecondEdge inside = find_in_relief(outer.r, outer.centre, outer.relief, from, to, picture);
+  if (SecondEdge deep = find_in_relief(outer.r, outer.centre, outer.relief, from, to - kSheet_px, picture);
+      parallel_in_relief(deep, outer.r, outer.level, picture) &&
+      deep.path.level > kAsClear * inside.path.level) {
+    inside = std::move(deep);
+  }
+  return clear_in_relief(inside, outer, picture)
+             ? std::optional(
+                   started(outer.centre, inside.path.r, Polarity::relief, inside.path.level, inside.relief))
+             : std::nullopt;
+}
+
+// Whether two paths run along one edge nearly everywhere.
+bool same_edge(const ClosedEdge& a, const ClosedEdge& b) {
+  constexpr double kNear_px = 4, kShare = 0.9;
+  const Vector<double> there =
+      polar_radii(from_polar(b.centre, b.path.r), a.centre, static_cast<int>(a.path.r.size()));
+  std::size_t near = 0;
+  for (std::size_t i = 0; i < there.size(); ++i) {
+    near += std::abs(there[i] - a.path.r[i]) < kNear_px ? 1 : 0;
+  }
+  return static_cast<double>(near) > kShare * static_cast<double>(a.path.r.size());
+}
+
+// The strongest edge is one of the faces of the wall: the outermost one is where what the light crosses
+// begins, and the inner face has the opposite sign.
+StartedMembranes tell_apart_in_relief(const MainEdge& found, const ClearedPicture& picture,
+                                      const VisionConfig& config) {
+  const ClosedEdge& main = found.edge;
+  constexpr double kNearest = 0.5, kFurthest = 2;  // wall thicknesses
+  constexpr int kFaces = 3;
+  StartedMembranes out;
+  const double wall = config.px(config.h_m);
+  const auto other_face = [&](const FollowedMembrane& of, double from, double to) {
+    SecondEdge face = find_in_relief(of.r, of.centre, of.relief.opposite(), from * wall, to * wall, picture);
+    return parallel_in_relief(face, of.r, of.level, picture)
+               ? std::optional(
+                     started(of.centre, face.path.r, Polarity::relief, face.path.level, face.relief))
+               : std::nullopt;
+  };
+  FollowedMembrane outermost =
+      started(main.centre, main.path.r, Polarity::relief, main.path.level, main.relief);
+  int further = 0;
+  for (; further < kFaces; ++further) {
+    auto face = other_face(outermost, kNearest, kFurthest);
+    if (!face) {
+      break;
+    }
+    outermost = *std::move(face);
+  }
+  if (further > 0 || !config.inner || other_face(outermost, -kFurthest, -kNearest)) {
+    out.outer = std::move(outermost);
+  } else {  // no wall: it is the ooplasm
+    const ClosedEdge& any = found.of_any_sign;
+    out.inner = same_edge(main, any)
+                    ? started(main.centre, main.path.r, Polarity::relief, main.path.level, main.relief)
+                    : started(any.centre, any.path.r, Polarity::any, any.path.level);
+    return out;
+  }
+  if (config.inner) {
+    if (auto inside = ooplasm_in_relief(out.outer, picture, config)) {
+      out.inner = *std::move(inside);
+    }
+  }
+  return out;
 }
 
 StartedMembranes tell_apart(const MainEdge& found, const ClearedPicture& picture,
                             const VisionConfig& config) {
   StartedMembranes out;
   const ClosedEdge& main = found.edge;
+  if (main.polarity == Polarity::relief) {
+    return tell_apart_in_relief(found, picture, config);
+  }
   const Contour contour = from_polar(main.centre, main.path.r);
   const Point centre = centroid(contour);
-  const std::vector<double> r1 = polar_radii(contour, centre, config.contour_points);
+  const Vector<double> r1 = polar_radii(contour, centre, config.contour_points);
   if (r1.empty()) {
     out.reason = "closed edge not star-shaped";
     return out;
@@ -77,15 +194,13 @@ StartedMembranes tell_apart(const MainEdge& found, const ClearedPicture& picture
   }
   const SecondEdge inside = find_second(r1, centre, main.polarity, false, picture, config);
   const bool inside_clear = clear_enough(inside, main.path.level, picture);
-  // Two flanks of one dark line belong to one membrane.
-  const auto flank = [&](const SecondEdge& x) {
-    return main.polarity != Polarity::any && x.polarity != Polarity::any && x.polarity != main.polarity &&
-           std::abs(median_of(x.path.r) - mean) < 0.13 * mean;
-  };
-  const bool outside_is_flank = outside_clear && flank(outside),
-             inside_is_flank = inside_clear && flank(inside);
+  const bool outside_is_flank = outside_clear && other_face(outside, r1, main.polarity),
+             inside_is_flank = inside_clear && !outside_is_flank && other_face(inside, r1, main.polarity);
   const FollowedMembrane outer_face =
       outside_is_flank ? begin(outside) : middle;  // of the membrane to which main belongs
+  const SecondEdge behind_wall =
+      inside_is_flank ? second_of_a_wall(inside, centre, main.polarity, main.path.level, picture, config)
+                      : SecondEdge{};
   const bool second_inside = inside_clear && !inside_is_flank,
              second_outside = outside_clear && !outside_is_flank;
   if (second_outside && (!second_inside || outside.quality > inside.quality)) {
@@ -93,9 +208,9 @@ StartedMembranes tell_apart(const MainEdge& found, const ClearedPicture& picture
     out.inner = middle;
     return out;
   }
-  if (second_inside) {
+  if (second_inside || !behind_wall.path.r.empty()) {
     out.outer = outer_face;
-    out.inner = begin(inside);
+    out.inner = begin(second_inside ? inside : behind_wall);
     return out;
   }
   const bool too_small_for_outer = mean < 0.9 * config.px(config.R_min_m);
@@ -117,8 +232,9 @@ StartedMembranes tell_apart(const MainEdge& found, const ClearedPicture& picture
 // The gradient (grey levels per px) below which seven tenths of the picture are.
 double texture(const GradientField& field) {
   cv::Mat sample;
-  cv::resize(field.sobel, sample, cv::Size(), 0.25, 0.25, cv::INTER_NEAREST);
-  std::vector<float> v(sample.begin<float>(), sample.end<float>());
+  cv::resize(field.magnitude(cv::Range(0, field.area.height)), sample, cv::Size(), 0.25, 0.25,
+             cv::INTER_NEAREST);
+  Vector<float> v(sample.begin<float>(), sample.end<float>());
   if (v.empty()) {
     return 0;
   }
@@ -220,7 +336,7 @@ void CellSearch::try_circles(const ClearedPicture& picture, const VisionConfig& 
 // The cell round a circle, in this picture alone. Empty when no closed edge stands out there.
 std::optional<StartedMembranes> CellSearch::begin_round(const Circle& circle, const ClearedPicture& picture,
                                                         const VisionConfig& config) const {
-  std::vector<Point> others;
+  Vector<Point> others;
   const auto any = closed_edge_round(circle, seeded_, saturation_, others, picture, config);
   const auto edge = any ? edge_by_its_sign(*any, circle, seeded_, picture, config) : std::nullopt;
   return edge ? std::optional(tell_apart(*edge, picture, config)) : std::nullopt;
@@ -228,7 +344,14 @@ std::optional<StartedMembranes> CellSearch::begin_round(const Circle& circle, co
 
 std::optional<FollowedMembrane> start_inner(const ClearedPicture& picture, const VisionConfig& config,
                                             const FollowedMembrane& outer, bool faint_too) {
-  const SecondEdge inside = find_second(outer.r, outer.centre, outer.polarity, false, picture, config);
+  if (outer.polarity == Polarity::relief) {
+    return ooplasm_in_relief(outer, picture, config);
+  }
+  SecondEdge inside = find_second(outer.r, outer.centre, outer.polarity, false, picture, config);
+  if (clear_enough(inside, outer.level, picture) && other_face(inside, outer.r, outer.polarity)) {
+    SecondEdge behind = second_of_a_wall(inside, outer.centre, outer.polarity, outer.level, picture, config);
+    inside = behind.path.r.empty() ? std::move(inside) : std::move(behind);
+  }
   if (clear_enough(inside, outer.level, picture)) {
     return started(outer.centre, inside.path.r, inside.polarity, inside.path.level);
   }

@@ -4,9 +4,9 @@
 
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "vision/image/hough_circles.hpp"
+#include "vision/image/kept_vector.hpp"
 #include "vision/membrane/membrane_following.hpp"
 
 namespace punctum::vision {
@@ -46,10 +46,10 @@ class CellSearch {
   std::optional<Circle> last_seen_;
   std::optional<CircleSearch> votes_;
   int parts_voted_ = 0;
-  std::vector<Circle> circles_;  // still to be tried
-  std::vector<Point> tried_;     // centres of the edges round those that were
-  double saturation_ = 0;        // grey levels per px, the same for all circles
-  std::vector<Candidate> candidates_;
+  Vector<Circle> circles_;  // still to be tried
+  Vector<Point> tried_;     // centres of the edges round those that were
+  double saturation_ = 0;   // grey levels per px, the same for all circles
+  Vector<Candidate> candidates_;
 };
 
 // The inner membrane alone, inside an outer membrane that is followed. faint_too: even if single rays do not

@@ -24,9 +24,9 @@ constexpr double kHalf_px = 4;      // of the band round the best place
 // The edge at every depth below the outer one, ray by ray.
 struct EdgesBelow {
   int angles, depths;
-  double from;              // px below the outer edge, of the first depth
-  std::vector<float> edge;  // 0 where it is hidden
-  std::vector<std::uint8_t> seen;
+  double from;         // px below the outer edge, of the first depth
+  Vector<float> edge;  // 0 where it is hidden
+  Vector<std::uint8_t> seen;
   double usual = 0;  // root of their mean square
 
   EdgesBelow(const EdgeBand& outer, Polarity sign, const ClearedPicture& picture, double first, double last)
@@ -57,7 +57,7 @@ struct EdgesBelow {
 
   // Their sum along a parallel, in standard deviations if they were chance. shift: of its middle, in depth
   // steps per angle.
-  [[nodiscard]] double score(int depth, const std::vector<int>& shift, double joined) const {
+  [[nodiscard]] double score(int depth, const Vector<int>& shift, double joined) const {
     double sum = 0;
     int n = 0;
     for (int i = 0; i < angles; ++i) {
@@ -73,9 +73,8 @@ struct EdgesBelow {
 
 }  // namespace
 
-std::optional<EdgePath> parallel_edge_within(const std::vector<double>& outer, const Point& centre,
-                                             Polarity sign, const ClearedPicture& picture,
-                                             const VisionConfig& config) {
+std::optional<EdgePath> parallel_edge_within(const Vector<double>& outer, const Point& centre, Polarity sign,
+                                             const ClearedPicture& picture, const VisionConfig& config) {
   EdgeBand band;
   band.centre = centre;
   band.middle = outer;
@@ -88,8 +87,8 @@ std::optional<EdgePath> parallel_edge_within(const std::vector<double>& outer, c
   }
   const double joined = std::max(1.0, kAlike_px * below.angles / (2 * std::numbers::pi * mean));
   double best = kLeastScore;
-  std::vector<double> best_below;  // px per angle
-  std::vector<int> shift(outer.size());
+  Vector<double> best_below;  // px per angle
+  Vector<int> shift(outer.size());
   for (int across = -kShifts; across <= kShifts; ++across) {
     for (int down = -kShifts; down <= kShifts; ++down) {
       for (int i = 0; i < below.angles; ++i) {

@@ -18,40 +18,44 @@ constexpr double kDentHalf = 0.9;         // rad to either side of the entry
 constexpr double kHolderHalf = 0.6;       // rad to either side of the holding pipette's mouth
 constexpr double kHolderMotion_px = 1.0;  // less is no motion of the holding pipette
 
-double angle_of(const Point& d, const Point& e) { return std::abs(math::atan2(d.cross(e), d.dot(e))); }
+// The angle between them has a larger cosine.
+bool within(const Point& d, const Point& e, double cosine) {
+  return d.dot(e) > cosine * std::sqrt(d.dot(d) * e.dot(e));
+}
 
 }  // namespace
 
 bool RestOutline::reliable() const noexcept { return frames >= kReliable; }
 
-std::vector<double> RestOutline::seen_from(const Point& other_centre) const {
-  return r.empty() ? r : polar_radii(from_polar(centre, r), other_centre, static_cast<int>(r.size()));
+Vector<double> RestOutline::seen_from(const Point& other_centre) const {
+  return r.empty() || other_centre == centre
+             ? r
+             : polar_radii(from_polar(centre, r), other_centre, static_cast<int>(r.size()));
 }
 
-void RestOutline::learn(const Point& now_centre, const std::vector<double>& now_r) {
+void RestOutline::learn(const Point& now_centre, const Vector<double>& now_r) {
   if (r.empty() || cv::norm(centre - now_centre) > 0.1 * median_of(now_r)) {
     *this = {now_centre, now_r, 1};
     return;
   }
-  const std::vector<double> now =
-      polar_radii(from_polar(now_centre, now_r), centre, static_cast<int>(r.size()));
+  const Vector<double> now = polar_radii(from_polar(now_centre, now_r), centre, static_cast<int>(r.size()));
   const double gain = 1.0 / std::min(++frames, kOutlineMemory);
   for (std::size_t i = 0; i < now.size(); ++i) {
     r[i] += gain * (now[i] - r[i]);
   }
 }
 
-RestOutline outline_within(const RestOutline& around, const Point& centre, const std::vector<double>& r,
+RestOutline outline_within(const RestOutline& around, const Point& centre, const Vector<double>& r,
                            const Point& entry) {
   constexpr double kBlend = 0.3;  // rad
-  const std::vector<double> outer = around.seen_from(centre);
+  const Vector<double> outer = around.seen_from(centre);
   const int angles = static_cast<int>(r.size());
   if (outer.size() != r.size()) {
     return {};
   }
   const Point towards = entry - centre;
   RestOutline out{centre, r, 0};
-  std::vector<double> near(r.size()), gap;
+  Vector<double> near(r.size()), gap;
   for (std::size_t k = 0; k < r.size(); ++k) {
     const double from_needle =
         angle_between(polar_angle(static_cast<int>(k), angles), math::atan2(towards.y, towards.x));
@@ -100,7 +104,7 @@ Point LearntUndeformed::update(const Undeformed& now, bool touched, const std::o
 }
 
 void LearntUndeformed::learn_outline(const Contour& contour, const Point& centre) {
-  const std::vector<double> r = polar_radii(contour, centre, static_cast<int>(contour.size()));
+  const Vector<double> r = polar_radii(contour, centre, static_cast<int>(contour.size()));
   if (!r.empty()) {
     face_.learn(centre, r);
   }
@@ -124,7 +128,7 @@ bool LearntUndeformed::same_cell(const Contour& outer, const Point& centre, cons
   if (!shape_) {
     return false;
   }
-  std::vector<double> weight(outer.size(), 1.0);
+  Vector<double> weight(outer.size(), 1.0);
   if (needle.ok) {
     for (std::size_t i = 0; i < outer.size(); ++i) {
       const Point d = outer[i] - centre;
@@ -137,14 +141,15 @@ bool LearntUndeformed::same_cell(const Contour& outer, const Point& centre, cons
          std::abs(fitted->r - known.r) < 0.06 * known.r;
 }
 
-std::vector<double> undeformed_weights(const Contour& contour, const ClearedPicture& picture,
-                                       const std::optional<Point>& entry, const std::optional<Point>& mouth) {
+Vector<double> undeformed_weights(const Contour& contour, const ClearedPicture& picture,
+                                  const std::optional<Point>& entry, const std::optional<Point>& mouth) {
   const Point centre = centroid(contour);
-  std::vector<double> weight(contour.size(), 1.0);
+  const double dent = math::cos(kDentHalf), holder = math::cos(kHolderHalf);
+  Vector<double> weight(contour.size(), 1.0);
   for (std::size_t i = 0; i < contour.size(); ++i) {
     const Point d = contour[i] - centre;
-    if (picture.hidden(contour[i]) || (entry && angle_of(d, *entry - centre) < kDentHalf) ||
-        (mouth && angle_of(d, *mouth - centre) < kHolderHalf)) {
+    if (picture.hidden(contour[i]) || (entry && within(d, *entry - centre, dent)) ||
+        (mouth && within(d, *mouth - centre, holder))) {
       weight[i] = 0;
     }
   }

@@ -2,8 +2,8 @@
 #pragma once
 
 #include <optional>
-#include <vector>
 
+#include "vision/image/kept_vector.hpp"
 #include "vision/membrane/cleared_picture.hpp"
 #include "vision/membrane/undeformed.hpp"
 
@@ -12,19 +12,19 @@ namespace punctum::vision {
 // Contour of one membrane.
 struct RestOutline {
   Point centre;
-  std::vector<double> r;  // px per angle; empty: not known
-  int frames = 0;         // that it was learnt from
+  Vector<double> r;  // px per angle; empty: not known
+  int frames = 0;    // that it was learnt from
 
-  [[nodiscard]] bool reliable() const noexcept;                                  // learnt from enough frames
-  [[nodiscard]] std::vector<double> seen_from(const Point& other_centre) const;  // empty: not known
-  void learn(const Point& now_centre, const std::vector<double>& now_r);
+  [[nodiscard]] bool reliable() const noexcept;                             // learnt from enough frames
+  [[nodiscard]] Vector<double> seen_from(const Point& other_centre) const;  // empty: not known
+  void learn(const Point& now_centre, const Vector<double>& now_r);
 };
 
 // Of a membrane that was never seen without the needle: what is seen of it away from the needle, and near the
 // needle as far within the outline of the membrane around it as elsewhere. r: seen from `centre`; entry: of
 // the needle.
 [[nodiscard]] RestOutline outline_within(const RestOutline& around, const Point& centre,
-                                         const std::vector<double>& r, const Point& entry);
+                                         const Vector<double>& r, const Point& entry);
 
 // The outer membrane with nothing touching it: the shape that is fitted to what touches nothing, and the
 // outline of its outer face as it was seen. Both move with the holding pipette.
@@ -52,8 +52,8 @@ class LearntUndeformed {
 
 // Weights for fit_undeformed: 0 where the contour is hidden, may be dented at `entry`, or is pressed by the
 // holding pipette.
-[[nodiscard]] std::vector<double> undeformed_weights(const Contour& contour, const ClearedPicture& picture,
-                                                     const std::optional<Point>& entry,
-                                                     const std::optional<Point>& mouth);
+[[nodiscard]] Vector<double> undeformed_weights(const Contour& contour, const ClearedPicture& picture,
+                                                const std::optional<Point>& entry,
+                                                const std::optional<Point>& mouth);
 
 }  // namespace punctum::vision

@@ -6,7 +6,6 @@
 #include <initializer_list>
 #include <opencv2/core.hpp>
 #include <utility>
-#include <vector>
 
 #include "hal/math/elementary.hpp"
 #include "vision/image/hough_circles.hpp"
@@ -33,13 +32,13 @@ double strength_at(const ClearedPicture& picture, const Point& p) {
 // The first clear edge on every ray that starts at the distance `from` and ends at the distance `to`. It is
 // the outer face of the outermost membrane when the rays come from outside; the circle that has most votes
 // may lie on any face of either membrane.
-std::vector<Point> first_edges(const ClearedPicture& picture, const Point& centre, double from, double to) {
+Vector<Point> first_edges(const ClearedPicture& picture, const Point& centre, double from, double to) {
   const int steps = static_cast<int>(std::abs(to - from) / kRayStep_px);
   const double step = (to - from) / std::max(1, steps);
-  std::vector<std::vector<double>> rays;
-  std::vector<double> strongest;
+  Vector<Vector<double>> rays;
+  Vector<double> strongest;
   for (int i = 0; i < kRays; ++i) {
-    std::vector<double> g;
+    Vector<double> g;
     for (int k = 0; k <= steps; ++k) {
       g.push_back(strength_at(picture, on_ray(centre, i, kRays, from + k * step)));
     }
@@ -48,9 +47,9 @@ std::vector<Point> first_edges(const ClearedPicture& picture, const Point& centr
   }
   const double clear =
       std::max(kEdgeClear_noise * picture.gradient_noise, kClear * median_of(std::move(strongest)));
-  std::vector<Point> edges;
+  Vector<Point> edges;
   for (int i = 0; i < kRays; ++i) {
-    const std::vector<double>& g = rays[static_cast<std::size_t>(i)];
+    const Vector<double>& g = rays[static_cast<std::size_t>(i)];
     for (std::size_t k = 1; k + 1 < g.size(); ++k) {
       if (g[k] > clear && g[k] >= g[k - 1] && g[k] > g[k + 1]) {
         edges.push_back(on_ray(centre, i, kRays, from + static_cast<double>(k) * step));
@@ -71,8 +70,7 @@ struct Look {
 Circle circle_of_first_edges(const ClearedPicture& picture, Circle circle,
                              std::initializer_list<Look> rounds) {
   for (const Look& look : rounds) {
-    const std::vector<Point> edges =
-        first_edges(picture, circle.centre, look.from * circle.r, look.to * circle.r);
+    const Vector<Point> edges = first_edges(picture, circle.centre, look.from * circle.r, look.to * circle.r);
     if (static_cast<int>(edges.size()) > kRays / 3) {
       const auto fitted = fit_circle(edges);
       if (fitted && std::abs(fitted->r - circle.r) < kOtherCircle * circle.r) {
@@ -89,7 +87,7 @@ FollowedMembrane snake_on(const Circle& c, const ClearedPicture& picture, const 
   m.centre = c.centre;
   m.r.assign(static_cast<std::size_t>(config.contour_points), c.r);
   m.nodes = circle_contour(c, config.snake.nodes);
-  std::vector<double> strength;
+  Vector<double> strength;
   for (const Point& p : m.contour()) {
     strength.push_back(strength_at(picture, p));
   }
@@ -159,6 +157,19 @@ StartedMembranes start_snakes(const ClearedPicture& picture, const VisionConfig&
   return out;
 }
 
+namespace {
+
+// Eq. 3: the external energy. 0 where the picture is covered.
+cv::Mat squared_gradient(const ClearedPicture& picture) {
+  const cv::Rect& area = picture.field.area;
+  const cv::Mat length = picture.field.magnitude(cv::Range(0, area.height));
+  cv::Mat out = length.mul(length);
+  out.setTo(0, picture.covered(area));
+  return out;
+}
+
+}  // namespace
+
 Membrane follow_snake(FollowedMembrane& m, const ClearedPicture& picture, const VisionConfig& config,
                       const ContactPoints& contact) {
   Membrane out;
@@ -166,16 +177,15 @@ Membrane follow_snake(FollowedMembrane& m, const ClearedPicture& picture, const 
     out.reason = "not found";
     return out;
   }
-  // Eq. 3: the external energy is the square of the gradient.
   const cv::Rect& area = picture.field.area;
   const Point offset(area.x, area.y);
   const double floor = picture.snake_floor();
-  out.nodes = moved(evolve(picture.edge.mul(picture.edge), moved(m.nodes, -offset), config.snake,
-                           floor * floor, picture.covered(area)),
+  out.nodes = moved(evolve(squared_gradient(picture), moved(m.nodes, -offset), config.snake, floor * floor,
+                           picture.covered(area)),
                     offset);
   out.contour = visible_contour(out.nodes, m, picture, contact);
   const Point centre = out.contour.empty() ? Point() : centroid(out.contour);
-  const std::vector<double> r = polar_radii(out.contour, centre, static_cast<int>(m.r.size()));
+  const Vector<double> r = polar_radii(out.contour, centre, static_cast<int>(m.r.size()));
   const double area_now = signed_area(out.contour), before = signed_area(m.contour());
   double strength = 0;
   int visible = 0;

@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <numbers>
 #include <opencv2/core.hpp>
-#include <vector>
 
 #include "hal/math/elementary.hpp"
 #include "vision/image/polar_contour.hpp"
@@ -50,7 +49,7 @@ std::optional<Undeformed> fit_undeformed(const Contour& contour, std::span<const
   if (!cv::solve(a, b, x, cv::DECOMP_CHOLESKY)) {
     return std::nullopt;
   }
-  std::vector<double> r(static_cast<std::size_t>(n));
+  Vector<double> r(static_cast<std::size_t>(n));
   for (int i = 0; i < n; ++i) {
     const double t = 2 * std::numbers::pi * i / n;
     r[static_cast<std::size_t>(i)] = x.at<double>(0) + x.at<double>(1) * math::cos(t) +

@@ -1,9 +1,9 @@
 #include "vision/pipettes/backdrop.hpp"
 
 #include <algorithm>
-#include <cstdint>
-#include <cstring>
+#include <utility>
 
+#include "vision/image/dispatched.hpp"
 #include "vision/pipettes/pipette_mask.hpp"
 
 namespace punctum::vision {
@@ -16,7 +16,7 @@ constexpr float kPart = 1.0F / 16;  // of a frame in the mean
 
 constexpr float kUnknown = -1;
 
-void learn_row(const float* now, int n, float* mean) {
+PUNCTUM_WIDE_LOOP void learn_row(const float* now, int n, float* mean) {
   for (int x = 0; x < n; ++x) {
     const float before = mean[x] < 0 ? now[x] : mean[x];
     mean[x] = before + kPart * (now[x] - before);
@@ -33,20 +33,15 @@ void Backdrop::learn(const GradientField& field, const NeedlePose& needle) {
   if (mean_.size() != field.picture) {
     mean_ = cv::Mat(field.picture, CV_32F, cv::Scalar(double{kUnknown}));
   }
-  near_.create(a.size(), CV_8U);
-  near_.setTo(0);
-  Polygon polygon = needle_polygon(needle, field.picture, kBeside_px, kAhead_px);
-  for (Point& p : polygon) {
+  Polygon near = needle_polygon(needle, field.picture, kBeside_px, kAhead_px);
+  for (Point& p : near) {
     p -= Point(a.x, a.y);
   }
-  draw_mask(near_, {polygon});
   for (int y = 0; y < a.height; ++y) {
-    const std::uint8_t *row = near_.ptr(y), *end = row + a.width;
-    const auto* first =
-        static_cast<const std::uint8_t*>(std::memchr(row, 255, static_cast<std::size_t>(a.width)));
-    const std::uint8_t* last = first == nullptr ? end : std::find(first, end, std::uint8_t{0});
-    const int from = first == nullptr ? a.width : static_cast<int>(first - row),
-              to = static_cast<int>(last - row);
+    const auto [from, to] = [&] {
+      const cv::Range x = touched_in_row(near, y, a.width);
+      return x.empty() ? std::pair(a.width, a.width) : std::pair(x.start, x.end);
+    }();
     const float* now = field.smooth.ptr<float>(y);
     float* mean = mean_.ptr<float>(a.y + y) + a.x;
     learn_row(now, from, mean);

@@ -20,7 +20,6 @@ class Backdrop {
 
  private:
   cv::Mat mean_;  // CV_32F grey levels, the whole picture; less than 0: not seen without the needle
-  cv::Mat near_;  // CV_8U, of the area that is searched: 255 = near the needle in this frame
 };
 
 }  // namespace punctum::vision

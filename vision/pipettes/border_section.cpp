@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <opencv2/core.hpp>
-#include <vector>
+#include <utility>
 
 #include "hal/math/elementary.hpp"
 
@@ -12,57 +12,79 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr double kInset_px = 4;  // borders of recorded pictures are often black
-constexpr double kColumnStep_px = 2;
+constexpr double kLineStep_px = 2;
 constexpr double kLeastEdge = 0.25;  // grey levels per px
 
+struct BorderEdge {
+  double at, energy;  // along the border, squared edge
+};
+
 struct EdgeGroup {
-  double lo = 0, hi = 0;  // outermost edges
-  double energy = 0;      // sum of the squared edges
+  Vector<BorderEdge> edges;  // from the first
+  double energy = 0;         // of all
 };
 
 // Mean grey along lines of one tilt; at the tube's own tilt its edges are sharpest.
 struct TiltedProfile {
-  std::vector<float> edge;  // per row, |change of grey| per px
+  Vector<float> edge;  // per px along the border, |change of grey| per px
   double strongest = 0;
   int samples = 0;  // along each line
 };
 
-// The columns of the strip, one after the other from the border inwards.
-std::vector<std::vector<float>> columns_of(const GradientField& field, double border_x, double into_x,
-                                           double strip) {
-  std::vector<std::vector<float>> out;
-  for (double s = 0; s < strip; s += kColumnStep_px) {
-    std::vector<float>& column = out.emplace_back();
-    for (int y = 0; y < field.area.height; ++y) {
-      column.push_back(static_cast<float>(
-          field.grey(Point(border_x + s * into_x,
-                           std::min(field.area.y + y + 0.0, field.area.y + field.area.height - 1.001)))));
+// A border of the picture, as its left one: along it, and from it inwards.
+struct BorderAxes {
+  Point origin, along, into;
+  int length;
+};
+
+BorderAxes axes_of(const cv::Rect& a, Border border, double inset) {
+  switch (border) {
+    case Border::right:
+      return {Point(a.x + a.width - 1 - inset, a.y), {0, 1}, {-1, 0}, a.height};
+    case Border::upper:
+      return {Point(a.x, a.y + inset), {1, 0}, {0, 1}, a.width};
+    case Border::lower:
+      return {Point(a.x, a.y + a.height - 1 - inset), {1, 0}, {0, -1}, a.width};
+    case Border::left:
+      break;
+  }
+  return {Point(a.x + inset, a.y), {0, 1}, {1, 0}, a.height};
+}
+
+// The lines of the strip along the border, one after the other inwards.
+Vector<Vector<float>> lines_of(const GradientField& field, const BorderAxes& axes, double strip) {
+  Vector<Vector<float>> out;
+  for (double s = 0; s < strip; s += kLineStep_px) {
+    Vector<float>& line = out.emplace_back();
+    line.reserve(static_cast<std::size_t>(axes.length));
+    for (int k = 0; k < axes.length; ++k) {
+      line.push_back(static_cast<float>(
+          field.grey(axes.origin + s * axes.into + std::min(k + 0.0, axes.length - 1.001) * axes.along)));
     }
   }
   return out;
 }
 
-// Short loops over the rows, which the compiler vectorises.
-TiltedProfile profile_at(const std::vector<std::vector<float>>& columns, double slope) {
-  const int h = static_cast<int>(columns.front().size());
-  std::vector<float> sum(static_cast<std::size_t>(h));
+// Short loops, which the compiler vectorises.
+TiltedProfile profile_at(const Vector<Vector<float>>& lines, double slope) {
+  const int h = static_cast<int>(lines.front().size());
+  Vector<float> sum(static_cast<std::size_t>(h));
   TiltedProfile out;
-  out.samples = static_cast<int>(columns.size());
+  out.samples = static_cast<int>(lines.size());
   for (int c = 0; c < out.samples; ++c) {
-    const double shift = c * kColumnStep_px * slope;
+    const double shift = c * kLineStep_px * slope;
     const int down = static_cast<int>(std::floor(shift));
     const float after = static_cast<float>(shift - down), here = 1 - after;
-    const float* const column = columns[static_cast<std::size_t>(c)].data();
+    const float* const line = lines[static_cast<std::size_t>(c)].data();
     const int from = std::clamp(-down, 0, h), to = std::clamp(h - 1 - down, from, h);
     for (int y = 0; y < from; ++y) {
-      sum[static_cast<std::size_t>(y)] += column[0];
+      sum[static_cast<std::size_t>(y)] += line[0];
     }
     for (int y = from; y < to; ++y) {
-      sum[static_cast<std::size_t>(y)] += here * column[y + down] + after * column[y + down + 1];
+      sum[static_cast<std::size_t>(y)] += here * line[y + down] + after * line[y + down + 1];
     }
     for (int y = to; y < h; ++y) {
-      sum[static_cast<std::size_t>(y)] += column[h - 1];
+      sum[static_cast<std::size_t>(y)] += line[h - 1];
     }
   }
   out.edge.assign(static_cast<std::size_t>(h), 0.0F);
@@ -76,9 +98,8 @@ TiltedProfile profile_at(const std::vector<std::vector<float>>& columns, double 
 }
 
 // Edges above the floor that are nearer to the first of their group than `width_max`. total: energy of all.
-std::vector<EdgeGroup> groups_of(const std::vector<float>& edge, double floor, double width_max,
-                                 double& total) {
-  std::vector<EdgeGroup> groups;
+Vector<EdgeGroup> groups_of(const Vector<float>& edge, double floor, double width_max, double& total) {
+  Vector<EdgeGroup> groups;
   total = 0;
   for (std::size_t y = 4; y + 4 < edge.size(); ++y) {
     const double e = static_cast<double>(edge[y]);
@@ -87,63 +108,97 @@ std::vector<EdgeGroup> groups_of(const std::vector<float>& edge, double floor, d
     }
     total += e * e;
     const double at = static_cast<double>(y);
-    if (groups.empty() || at - groups.back().lo > width_max) {
-      groups.push_back({at, at, e * e});
-    } else {
-      groups.back().hi = at;
-      groups.back().energy += e * e;
+    if (groups.empty() || at - groups.back().edges.front().at > width_max) {
+      groups.emplace_back();
     }
+    groups.back().edges.push_back({at, e * e});
+    groups.back().energy += e * e;
   }
   return groups;
 }
 
+// The faint ones outside of the others: specks beside the tube.
+void leave_out_faint(EdgeGroup& group) {
+  constexpr double kFaint = 0.35;  // of the strongest one
+  double strongest = 0;
+  for (const BorderEdge& edge : group.edges) {
+    strongest = std::max(strongest, edge.energy);
+  }
+  const auto clear = [&](const BorderEdge& edge) { return edge.energy >= kFaint * kFaint * strongest; };
+  const auto first = std::find_if(group.edges.begin(), group.edges.end(), clear);
+  const auto last = std::find_if(group.edges.rbegin(), group.edges.rend(), clear).base();
+  group.edges = Vector<BorderEdge>(first, std::max(first, last));
+}
+
 }  // namespace
 
-std::optional<TubeTrace> border_section(const GradientField& field, Side side, double width_min,
-                                        double width_max, double noise, double strip, double relative,
-                                        int tilt_max_deg) {
-  const cv::Rect a = field.area;
-  const double into_x = side == Side::right ? -1 : 1;
-  const double border_x = side == Side::right ? a.x + a.width - 1 - kInset_px : a.x + kInset_px;
-  const auto columns = columns_of(field, border_x, into_x, strip);
-  std::optional<TubeTrace> best;
-  double best_energy = 0;
+Vector<TubeTrace> border_sections(const GradientField& field, Border border, const WantedTube& wanted,
+                                  double noise) {
+  const BorderAxes axes = axes_of(field.area, border, wanted.inset);
+  const auto lines = lines_of(field, axes, wanted.strip);
+  constexpr std::size_t kLeftOut = 3;
+  EdgeGroup best;
+  double best_total = 0;
   int best_degree = 0;
+  const auto width_of = [](const BorderEdge& low, const BorderEdge& high, int degree) {
+    return (high.at - low.at) * math::cos(degree * CV_PI / 180);
+  };
   const auto look_along = [&](int degree) {
     const double slope = math::tan(degree * CV_PI / 180);
-    const TiltedProfile profile = profile_at(columns, slope);
+    const TiltedProfile profile = profile_at(lines, slope);
     // Four standard deviations of what the noise leaves.
     const double floor = std::max({4 * field.noise_of_gradient(noise) / std::sqrt(0.6 * profile.samples),
-                                   kLeastEdge, relative * profile.strongest});
+                                   kLeastEdge, wanted.relative * profile.strongest});
     double total = 0;
-    for (const EdgeGroup& group : groups_of(profile.edge, floor, width_max, total)) {
-      const double width = (group.hi - group.lo) * math::cos(degree * CV_PI / 180);
-      if (width < width_min || width > width_max || group.energy <= best_energy) {
-        continue;
+    for (EdgeGroup& group :
+         groups_of(profile.edge, floor, wanted.width_max / math::cos(degree * CV_PI / 180), total)) {
+      const double width = width_of(group.edges.front(), group.edges.back(), degree);
+      if (width >= wanted.width_min && width <= wanted.width_max && group.energy > best.energy) {
+        best = std::move(group);
+        best_degree = degree;
+        best_total = -1;
       }
-      best_energy = group.energy;
-      best_degree = degree;
-      TubeTrace t;
-      t.side = side;
-      t.axis = Point(into_x, slope) / math::hypot(1.0, slope);
-      t.root = Point(border_x, a.y + 0.5 * (group.lo + group.hi));
-      t.half_width = 0.5 * width;
-      t.edge_share = group.energy / total;
-      best = t;
     }
+    best_total = best_total < 0 ? total : best_total;
   };
   // Half of the step blurs an edge by less than a pixel at the ends of the widest strip.
   constexpr int kStep_deg = 3;
-  for (int degree = -tilt_max_deg; degree <= tilt_max_deg; degree += kStep_deg) {
-    look_along(degree);
-  }
-  const int roughly = best_degree;
-  for (int degree = roughly - kStep_deg + 1; degree < roughly + kStep_deg; ++degree) {
-    if (best && degree != roughly && std::abs(degree) <= tilt_max_deg) {
+  for (int degree = -wanted.tilt_max_deg; degree <= wanted.tilt_max_deg; degree += kStep_deg) {
+    if (std::abs(degree) >= wanted.tilt_min_deg) {
       look_along(degree);
     }
   }
-  return best;
+  const int roughly = best_degree;
+  for (int degree = roughly - kStep_deg + 1; degree < roughly + kStep_deg; ++degree) {
+    if (!best.edges.empty() && degree != roughly && std::abs(degree) <= wanted.tilt_max_deg) {
+      look_along(degree);
+    }
+  }
+  if (wanted.without_faint) {
+    leave_out_faint(best);
+  }
+  Vector<TubeTrace> out;
+  const double slope = math::tan(best_degree * CV_PI / 180);
+  const std::size_t edges = best.edges.size();
+  for (std::size_t above = 0; above <= kLeftOut; ++above) {
+    for (std::size_t below = 0; below <= kLeftOut && above + below + 2 <= edges; ++below) {
+      const BorderEdge &low = best.edges[above], &high = best.edges[edges - 1 - below];
+      const double width = width_of(low, high, best_degree);
+      if (width < wanted.width_min) {
+        break;
+      }
+      double energy = 0;
+      for (std::size_t k = above; k < edges - below; ++k) {
+        energy += best.edges[k].energy;
+      }
+      TubeTrace& t = out.emplace_back();
+      t.axis = (axes.into + slope * axes.along) / math::hypot(1.0, slope);
+      t.root = axes.origin + 0.5 * (low.at + high.at) * axes.along;
+      t.half_width = 0.5 * width;
+      t.edge_share = energy / best_total;
+    }
+  }
+  return out;
 }
 
 Point across_tube(const Point& axis) {

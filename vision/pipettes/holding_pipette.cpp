@@ -25,7 +25,8 @@ std::optional<TubeTrace> find_holder_tube(const GradientField& field, std::span<
     return t.similarity * t.edge_share * std::min(t.length, 60.0);
   };
   for (const Side side : sides) {
-    const auto t = trace_wide_tube(field, side, kNarrowest_px, std::min(0.7 * height, 2.2 * R_max), noise);
+    const auto t = trace_wide_tube(field, side == Side::right ? Border::right : Border::left, kNarrowest_px,
+                                   std::min(0.7 * height, 2.2 * R_max), noise);
     if (t && t->similarity > 0.5 && t->length > 10 && std::abs(t->axis.y) < 0.25 &&
         (!best || score(*t) > score(*best))) {
       best = t;
@@ -129,7 +130,7 @@ HolderPose HoldingPipette::find(const cv::Mat& grey) {
   return holder;
 }
 
-void HoldingPipette::refine(const cv::Mat& grey, HolderPose& holder) const {
+void HoldingPipette::refine(const cv::Mat& grey, HolderPose& holder) {
   if (!holder.ok) {
     return;
   }

@@ -49,7 +49,7 @@ class HoldingPipette {
   // Searches the window round the last position; the whole picture when no position is known.
   [[nodiscard]] HolderPose find(const cv::Mat& grey);
   // The place that eq. 1 told, more finely.
-  void refine(const cv::Mat& grey, HolderPose& holder) const;
+  void refine(const cv::Mat& grey, HolderPose& holder);
 
  private:
   HolderVision config_;

@@ -9,8 +9,10 @@
 
 #include "hal/math/elementary.hpp"
 #include "vision/image/correlation.hpp"
+#include "vision/pipettes/needle_bevel.hpp"
 #include "vision/pipettes/needle_end.hpp"
 #include "vision/pipettes/needle_walls.hpp"
+#include "vision/pipettes/wide_tube.hpp"
 
 namespace punctum::vision {
 
@@ -28,14 +30,16 @@ constexpr double kSameEnd_px = 5;  // the walls end where the shape does, but fo
 // By which the walls may seem to end too early: 1.9 to 4.2 px in pictures of two renderers; later it is
 // known.
 constexpr double kStartReach_px = 7, kGlassReach_px = 4;
-constexpr double kStraight = 0.65;  // share of the stations along the shaft on straight walls
+constexpr double kWidest_radii = 10;  // of its radius at the tip: its whole width at the border
+constexpr double kStraight = 0.65;    // share of the stations along the shaft on straight walls
 constexpr double kShortest_px = 4, kLongest_px = 40;  // of a wall that an edge is averaged over, at the start
 constexpr double kFollowed_px = 24;                   // and later, of a faint one: it may bend
 // Standard deviation of the end of a faint needle. A tip that is less certain does more harm than one that is
 // not claimed: membranes are then taken for pushed that are free.
-constexpr double kEndKnown_px = 0.7;
+constexpr double kEndKnown_px = 1.2;
 // Further out of focus the lumen closes, and the end is somewhere in 3 px.
 constexpr double kSharp_px = 2.3;
+constexpr double kMostBlur_px = 3.6;  // the widest blur of which the end is known
 // In a needle with a smaller half-width no lumen is left between the walls, and a line across it looks like
 // them.
 constexpr double kLumen_px = 4.5;
@@ -43,6 +47,29 @@ constexpr double kLumen_px = 4.5;
 constexpr int kLostMax = 3;
 constexpr const char* kNotRecognised = "tip not recognised";
 constexpr int kWiderMost = 6;  // frames in a row; then the window for its tip grows no more
+
+// Half of the picture that it enters through.
+Side side_of(const TubeTrace& tube) { return tube.axis.x < 0 ? Side::right : Side::left; }
+
+// Through which it does not enter.
+std::optional<Border> other_border(Side side) {
+  return side == Side::automatic ? std::nullopt
+                                 : std::optional(side == Side::right ? Border::left : Border::right);
+}
+
+// One wall of a holding pipette looks like a needle.
+bool is_wall_of_wide_tube(const GradientField& field, const TubeTrace& tube, double noise) {
+  constexpr double kNarrowest_px = 20, kWidest = 0.6;  // of the picture
+  constexpr double kAside = 0.35, kOutside = 1.2, kTimesAsWide = 1.5, kParallel = 0.12;
+  const Border border = side_of(tube) == Side::right ? Border::right : Border::left;
+  const auto wide = trace_wide_tube(field, border, kNarrowest_px, kWidest * field.area.height, noise);
+  if (!wide || wide->half_width < kTimesAsWide * tube.half_width ||
+      std::abs(tube.axis.cross(wide->axis)) > kParallel) {
+    return false;
+  }
+  const double aside = std::abs((tube.root - wide->root).cross(wide->axis)) / wide->half_width;
+  return aside > kAside && aside < kOutside;
+}
 
 // Mean change of grey across the two outer faces. Those of two equal walls have opposite senses; in relief
 // contrast they need not.
@@ -112,10 +139,8 @@ bool InjectionPipette::cut_template(const GradientField& field) {
 }
 
 bool InjectionPipette::start(const GradientField& field, double noise, const Clear& clear_at) {
-  sides_looked_at_ = 0;
+  forget_tubes();
   trace_.reset();
-  tube_.reset();
-  walls_tried_.reset();
   Start start = Start::more_to_do;
   while (start == Start::more_to_do) {
     start = advance_start(field, noise, clear_at, false);
@@ -123,30 +148,45 @@ bool InjectionPipette::start(const GradientField& field, double noise, const Cle
   return start == Start::found;
 }
 
+void InjectionPipette::forget_tubes() {
+  sections_looked_at_ = tubes_tried_ = 0;
+  tubes_.clear();
+  walls_tried_.reset();
+}
+
 InjectionPipette::Start InjectionPipette::advance_start(const GradientField& field, double noise,
                                                         const Clear& clear_at, bool keep_tube) {
-  if (trace_next_side(field, noise)) {
+  if (trace_next_border(field, noise)) {
     return Start::more_to_do;
   }
-  if (!tube_) {
+  if (tubes_.empty()) {
     reason_ = "no narrow tube enters through the border";
-    sides_looked_at_ = 0;
+    forget_tubes();
     return Start::failed;
   }
   if (fit_walls_further(field, noise)) {
     return Start::more_to_do;
   }
-  const bool found = begin_at_end(field, noise, clear_at);
+  bool straight = false;
+  const bool found = begin_at_end(field, noise, clear_at, straight);
   walls_tried_.reset();
-  if (found || !keep_tube) {
-    sides_looked_at_ = 0;
-    tube_.reset();
+  if (found) {
+    forget_tubes();
+    return Start::found;
   }
-  return found ? Start::found : Start::failed;
+  if (!straight && ++tubes_tried_ < tubes_.size()) {
+    return Start::more_to_do;
+  }
+  tubes_tried_ = 0;
+  if (!keep_tube) {
+    forget_tubes();
+  }
+  return Start::failed;
 }
 
-// False when both borders were traced before, or the one that is known.
-bool InjectionPipette::trace_next_side(const GradientField& field, double noise) {
+// False when all borders were traced before. Through the upper and the lower one enters what is too steep for
+// the others.
+bool InjectionPipette::trace_next_border(const GradientField& field, double noise) {
   if (trace_) {
     if (!trace_->advance(field)) {
       return true;
@@ -154,21 +194,29 @@ bool InjectionPipette::trace_next_side(const GradientField& field, double noise)
     const auto t = trace_->tube(field);
     trace_.reset();
     if (t && t->edge_share > 0.5 && t->similarity > 0.5 && t->length > 12 &&
-        (!tube_ || t->edge_share * t->similarity > tube_->edge_share * tube_->similarity)) {
-      tube_ = t;
+        (side_ == Side::automatic || side_ == side_of(*t))) {
+      const auto like = [](const TubeTrace& tube) { return tube.edge_share * tube.similarity; };
+      const auto less = [&](const TubeTrace& other) { return like(other) < like(*t); };
+      tubes_.insert(std::find_if(tubes_.begin(), tubes_.end(), less), *t);
     }
     return true;
   }
-  constexpr Side kSides[] = {Side::right, Side::left};
-  const int sides = side_ == Side::automatic ? 2 : 1;
-  if (sides_looked_at_ == sides) {
+  constexpr std::array kBorders = {Border::right, Border::left, Border::upper, Border::lower};
+  // With all its edges first: in relief one wall may be faint.
+  if (sections_looked_at_ == 2 * kBorders.size()) {
     return false;
   }
-  const Side side = sides == 1 ? side_ : kSides[sides_looked_at_];
-  ++sides_looked_at_;
-  if (const auto crossing = narrow_tube_at_border(field, side, 3, std::max(22.0, 8 * radius_px_), noise)) {
+  const Border border = kBorders[sections_looked_at_ / 2];
+  const bool without_faint = sections_looked_at_++ % 2 == 1;
+  if (border == other_border(side_)) {
+    return true;
+  }
+  const auto crossing = narrow_tube_at_border(field, border, 3, std::max(22.0, kWidest_radii * radius_px_),
+                                              noise, without_faint);
+  if (crossing && !(without_faint && crossing->half_width >= section_half_width_)) {
     trace_.emplace(*crossing);
   }
+  section_half_width_ = crossing ? crossing->half_width : 0;
   return true;
 }
 
@@ -177,19 +225,20 @@ bool InjectionPipette::fit_walls_further(const GradientField& field, double nois
   // Noise may have hidden the walls near the end; a speck beside a wall draws the tube aside.
   constexpr double kReaches[] = {kWallReach_px, kWallReachAtStart_px};
   constexpr double kSurely = 0.9;
+  const TubeTrace& tube = tubes_[tubes_tried_];
   NeedlePose traced;
-  traced.axis = tube_->axis;
-  traced.half_width = tube_->end_half_width;
-  traced.taper =
-      std::clamp((tube_->half_width - tube_->end_half_width) / std::max(tube_->length, 1.0), 0.0, 0.2);
-  traced.tip = tube_->end();
+  traced.axis = tube.axis;
+  traced.half_width = tube.end_half_width;
+  traced.taper = std::clamp((tube.half_width - tube.end_half_width) / std::max(tube.length, 1.0), 0.0, 0.2);
+  const double length = walls_tried_ && walls_tried_->reaches % 2 == 1 ? tube.sure_length : tube.length;
+  traced.tip = tube.root + length * tube.axis;
   if (!walls_tried_) {
     walls_tried_ = {traced, -1, 0};
   }
-  if (walls_tried_->reaches == std::size(kReaches)) {
+  if (walls_tried_->reaches == 2 * std::size(kReaches)) {
     return false;
   }
-  const double reach = kReaches[walls_tried_->reaches++];
+  const double reach = kReaches[walls_tried_->reaches++ / 2];
   for (const double wider : {1.0, 0.7, 0.5}) {
     NeedlePose tried = traced;
     tried.half_width *= wider;
@@ -203,19 +252,24 @@ bool InjectionPipette::fit_walls_further(const GradientField& field, double nois
   return true;
 }
 
-bool InjectionPipette::begin_at_end(const GradientField& field, double noise, const Clear& clear_at) {
+bool InjectionPipette::begin_at_end(const GradientField& field, double noise, const Clear& clear_at,
+                                    bool& is_straight) {
+  const TubeTrace& tube = tubes_[tubes_tried_];
   last_ = walls_tried_->needle;
   double straight = walls_tried_->straight;
   look_further_out(field, noise, radius_px_, last_, straight);
-  put_at_end(field, noise, *tube_, 25, last_);
+  put_at_end(field, noise, tube, 25, last_);
   for (int round = 0; round < 2; ++round) {
     straight = fit_walls(field, noise, radius_px_, last_, kLongest_px);
-    put_at_end(field, noise, *tube_, 10, last_);
+    put_at_end(field, noise, tube, 10, last_);
   }
-  if (straight < kStraight || last_.half_width > 2 * radius_px_ + 1) {
+  if (straight < kStraight || last_.half_width > 2 * radius_px_ + 1 ||
+      is_wall_of_wide_tube(field, tube, noise)) {
     reason_ = "what enters through the border is not a straight needle";
     return false;
   }
+  found_side_ = side_of(tube);
+  side_known_ = is_straight = true;
   step_sign_ = 0;
   walls_offset_ = 0.15 * last_.half_width;
   offset_frames_ = 0;
@@ -228,13 +282,16 @@ bool InjectionPipette::begin_at_end(const GradientField& field, double noise, co
   }
   glass_ahead_ = glass_scatter_ = glass_blur_ = 0;
   glass_frames_ = 0;
+  bevel_ = last_.half_width < kLumen_px
+               ? Bevel{}
+               : bevel_of_glass(field, noise, last_, kStartReach_px, kStartReach_px).value_or(Bevel{});
   learn_glass(field, noise, last_, kStartReach_px);
   NeedlePose plain = last_;
   const bool faint = fit_walls(field, noise, radius_px_, plain, kShortest_px) < kStraight;
   longest_ = faint ? kFollowed_px : kShortest_px;
   if (faint) {
-    const auto end = end_of_glass(field, noise, last_, kStartReach_px, kStartReach_px);
-    if (!end || end->sd > kEndKnown_px || end->blur > kSharp_px || !clear_at(last_.tip)) {
+    const auto end = end_of_glass(field, noise, last_, bevel_.tangent, kStartReach_px, kStartReach_px);
+    if (!end || end->sd > kEndKnown_px || end->blur > kMostBlur_px || !clear_at(last_.tip)) {
       reason_ = "the end of the needle is not clear";
       return false;
     }
@@ -245,7 +302,6 @@ bool InjectionPipette::begin_at_end(const GradientField& field, double noise, co
   }
   last_.ok = true;
   last_.score = 1;
-  found_side_ = tube_->side;
   velocity_ = {};
   lost_ = 0;
   started_ = true;
@@ -257,12 +313,18 @@ bool InjectionPipette::begin_at_end(const GradientField& field, double noise, co
 NeedlePose InjectionPipette::find(const GradientField& field, double noise,
                                   const std::optional<Point>& moved) {
   velocity_ = moved.value_or(velocity_);
-  NeedlePose needle = follow(field, noise);
+  return told(follow(field, noise), noise);
+}
+
+NeedlePose InjectionPipette::as_found(double noise) const { return told(last_, noise); }
+
+NeedlePose InjectionPipette::told(NeedlePose needle, double noise) const {
   needle.tip += glass_ahead_ * needle.axis;
   // Of a needle whose lumen is not seen only the walls tell the end.
   constexpr double kWalls_px = 0.5, kBeyondWalls_px = 0.8;
   const bool by_walls = last_.half_width < kLumen_px && glass_frames_ == 0;
-  needle.constant_sd = by_walls ? kBeyondWalls_px : 0;
+  needle.constant_sd =
+      by_walls ? kBeyondWalls_px : bevel_.sd * outer_radius_of_glass(last_.half_width, glass_blur_);
   // It is learnt in focus. Out of it the end seems to lie further back; beyond the blurs that are tried, as
   // far as its contrast lasts.
   constexpr double kBeyondBlurs_px = 6;
@@ -283,6 +345,20 @@ double InjectionPipette::tip_sd(double noise) const {
 }
 
 void InjectionPipette::put(const Point& tip) { last_.tip = tip - glass_ahead_ * last_.axis; }
+
+bool InjectionPipette::go_on_at(const GradientField& field, double noise, const Point& tip) {
+  constexpr double kAstray_px = 2.5;  // across the axis
+  const auto seen = by_shaft(field, noise, tip);
+  if (!seen || std::abs((seen->tip - tip).cross(seen->axis)) > kAstray_px) {
+    return false;
+  }
+  velocity_ = {};
+  jumps_ = 0;
+  search_next_ = walls_agree_ = false;
+  backdrop_ = {};
+  view_ = {};
+  return true;
+}
 
 std::optional<NeedlePose> InjectionPipette::by_shaft(const GradientField& field, double noise,
                                                      const Point& tip) {
@@ -465,13 +541,12 @@ void InjectionPipette::learn_shape_anew(const GradientField& field) {
 void InjectionPipette::learn_glass(const GradientField& field, double noise, NeedlePose followed,
                                    double reach) {
   constexpr int kFrames = 30;  // by then the noise of one frame has fallen to a fifth
-  constexpr double kCertain_px = 1;
   if (glass_frames_ >= kFrames || followed.half_width < kLumen_px) {
     return;
   }
   followed.tip += glass_ahead_ * followed.axis;
-  const auto end = end_of_glass(field, noise, followed, reach, reach);
-  if (end && end->sd < kCertain_px) {
+  const auto end = end_of_glass(field, noise, followed, bevel_.tangent, reach, reach);
+  if (end && end->sd < kEndKnown_px) {
     const double before = end->ahead, part = 1.0 / ++glass_frames_;
     glass_ahead_ += part * before;
     // With the deviation that its likelihood has.
@@ -503,14 +578,18 @@ void InjectionPipette::learn(const GradientField& field, const NeedlePose& needl
     shape_offset_ +=
         std::clamp(shape_.face().value_or(shape_offset_) - shape_offset_, -kFaceRate_px, kFaceRate_px);
   }
-  cv::Mat here;
+  cv::Mat here = kept_picture(template_.size(), CV_32F);
   cv::getRectSubPix(field.smooth, template_.size(),
                     cv::Point2f(static_cast<float>(followed.tip.x - field.area.x - tip_in_template_.x +
                                                    (template_.cols - 1) / 2.0),
                                 static_cast<float>(followed.tip.y - field.area.y - tip_in_template_.y +
                                                    (template_.rows - 1) / 2.0)),
                     here);
-  cv::addWeighted(template_, 0.9, here, 0.1, 0, template_);
+  for (int y = 0; y < here.rows; ++y) {
+    std::transform(here.ptr<float>(y), here.ptr<float>(y) + here.cols, template_.ptr<float>(y),
+                   template_.ptr<float>(y),
+                   [](float now, float before) { return 0.9F * before + 0.1F * now; });
+  }
 }
 
 }  // namespace punctum::vision

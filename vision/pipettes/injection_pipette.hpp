@@ -11,8 +11,10 @@
 
 #include "vision/config.hpp"
 #include "vision/image/gradient.hpp"
+#include "vision/image/kept_vector.hpp"
 #include "vision/pipettes/backdrop.hpp"
 #include "vision/pipettes/narrow_tube.hpp"
+#include "vision/pipettes/needle_bevel.hpp"
 #include "vision/pipettes/needle_pose.hpp"
 #include "vision/pipettes/needle_shape.hpp"
 #include "vision/pipettes/tube_trace.hpp"
@@ -29,7 +31,7 @@ class InjectionPipette {
   // else lies near.
   using Clear = std::function<bool(const Point& tip)>;
   [[nodiscard]] bool start(const GradientField& field, double noise, const Clear& clear_at);
-  // The same in parts, each in the picture of its frame: what crosses either border, the tube from there,
+  // The same in parts, each in the picture of its frame: what crosses each border, the tube from there,
   // then its end. keep_tube: where that end is not a needle's or not clear, the next part looks at it once
   // more.
   enum class Start : std::uint8_t { more_to_do, failed, found };
@@ -37,8 +39,13 @@ class InjectionPipette {
                                     bool keep_tube);
   // moved: what the manipulator has moved it by since the last frame, px, where that is known.
   [[nodiscard]] NeedlePose find(const GradientField& field, double noise, const std::optional<Point>& moved);
+  // Where advance_start found it, in the frame that showed its end.
+  [[nodiscard]] NeedlePose as_found(double noise) const;
   // It is known to be elsewhere along its axis than the picture shows.
   void put(const Point& tip);
+  // No frame was seen for a while, and its tip is known to be there now: what was learnt of the needle itself
+  // is kept. False, and to be found anew, unless its shaft lies there.
+  [[nodiscard]] bool go_on_at(const GradientField& field, double noise, const Point& tip);
   // Its shaft is seen behind a tip that is known otherwise; its axis and width are then as seen.
   [[nodiscard]] std::optional<NeedlePose> by_shaft(const GradientField& field, double noise,
                                                    const Point& tip);
@@ -46,12 +53,16 @@ class InjectionPipette {
   void learn(const GradientField& field, const NeedlePose& needle, double noise);
 
   [[nodiscard]] bool started() const noexcept { return started_; }
+  // The border through which a straight needle enters, even where its end is not clear.
+  [[nodiscard]] bool side_known() const noexcept { return side_known_; }
   [[nodiscard]] Side side() const noexcept { return found_side_; }
 
  private:
-  [[nodiscard]] bool trace_next_side(const GradientField& field, double noise);
+  void forget_tubes();
+  [[nodiscard]] bool trace_next_border(const GradientField& field, double noise);
   [[nodiscard]] bool fit_walls_further(const GradientField& field, double noise);
-  [[nodiscard]] bool begin_at_end(const GradientField& field, double noise, const Clear& clear_at);
+  [[nodiscard]] bool begin_at_end(const GradientField& field, double noise, const Clear& clear_at,
+                                  bool& is_straight);
   bool cut_template(const GradientField& field);
   [[nodiscard]] double aside(const GradientField& field, double noise, const NeedlePose& predicted,
                              double correlated) const;
@@ -62,15 +73,19 @@ class InjectionPipette {
   void learn_shape_anew(const GradientField& field);
   void learn_glass(const GradientField& field, double noise, NeedlePose followed, double reach);
   [[nodiscard]] double tip_sd(double noise) const;
+  // The end that is followed, as the outermost glass.
+  [[nodiscard]] NeedlePose told(NeedlePose needle, double noise) const;
   [[nodiscard]] NeedlePose follow(const GradientField& field, double noise);
   [[nodiscard]] NeedlePose search_from_border(const GradientField& field, double noise, NeedlePose needle);
 
   Side side_;
   double radius_px_;
   bool started_ = false;
-  int sides_looked_at_ = 0;  // in the search for it
+  std::size_t sections_looked_at_ = 0;  // in the search for it: of each border two
+  double section_half_width_ = 0;       // of the last one, px
   std::optional<NarrowTubeTrace> trace_;
-  std::optional<TubeTrace> tube_;  // the best through those
+  Vector<TubeTrace> tubes_;  // through those, the most likely one first
+  std::size_t tubes_tried_ = 0;
   struct WallsTried {
     NeedlePose needle;  // on the straightest
     double straight;
@@ -79,6 +94,7 @@ class InjectionPipette {
   std::optional<WallsTried> walls_tried_;
   double longest_ = 0;  // of a wall that an edge is averaged over, px
   Side found_side_ = Side::right;
+  bool side_known_ = false;
   std::string reason_;  // why it was not started
   cv::Mat template_;
   Point tip_in_template_;
@@ -96,6 +112,7 @@ class InjectionPipette {
   double shape_offset_ = 0;   // from where the learnt shape has its origin to the end face, px
   double walls_offset_ = 0;   // from where the profile of the walls ends to the end face, px
   int offset_frames_ = 0;     // that walls_offset_ was learnt from
+  Bevel bevel_;               // of its end, as it was found
   double glass_ahead_ = 0;    // of the end that is followed: the outermost glass, px
   int glass_frames_ = 0;      // that it was learnt from
   double glass_scatter_ = 0;  // variance of where the end that is followed seems to be from it, px^2

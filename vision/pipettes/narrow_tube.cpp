@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <numeric>
 #include <opencv2/core.hpp>
-#include <vector>
+#include <utility>
 
 #include "vision/pipettes/border_section.hpp"
 #include "vision/pipettes/robust_line.hpp"
@@ -26,7 +26,7 @@ double strip_of(const GradientField& field) { return std::clamp(0.09 * field.are
 
 // Takes off mean and slope and scales to unit length. Returns the length before the scaling, 0 for a flat
 // profile.
-double normalise(std::vector<double>& v) {
+double normalise(Vector<double>& v) {
   const double n = static_cast<double>(v.size());
   double mean = 0, tilt = 0, ss = 0;
   for (double x : v) {
@@ -51,13 +51,36 @@ double normalise(std::vector<double>& v) {
 
 }  // namespace
 
-std::optional<TubeTrace> narrow_tube_at_border(const GradientField& field, Side side, double width_min,
-                                               double width_max, double noise) {
+// At a corner only a part of it crosses the border: there the whole is seen further inside.
+std::optional<TubeTrace> narrow_tube_at_border(const GradientField& field, Border border, double width_min,
+                                               double width_max, double noise, bool without_faint) {
   constexpr int kLeast_px = 48;
-  if (field.area.width < kLeast_px || field.area.height < kLeast_px) {
+  constexpr double kCorner_px = 60;
+  const cv::Rect& a = field.area;
+  if (a.width < kLeast_px || a.height < kLeast_px) {
     return std::nullopt;
   }
-  return border_section(field, side, width_min, width_max, noise, strip_of(field), 0.12, 45);
+  const bool upright = border == Border::right || border == Border::left;
+  WantedTube wanted{.width_min = width_min,
+                    .width_max = width_max,
+                    .strip = strip_of(field),
+                    .relative = 0.12,
+                    .tilt_min_deg = upright ? 0 : 30,
+                    .tilt_max_deg = upright ? 45 : 66,
+                    .without_faint = without_faint};
+  auto sections = border_sections(field, border, wanted, noise);
+  if (sections.empty()) {
+    return std::nullopt;
+  }
+  const Point& root = sections.front().root;
+  const double along = upright ? root.y - a.y : root.x - a.x, length = upright ? a.height : a.width;
+  if (std::min(along, length - along) < kCorner_px) {
+    wanted.inset = kCorner_px;
+    if (auto inside = border_sections(field, border, wanted, noise); !inside.empty()) {
+      sections = std::move(inside);
+    }
+  }
+  return sections.front();
 }
 
 NarrowTubeTrace::NarrowTubeTrace(const TubeTrace& at_border)
@@ -79,7 +102,9 @@ bool NarrowTubeTrace::advance(const GradientField& field) {
   if (learnt_.empty() && !learn_at_border(field)) {
     return true;
   }
-  const double longest = 0.85 * field.area.width / std::abs(at_border_.axis.x);
+  const Point& axis = at_border_.axis;
+  const double longest = 0.85 * std::min(field.area.width / std::max(std::abs(axis.x), 1e-6),
+                                         field.area.height / std::max(std::abs(axis.y), 1e-6));
   for (int part = 0; part < kStationsPerPart; ++part) {
     const double s = static_cast<double>(along_.size()) * kStride_px;
     if (s >= longest || sum_ < sum_best_ - kGiveUp) {
@@ -96,10 +121,10 @@ bool NarrowTubeTrace::advance(const GradientField& field) {
 }
 
 // Mean grey over `length` px along the tube; across it, at samples that are `apart` px apart, about `at`.
-std::vector<double> NarrowTubeTrace::profile(const GradientField& field, const Point& at, double length,
-                                             int samples, double apart) const {
+Vector<double> NarrowTubeTrace::profile(const GradientField& field, const Point& at, double length,
+                                        int samples, double apart) const {
   const cv::Rect& a = field.area;
-  std::vector<double> v(static_cast<std::size_t>(samples), 0.0);
+  Vector<double> v(static_cast<std::size_t>(samples), 0.0);
   int stations = 0;
   for (double k = 0; k < length; k += kAlongStep_px) {
     ++stations;
@@ -119,11 +144,11 @@ std::vector<double> NarrowTubeTrace::profile(const GradientField& field, const P
 void NarrowTubeTrace::step(const GradientField& field, double s) {
   constexpr int kHalfPixels = 4;  // that it is looked for to either side
   double top = -2, at = lateral_, top_contrast = 0;
-  std::vector<double> top_profile;
+  Vector<double> top_profile;
   // The profiles at all these places share their samples.
-  const std::vector<double> wide = profile(field, at_border_.root + s * at_border_.axis + lateral_ * across_,
-                                           kWindow_px, 2 * (n_ - 1) + 2 * kHalfPixels + 1, 0.5);
-  std::vector<double> v(static_cast<std::size_t>(n_));
+  const Vector<double> wide = profile(field, at_border_.root + s * at_border_.axis + lateral_ * across_,
+                                      kWindow_px, 2 * (n_ - 1) + 2 * kHalfPixels + 1, 0.5);
+  Vector<double> v(static_cast<std::size_t>(n_));
   for (int aside = -kHalfPixels; aside <= kHalfPixels; ++aside) {
     const double dl = 0.5 * aside;
     for (int i = 0; i < n_; ++i) {
@@ -161,7 +186,7 @@ void NarrowTubeTrace::step(const GradientField& field, double s) {
 double NarrowTubeTrace::half_width_near_end(const GradientField& field, const TubeTrace& t) const {
   const Point across(-t.axis.y, t.axis.x);
   const double back = std::min(t.length * 0.6, 26.0);
-  std::vector<double> tail(static_cast<std::size_t>(n_), 0.0);
+  Vector<double> tail(static_cast<std::size_t>(n_), 0.0);
   const Point near_end = t.root + (t.length - back) * t.axis;
   for (double k = 0; k < 0.6 * back; k += kAlongStep_px) {
     for (int i = 0; i < n_; ++i) {
@@ -211,6 +236,13 @@ std::optional<TubeTrace> NarrowTubeTrace::tube(const GradientField& field) {
   t.axis = t.axis + middle.line.slope * across_;
   t.axis *= 1 / cv::norm(t.axis);
   t.length = along_[last_] + kWindow_px;
+  // A cell behind its end may look a little like it.
+  constexpr std::ptrdiff_t kGap = 4;
+  const auto gap = std::search_n(similarity_.begin(), similarity_.end(), kGap, kContinued,
+                                 [](double similarity, double least) { return similarity < least; });
+  t.sure_length = gap == similarity_.end()
+                      ? t.length
+                      : along_[static_cast<std::size_t>(gap - similarity_.begin())] + kWindow_px;
   t.end_half_width = half_width_near_end(field, t);
   return t;
 }

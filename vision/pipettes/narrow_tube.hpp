@@ -3,17 +3,19 @@
 
 #include <cstddef>
 #include <optional>
-#include <vector>
 
 #include "vision/image/gradient.hpp"
+#include "vision/image/kept_vector.hpp"
+#include "vision/pipettes/border_section.hpp"
 #include "vision/pipettes/tube_trace.hpp"
 
 namespace punctum::vision {
 
 // What crosses the border with a total width of width_min .. width_max px. noise: grey levels.
-[[nodiscard]] std::optional<TubeTrace> narrow_tube_at_border(const GradientField& field, Side side,
-                                                             double width_min, double width_max,
-                                                             double noise);
+// without_faint: its outermost edges where they are faint.
+[[nodiscard]] std::optional<TubeTrace> narrow_tube_at_border(const GradientField& field, Border border,
+                                                             double width_min, double width_max, double noise,
+                                                             bool without_faint);
 
 // Follows a tube by its cross profile, which it learns on the way; in parts, each in the picture of its
 // frame.
@@ -30,17 +32,17 @@ class NarrowTubeTrace {
  private:
   [[nodiscard]] bool learn_at_border(const GradientField& field);
   void step(const GradientField& field, double s);
-  [[nodiscard]] std::vector<double> profile(const GradientField& field, const Point& at, double length,
-                                            int samples, double apart) const;
+  [[nodiscard]] Vector<double> profile(const GradientField& field, const Point& at, double length,
+                                       int samples, double apart) const;
   [[nodiscard]] double half_width_near_end(const GradientField& field, const TubeTrace& t) const;
 
   TubeTrace at_border_;
   Point across_;
   int n_;  // samples of a profile, 1 px apart
-  std::vector<double> learnt_;
+  Vector<double> learnt_;
   double contrast_ = 0;
   double lateral_ = 0;  // of the tube at the present station, px
-  std::vector<double> along_, shift_, similarity_;
+  Vector<double> along_, shift_, similarity_;
   double sum_ = 0, sum_best_ = 0;  // of (similarity - 0.5)
   std::size_t last_ = 0;           // station where that is largest
 };

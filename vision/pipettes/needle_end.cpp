@@ -4,13 +4,16 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstring>
 #include <numbers>
-#include <vector>
+#include <span>
 
 #include "hal/math/elementary.hpp"
 #include "vision/image/blurred_step.hpp"
+#include "vision/image/dispatched.hpp"
 #include "vision/image/median.hpp"
 #include "vision/image/parabola.hpp"
+#include "vision/pipettes/needle_bevel.hpp"
 
 namespace punctum::vision {
 
@@ -45,6 +48,22 @@ double product(const Lanes& a, const Lanes& b, double half_width) {
   return sum;
 }
 
+// The same, of b with its widths.
+double product(const Lanes& a, const Lanes& weighted) {
+  double sum = 0;
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    sum += a[i] * weighted[i];
+  }
+  return sum;
+}
+Lanes weights_of(const Lanes& v, double half_width) {
+  Lanes out;
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    out[i] = width(i, half_width) * v[i];
+  }
+  return out;
+}
+
 // A membrane across the needle and a slope of the light are not of it: without mean and slope.
 void take_off_mean_and_slope(Lanes& row, double half_width) {
   double m0 = 0, m2 = 0, r0 = 0, r1 = 0;
@@ -60,12 +79,14 @@ void take_off_mean_and_slope(Lanes& row, double half_width) {
   }
 }
 
-std::optional<Lanes> row_at(const GradientField& field, const NeedlePose& needle, double s) {
+// bevel: by how much further back than the axis it is sampled, per px across.
+std::optional<Lanes> row_at(const GradientField& field, const NeedlePose& needle, double bevel, double s) {
   const cv::Rect& a = field.area;
   const double w = needle.half_width + needle.taper * s;
   Lanes row{};
   for (std::size_t i = 0; i < kLanes; ++i) {
-    const Point p = needle.at(s, place(i, w));
+    const double u = place(i, w);
+    const Point p = needle.at(s + bevel * u, u);
     if (p.x < a.x + 1 || p.y < a.y + 1 || p.x > a.x + a.width - 2 || p.y > a.y + a.height - 2) {
       return std::nullopt;
     }
@@ -77,15 +98,16 @@ std::optional<Lanes> row_at(const GradientField& field, const NeedlePose& needle
 
 // What the rows show, from the most forward one backward.
 struct Rows {
-  std::vector<Lanes> seen;
+  Vector<Lanes> seen;
   double first_s = 0;  // of the first row behind the tip, px
   [[nodiscard]] double at(std::size_t j) const { return first_s + kStep_px * static_cast<double>(j); }
 };
 
-Rows rows_along(const GradientField& field, const NeedlePose& needle, double from, double to) {
+Rows rows_along(const GradientField& field, const NeedlePose& needle, double bevel, double from, double to) {
   Rows out;
+  out.seen.reserve(static_cast<std::size_t>((to - from) / kStep_px) + 1);
   for (double s = from; s <= to; s += kStep_px) {
-    if (const auto row = row_at(field, needle, s)) {
+    if (const auto row = row_at(field, needle, bevel, s)) {
       if (out.seen.empty()) {
         out.first_s = s;
       }
@@ -102,7 +124,7 @@ Rows rows_along(const GradientField& field, const NeedlePose& needle, double fro
 std::optional<Lanes> usual_row(const Rows& rows, double from, double to) {
   constexpr std::size_t kLeast = 24;
   Lanes out{};
-  std::vector<double> values;
+  Vector<double> values;
   for (std::size_t i = 0; i < kLanes; ++i) {
     values.clear();
     for (std::size_t j = 0; j < rows.seen.size(); ++j) {
@@ -118,36 +140,162 @@ std::optional<Lanes> usual_row(const Rows& rows, double from, double to) {
   return out;
 }
 
-// How an end at t looks: walls behind it, and a line across the lumen.
-class EndModel {
+constexpr std::size_t kFour = 4;
+using FourDoubles = double __attribute__((vector_size(kFour * sizeof(double))));
+
+struct ThreeSums {
+  double a, b, c;
+};
+// a . x, b . x and c . y, four at once in a fixed order; what is left is added one by one.
+PUNCTUM_WIDE_LOOP ThreeSums products_with(const double* a, const double* b, const double* c, const double* x,
+                                          const double* y, std::size_t n) {
+  FourDoubles sum_a{}, sum_b{}, sum_c{}, p, q, r, u, v;
+  std::size_t i = 0;
+  for (; i + kFour <= n; i += kFour) {
+    std::memcpy(&p, a + i, sizeof p);
+    std::memcpy(&q, b + i, sizeof q);
+    std::memcpy(&r, c + i, sizeof r);
+    std::memcpy(&u, x + i, sizeof u);
+    std::memcpy(&v, y + i, sizeof v);
+    sum_a += p * u;
+    sum_b += q * u;
+    sum_c += r * v;
+  }
+  ThreeSums out{(sum_a[0] + sum_a[1]) + (sum_a[2] + sum_a[3]), (sum_b[0] + sum_b[1]) + (sum_b[2] + sum_b[3]),
+                (sum_c[0] + sum_c[1]) + (sum_c[2] + sum_c[3])};
+  for (; i < n; ++i) {
+    out.a += a[i] * x[i];
+    out.b += b[i] * x[i];
+    out.c += c[i] * y[i];
+  }
+  return out;
+}
+
+// Sums over the first n values, for every n.
+class SumsUpTo {
  public:
-  EndModel(const Rows& rows, const Lanes& walls, double half_width, double blur, double noise2) {
-    noise2_ = noise2;
+  void reserve(std::size_t n) { sums_.reserve(n + 1); }
+  void add(double value) { sums_.push_back(sums_.back() + value); }
+  [[nodiscard]] double from_to(std::size_t from, std::size_t to) const { return sums_[to] - sums_[from]; }
+
+ private:
+  Vector<double> sums_{0.0};
+};
+
+constexpr double kFine_px = 0.25;  // between the ends that are compared
+constexpr int kFinePerRow = static_cast<int>(kStep_px / kFine_px);
+constexpr double kEndTo_px = 24;   // behind the end; further back the strength of the walls tells nothing
+constexpr double kEndFrom_px = 4;  // nearer, the walls may be weaker
+// Half the thickness of the glass over the radius of its middle: pulled glass keeps the ratio of inner to
+// outer diameter of its capillary, usually 0.7.
+constexpr double kHalfWall = 0.17;
+
+// What an end of that blur shows at the rows about it: walls behind it, a line across the lumen. Ends lie
+// finer than rows, so there are several phases of rows.
+class EndRows {
+ public:
+  EndRows(double half_width, double blur_px) : blur(blur_px) {
+    constexpr double kTails = 5;  // blurs ahead of the end, where nothing of it is left
     // The steepest outer face of a thin wall is its middle and the blur.
     const double middle = std::max(half_width - blur, 0.6 * half_width);
-    line_behind_ = kHalfWall * middle;
-    const double lumen = middle - line_behind_;
-    const double spread = std::numbers::sqrt2 * blur;
-    Lanes line{};
+    const double behind = kHalfWall * middle, lumen = middle - behind, spread = std::numbers::sqrt2 * blur;
     for (std::size_t i = 0; i < kLanes; ++i) {
       const double u = place(i, half_width);
       line[i] = 0.5 * (blurred_step((lumen - u) / spread) - blurred_step((-lumen - u) / spread));
     }
     take_off_mean_and_slope(line, half_width);
-    ww_ = std::max(product(walls, walls, half_width), 1e-9);
-    wl_ = product(walls, line, half_width);
-    ll_ = std::max(product(line, line, half_width), 1e-9);
-    for (const Lanes& row : rows.seen) {
-      // A speck may tell for or against the needle no more than the needle itself.
-      on_walls_.push_back(ww_ * std::clamp(product(row, walls, half_width) / ww_, -0.5, 1.6));
-      on_line_.push_back(product(row, line, half_width));
-    }
     zero_ = static_cast<int>(kTails * blur / kFine_px);
-    for (int k = -zero_; k * kFine_px < kTo_px; ++k) {
-      const double s = k * kFine_px;
-      step_.push_back(0.5 * blurred_step(s / spread));
-      const double z = (s - line_behind_) / blur;
-      bump_.push_back(math::exp(-0.5 * z * z));
+    constexpr int kTo = static_cast<int>(kEndTo_px / kFine_px);
+    for (Phase& p : phase_) {
+      const auto rows = static_cast<std::size_t>(zero_ + kTo) / kFinePerRow + 1;
+      for (Vector<double>* v : {&p.step, &p.step_place, &p.line}) {
+        v->reserve(rows);
+      }
+      for (SumsUpTo* sums : {&p.aa, &p.aas, &p.aass, &p.bb, &p.ab, &p.abs, &p.n, &p.s, &p.ss}) {
+        sums->reserve(rows);
+      }
+      p.first = kTo;
+    }
+    for (int k = -zero_; k < kTo; ++k) {
+      Phase& p = phase_[phase_of(k)];
+      p.first = std::min(p.first, k);
+      const double s = k * kFine_px, a = 0.5 * blurred_step(s / spread), z = (s - behind) / blur,
+                   b = math::exp(-0.5 * z * z);
+      p.step.push_back(a);
+      p.step_place.push_back(a * s);
+      p.line.push_back(b);
+      p.aa.add(a * a);
+      p.aas.add(a * a * s);
+      p.aass.add(a * a * s * s);
+      p.bb.add(b * b);
+      p.ab.add(a * b);
+      p.abs.add(a * b * s);
+      const bool strong = s > kEndFrom_px;
+      p.n.add(strong ? 1 : 0);
+      p.s.add(strong ? s : 0);
+      p.ss.add(strong ? s * s : 0);
+    }
+  }
+
+  struct Phase {
+    int first = 0;                          // fine steps behind the end
+    Vector<double> step, step_place, line;  // per row: walls, walls times place, line
+    SumsUpTo aa, aas, aass, bb, ab, abs;    // of their products, and of these times place
+    SumsUpTo n, s, ss;                      // of the rows behind kEndFrom_px: their number, places
+  };
+  // Of rows that lie t fine steps ahead of the end, and every kFinePerRow behind.
+  [[nodiscard]] const Phase& phase(int t) const { return phase_[phase_of(-t)]; }
+
+  double blur;
+  Lanes line{};  // across the needle
+
+ private:
+  static std::size_t phase_of(int k) {
+    return static_cast<std::size_t>((k % kFinePerRow + kFinePerRow) % kFinePerRow);
+  }
+  int zero_ = 0;
+  std::array<Phase, kFinePerRow> phase_;
+};
+
+// What the rows show of walls that look like these; a speck may tell for or against the needle no more than
+// the needle itself.
+struct OnWalls {
+  double power;                      // of the walls
+  Vector<double> strength;           // of a row, times the power
+  SumsUpTo sum, times_row, squares;  // of the strengths; times the number of the row; squared
+
+  OnWalls(const Rows& rows, const Lanes& walls, double half_width)
+      : power(std::max(product(walls, walls, half_width), 1e-9)) {
+    const Lanes weighted = weights_of(walls, half_width);
+    strength.reserve(rows.seen.size());
+    for (SumsUpTo* sums : {&sum, &times_row, &squares}) {
+      sums->reserve(rows.seen.size());
+    }
+    for (const Lanes& row : rows.seen) {
+      const double w = power * std::clamp(product(row, weighted) / power, -0.5, 1.6);
+      times_row.add(w * static_cast<double>(strength.size()));
+      strength.push_back(w);
+      sum.add(w);
+      squares.add(w * w);
+    }
+  }
+};
+
+// How an end at t looks: walls behind it, and a line across the lumen.
+class EndModel {
+ public:
+  EndModel(const Rows& rows, const OnWalls& on_walls, const Lanes& walls, const EndRows& end,
+           double half_width, double noise2)
+      : noise2_(noise2),
+        ww_(on_walls.power),
+        wl_(product(walls, end.line, half_width)),
+        ll_(std::max(product(end.line, end.line, half_width), 1e-9)),
+        end_(end),
+        on_walls_(on_walls) {
+    const Lanes line = weights_of(end.line, half_width);
+    on_line_.reserve(rows.seen.size());
+    for (const Lanes& row : rows.seen) {
+      on_line_.push_back(product(row, line));
     }
   }
 
@@ -155,44 +303,27 @@ class EndModel {
     double gain = 0;     // grey levels squared, over no needle
     bool plain = false;  // the walls near the end look as further back
   };
-  // t: behind the tip of the pose, in steps of kFine_px from the first row. The walls may be weaker at the
-  // tip, where they are thin, and weaker or stronger than elsewhere in front of a yolk.
+  // t: behind the tip of the pose, in fine steps from the first row. The walls may be weaker at the tip,
+  // where they are thin, and weaker or stronger than elsewhere in front of a yolk.
   [[nodiscard]] Fit fit(int t) const {
-    constexpr double kFrom_px = 4;
-    constexpr int kRowsPerStep = static_cast<int>(kStep_px / kFine_px);
-    double n = 0, s1 = 0, s2 = 0, w1 = 0, w2 = 0;      // strength of the walls over the place
-    double a0 = 0, a1 = 0, aa0 = 0, aa1 = 0, aa2 = 0;  // walls, walls times place, ...
-    double b0 = 0, bb = 0, ab0 = 0, ab1 = 0;           // line
-    double shaft = 0;
-    for (std::size_t j = 0; j < on_walls_.size(); ++j) {
-      const int k = static_cast<int>(j) * kRowsPerStep - t;
-      if (k < -zero_) {
-        continue;
-      }
-      const double s = k * kFine_px, w = on_walls_[j];
-      if (s >= kTo_px) {  // of any strength
-        shaft += w * w / ww_;
-        continue;
-      }
-      const double a = step_[static_cast<std::size_t>(zero_ + k)],
-                   b = bump_[static_cast<std::size_t>(zero_ + k)];
-      a0 += a * w;
-      a1 += a * s * w;
-      aa0 += a * a;
-      aa1 += a * a * s;
-      aa2 += a * a * s * s;
-      b0 += b * on_line_[j];
-      bb += b * b;
-      ab0 += a * b;
-      ab1 += a * b * s;
-      if (s > kFrom_px) {
-        n += 1;
-        s1 += s;
-        s2 += s * s;
-        w1 += w / ww_;
-        w2 += s * w / ww_;
-      }
-    }
+    const EndRows::Phase& at = end_.phase(t);
+    // Rows of the picture and of the end that lie on each other; behind them the walls have any strength.
+    const int rows = static_cast<int>(on_walls_.strength.size()), shown = static_cast<int>(at.step.size());
+    const int shift = (at.first + t) / kFinePerRow;  // row of the picture on the first one of the end
+    const int from = std::clamp(shift, 0, rows), to = std::clamp(shift + shown, from, rows);
+    const auto first = static_cast<std::size_t>(from), last = static_cast<std::size_t>(to),
+               p = static_cast<std::size_t>(std::max(from - shift, 0)), q = p + (last - first);
+    const auto [a0, a1, b0] =
+        products_with(at.step.data() + p, at.step_place.data() + p, at.line.data() + p,
+                      on_walls_.strength.data() + first, on_line_.data() + first, last - first);
+    const double aa0 = at.aa.from_to(p, q), aa1 = at.aas.from_to(p, q), aa2 = at.aass.from_to(p, q),
+                 bb = at.bb.from_to(p, q), ab0 = at.ab.from_to(p, q), ab1 = at.abs.from_to(p, q);
+    // Strength of the walls over the place.
+    const double n = at.n.from_to(p, q), s1 = at.s.from_to(p, q), s2 = at.ss.from_to(p, q);
+    const std::size_t strong = last - static_cast<std::size_t>(std::lround(n));
+    const double w1 = on_walls_.sum.from_to(strong, last) / ww_,
+                 w2 = kStep_px * on_walls_.times_row.from_to(strong, last) / ww_ - t * kFine_px * w1;
+    const double shaft = on_walls_.squares.from_to(last, on_walls_.strength.size()) / ww_;
     // What the noise leaves of the slope: nothing where it tells less than is known before.
     const double spread = s2 - s1 * s1 / std::max(n, 1.0);
     const double raw = spread > 1 ? (w2 - s1 * w1 / n) / spread : 0;
@@ -209,66 +340,59 @@ class EndModel {
     return out;
   }
 
-  static constexpr double kFine_px = 0.25;
-
  private:
-  // Half the thickness of the glass over the radius of its middle: pulled glass keeps the ratio of inner to
-  // outer diameter of its capillary, usually 0.7.
-  static constexpr double kHalfWall = 0.17;
-  double noise2_ = 0;  // grey levels squared times px squared, of a product with one row
-  double line_behind_ = 0, ww_ = 0, wl_ = 0, ll_ = 0;
-  static constexpr double kTails = 5;  // blurs ahead of the end, where nothing of it is left
-  static constexpr double kTo_px =
-      24;  // behind the end; further back the strength of the walls tells nothing
   static constexpr double kSlope = 0.01;  // usual slope of the walls' strength, per px
   static constexpr double kSteepest = 0.02, kWeakest = 0.6,
                           kStrongest = 1.6;  // of the usual strength, per px
-  std::vector<double> on_walls_, on_line_;
-  std::vector<double> step_, bump_;  // every kFine_px
-  int zero_ = 0;
+  double noise2_;  // grey levels squared times px squared, of a product with one row
+  double ww_, wl_, ll_;
+  const EndRows& end_;
+  const OnWalls& on_walls_;
+  Vector<double> on_line_;
 };
 
 // The likelihood of every end of the range, in grey levels squared.
 struct Ends {
   double first = 0;  // behind the tip of the pose, px
-  std::vector<double> at;
+  Vector<double> at;
   std::size_t best = 0;
   bool plain = false;
   double blur = 0;  // px
   [[nodiscard]] double top() const { return at[best]; }
   [[nodiscard]] double behind() const {
-    return first + (static_cast<double>(best) + 2 * vertex_offset(at[best - 2], top(), at[best + 2])) *
-                       EndModel::kFine_px;
+    return first +
+           (static_cast<double>(best) + 2 * vertex_offset(at[best - 2], top(), at[best + 2])) * kFine_px;
   }
   [[nodiscard]] double curvature() const {
-    constexpr double kApart = 2 * EndModel::kFine_px;
+    constexpr double kApart = 2 * kFine_px;
     return (2 * top() - at[best - 2] - at[best + 2]) / (kApart * kApart);
   }
 };
 
 // The most likely end from `from` to `to` px behind the tip, by the walls of the shaft from `shaft_from` to
 // `shaft_to`. Empty when it lies outside of the range.
-std::optional<Ends> best_end(const Rows& rows, double half_width, double from, double to, double shaft_from,
-                             double shaft_to, double noise2) {
-  constexpr std::array kBlurs_px = {1.4, 1.7, 2.1, 2.6, 3.2, 4.0};
+std::optional<Ends> best_end(const Rows& rows, std::span<const EndRows> blurred, double half_width,
+                             double from, double to, double shaft_from, double shaft_to, double noise2) {
   const auto walls = usual_row(rows, shaft_from, shaft_to);
   if (!walls || product(*walls, *walls, half_width) < 1e-6) {
     return std::nullopt;
   }
-  const int first = static_cast<int>(std::lround((from - rows.first_s) / EndModel::kFine_px));
-  const int ends = static_cast<int>((to - from) / EndModel::kFine_px) + 1;
+  const int first = static_cast<int>(std::lround((from - rows.first_s) / kFine_px));
+  const int ends = static_cast<int>((to - from) / kFine_px) + 1;
   Ends found;
-  for (const double blur : kBlurs_px) {
-    const EndModel model(rows, *walls, half_width, blur, noise2);
+  const OnWalls on_walls(rows, *walls, half_width);
+  for (const EndRows& end : blurred) {
+    const EndModel model(rows, on_walls, *walls, end, half_width, noise2);
     Ends g;
+    g.at.reserve(static_cast<std::size_t>(ends));
     for (int e = 0; e < ends; ++e) {
       g.at.push_back(model.fit(first + e).gain);
     }
     g.best = static_cast<std::size_t>(std::max_element(g.at.begin(), g.at.end()) - g.at.begin());
     if (found.at.empty() || g.top() > found.top()) {
-      g.plain = model.fit(first + static_cast<int>(g.best)).plain && blur < kBlurs_px.back();
-      g.first = rows.first_s + first * EndModel::kFine_px;
-      g.blur = blur;
+      g.plain = model.fit(first + static_cast<int>(g.best)).plain && &end != &blurred.back();
+      g.first = rows.first_s + first * kFine_px;
+      g.blur = end.blur;
       found = std::move(g);
     }
   }
@@ -281,16 +405,19 @@ std::optional<Ends> best_end(const Rows& rows, double half_width, double from, d
 }  // namespace
 
 std::optional<GlassEnd> end_of_glass(const GradientField& field, double noise, const NeedlePose& needle,
-                                     double back, double ahead) {
+                                     double bevel, double back, double ahead) {
   constexpr double kMargin_px = 6;  // the blur of the end reaches so far
   constexpr double kNear_px = 24;   // of the shaft look as its end, however it widens
   constexpr double kAgain_px = 3;   // round the first result
-  const Rows rows = rows_along(field, needle, -ahead - kMargin_px, back + kTail_px + kShaft_px);
+  const Rows rows = rows_along(field, needle, bevel, -ahead - kMargin_px, back + kTail_px + kShaft_px);
   if (rows.seen.empty()) {
     return std::nullopt;
   }
+  const std::array<EndRows, 6> blurred{EndRows{needle.half_width, 1.4}, EndRows{needle.half_width, 1.7},
+                                       EndRows{needle.half_width, 2.1}, EndRows{needle.half_width, 2.6},
+                                       EndRows{needle.half_width, 3.2}, EndRows{needle.half_width, 4.0}};
   // First with the shaft behind the range, then with the shaft just behind the end.
-  auto found = best_end(rows, needle.half_width, -ahead, back, back + kMargin_px,
+  auto found = best_end(rows, blurred, needle.half_width, -ahead, back, back + kMargin_px,
                         back + kMargin_px + kShaft_px, noise * noise);
   // Gain over variance: the smoothed noise weighs less on what is about as wide as the smoothing.
   constexpr double kSmoothed = 0.6;
@@ -301,13 +428,14 @@ std::optional<GlassEnd> end_of_glass(const GradientField& field, double noise, c
   }
   if (found) {
     const double end = found->behind();
-    found = best_end(rows, needle.half_width, end - kAgain_px, end + kAgain_px, end + kMargin_px,
+    found = best_end(rows, blurred, needle.half_width, end - kAgain_px, end + kAgain_px, end + kMargin_px,
                      end + kMargin_px + kNear_px, noise * noise);
   }
   if (!found || !found->plain) {
     return std::nullopt;
   }
-  return GlassEnd{-found->behind(), std::sqrt(2 * unit / std::max(found->curvature(), 1e-9)), found->blur};
+  return GlassEnd{-found->behind() + std::abs(bevel) * outer_radius_of_glass(needle.half_width, found->blur),
+                  std::sqrt(2 * unit / std::max(found->curvature(), 1e-9)), found->blur};
 }
 
 }  // namespace punctum::vision

@@ -16,9 +16,11 @@ struct GlassEnd {
   double blur = 0;   // of walls and line, px
 };
 
-// From `back` px behind the tip of the pose to `ahead` px ahead of it. noise: grey levels. Empty where the
-// walls do not stand out, or do not end.
+// The outermost glass, from `back` px behind the tip of the pose to `ahead` px ahead of it. noise: grey
+// levels. bevel: by how much further back the glass ends, per px across the axis. Empty where the walls do
+// not stand out, or do not end.
 [[nodiscard]] std::optional<GlassEnd> end_of_glass(const GradientField& field, double noise,
-                                                   const NeedlePose& needle, double back, double ahead);
+                                                   const NeedlePose& needle, double bevel, double back,
+                                                   double ahead);
 
 }  // namespace punctum::vision

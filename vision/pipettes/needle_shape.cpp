@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstring>
+#include <limits>
 #include <numeric>
-#include <span>
 
 #include "hal/math/elementary.hpp"
+#include "vision/image/dispatched.hpp"
 #include "vision/image/parabola.hpp"
 
 namespace punctum::vision {
@@ -63,9 +65,17 @@ std::optional<NeedleShape::Profile> NeedleShape::light_across(const GradientFiel
     }
   }
   Profile light{};
+  const Point from = needle.at(behind, -reach_),
+              step = 1.0 / (kLanes - 1) * (needle.at(behind, reach_) - from);
+  if (field.contains(from, step, kLanes)) {
+    std::array<float, kLanes + GradientField::kAtOnce> grey;
+    field.greys(from, step, kLanes, grey.data());
+    std::copy_n(grey.begin(), kLanes, light.begin());
+    return light;
+  }
   for (std::size_t i = 0; i < kLanes; ++i) {
     const Point p = needle.at(behind, static_cast<double>(kPlaces[i]) * reach_);
-    light[i] = static_cast<float>(Bilinear(p.x - a.x, p.y - a.y).of(field.smooth));
+    light[i] = Bilinear(p.x - a.x, p.y - a.y).of(field.smooth);
   }
   return light;
 }
@@ -103,7 +113,7 @@ void NeedleShape::learn(const GradientField& field, const NeedlePose& needle) {
     constexpr double kBeside_px = 2.5;  // the blur of the walls
     reach_ = needle.half_width_at(20) + kBeside_px;
   }
-  std::vector<Profile> now;
+  Vector<Profile> now;
   for (int k = -kAhead; k <= kBehind; ++k) {
     const auto light = light_across(field, needle, k * kStep_px);
     if (!light) {
@@ -128,21 +138,34 @@ void NeedleShape::learn(const GradientField& field, const NeedlePose& needle) {
 
 namespace {
 
-// As median_of, of each lane by itself. The order of the rows is lost.
-template <std::size_t kLanes>
-std::array<float, kLanes> median_by_lane(std::span<std::array<float, kLanes>> rows) {
-  const std::size_t middle = rows.size() / 2;
-  for (std::size_t k = 0; k <= middle; ++k) {
-    for (std::size_t j = k + 1; j < rows.size(); ++j) {
-      float *lower = rows[k].data(), *upper = rows[j].data();
-      for (std::size_t i = 0; i < kLanes; ++i) {
-        const float a = lower[i], b = upper[i];
-        lower[i] = b < a ? b : a;
-        upper[i] = b < a ? a : b;
-      }
+using EightFloats = float __attribute__((vector_size(32)));
+
+// As median_of, of each of eight columns by itself: the lowest to the front, one by one, as far as the
+// middle.
+template <std::size_t kRows>
+[[gnu::always_inline]] inline void median_of_eight(const float* rows, std::size_t apart, float* out) {
+  std::array<EightFloats, kRows> v;
+  for (std::size_t k = 0; k < kRows; ++k) {
+    std::memcpy(&v[k], rows + k * apart, sizeof v[k]);
+  }
+#pragma GCC unroll 16
+  for (std::size_t k = 0; k <= kRows / 2; ++k) {
+#pragma GCC unroll 16
+    for (std::size_t j = k + 1; j < kRows; ++j) {
+      const EightFloats a = v[k], b = v[j];
+      v[k] = b < a ? b : a;
+      v[j] = b < a ? a : b;
     }
   }
-  return rows[middle];
+  std::memcpy(out, &v[kRows / 2], sizeof v[0]);
+}
+
+// Of each of the first `many` columns, a multiple of eight.
+PUNCTUM_WIDE_LOOP void median_of_thirteen(const float* rows, std::size_t apart, std::size_t many,
+                                          float* out) {
+  for (std::size_t i = 0; i < many; i += 8) {
+    median_of_eight<13>(rows + i, apart, out + i);
+  }
 }
 
 }  // namespace
@@ -154,9 +177,13 @@ void NeedleShape::smooth_along_shaft() {
   const std::size_t tip = kAhead + (frames_ < kMemory / 2 ? 8 : 16);
   constexpr std::size_t kReach = 24, kStride = 4;  // steps: a speck is shorter
   constexpr double kBlur_px = 4;                   // ahead of the face
+  constexpr float kNoAbsorption = std::numeric_limits<float>::max();
   Profiles& shape = shape_.front().rows;
   shape = mean_;
-  std::array<Profile, 2 * kReach / kStride + 1> near;
+  constexpr std::size_t kMost = 2 * kReach / kStride + 1, kPadded = (kLanes + 7) / 8 * 8;
+  static_assert(kMost == 13);
+  std::array<std::array<float, kPadded>, kMost> near{};
+  std::array<float, kPadded> median{};
   for (std::size_t k = tip; k < mean_.size(); ++k) {
     std::size_t from = std::max(tip, k - kReach), to = std::min(mean_.size() - 1, k + kReach);
     if (frames_ >= kMemory / 2) {  // even, so that a needle that widens is not drawn to one side
@@ -164,11 +191,17 @@ void NeedleShape::smooth_along_shaft() {
       from = k - reach;
       to = k + reach;
     }
-    std::size_t n = 0;
-    for (std::size_t j = from; j <= to; j += kStride) {
-      near[n++] = mean_[j];
+    // Near the ends there are fewer rows; others on either side of all values leave the median as it is.
+    const std::size_t n = (to - from) / kStride + 1, below = kMost / 2 - n / 2;
+    for (std::size_t j = 0; j < kMost; ++j) {
+      if (j < below || j >= below + n) {
+        near[j].fill(j < below ? -kNoAbsorption : kNoAbsorption);
+      } else {
+        std::copy_n(mean_[from + (j - below) * kStride].begin(), kLanes, near[j].begin());
+      }
     }
-    shape[k] = median_by_lane(std::span(near).first(n));
+    median_of_thirteen(near[0].data(), kPadded, kPadded, median.data());
+    std::copy_n(median.begin(), kLanes, shape[k].begin());
   }
   const double front = kAhead - (face().value_or(0) + kBlur_px) / kStep_px;
   for (std::size_t k = 0; k < kAhead && static_cast<double>(k) < front; ++k) {
@@ -240,7 +273,7 @@ std::optional<double> NeedleShape::face() const {
 void NeedleShape::blur(double sigma_px, Profiles& out) const {
   out = shape_.front().rows;
   const auto kernel = [](double sigma) {
-    std::vector<float> k;
+    Vector<float> k;
     float sum = 0;
     for (int i = -static_cast<int>(std::ceil(3 * sigma)); i <= std::ceil(3 * sigma); ++i) {
       k.push_back(static_cast<float>(math::exp(-0.5 * i * i / (sigma * sigma))));
@@ -253,7 +286,7 @@ void NeedleShape::blur(double sigma_px, Profiles& out) const {
   };
   const auto across = kernel(sigma_px * (kLanes - 1) / (2 * reach_)), along = kernel(sigma_px / kStep_px);
   const int m = static_cast<int>(across.size() / 2), l = static_cast<int>(along.size() / 2);
-  std::vector<float> wide(across.size() - 1 + kLanes, 0.0F);  // with nothing on either side
+  Vector<float> wide(across.size() - 1 + kLanes, 0.0F);  // with nothing on either side
   for (Profile& p : out) {
     const float beside = 0.5F * (p.front() + p.back());  // there is no needle
     for (std::size_t i = 0; i < kLanes; ++i) {
@@ -292,40 +325,59 @@ float gain_of_row(float product, float power) {
 
 }  // namespace
 
+namespace {
+
+// Of n ends, a multiple of eight: the products of a row of the picture with rows of the shape, whose lanes
+// lie `size` apart, in three sums that do not wait for each other; and what each tells for the needle.
+template <std::size_t kLanes>
+[[gnu::always_inline]] inline void add_gains_of_row(const float* row, const float* lane, std::size_t size,
+                                                    const float* power, std::size_t n, float* gain) {
+  constexpr std::size_t kEight = 8;
+  for (std::size_t q = 0; q < n; q += kEight) {
+    std::array<EightFloats, 3> sum{};
+    EightFloats of_lane, of_power, here;
+#pragma GCC unroll 21
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      std::memcpy(&of_lane, lane + i * size + q, sizeof of_lane);
+      sum[i % 3] += row[i] * of_lane;
+    }
+    std::memcpy(&of_power, power + q, sizeof of_power);
+    std::memcpy(&here, gain + q, sizeof here);
+    const EightFloats product = sum[0] + sum[1] + sum[2], least = -0.5F * of_power, most = 1.5F * of_power,
+                      bounded = product < least ? least : product;
+    here += (bounded > most ? most : bounded) + least;
+    std::memcpy(gain + q, &here, sizeof here);
+  }
+}
+
+PUNCTUM_WIDE_LOOP void add_gains(const float* row, const float* lane, std::size_t size, const float* power,
+                                 std::size_t n, float* gain) {
+  add_gains_of_row<21>(row, lane, size, power, n, gain);
+}
+
+constexpr std::size_t kEndsAtOnce = 8;
+
+}  // namespace
+
 void NeedleShape::Look::arrange() {
   const std::size_t n = rows.size();
-  power.resize(n);
-  lanes.resize(kLanes * n);
+  power.assign(n + kEndsAtOnce, 0.0F);
+  lanes.assign(kLanes * (n + kEndsAtOnce), 0.0F);
   for (std::size_t k = 0; k < n; ++k) {
     const Profile& row = rows[n - 1 - k];
     power[k] = product(row, row);
     for (std::size_t i = 0; i < kLanes; ++i) {
-      lanes[i * n + k] = row[i];
-    }
-  }
-}
-
-// Of a row of the picture with the n rows of the shape from the k-th on, the last one being the first.
-void NeedleShape::Look::products(const Profile& row, std::size_t k, std::size_t n, float* out) const {
-  constexpr std::size_t kAtOnce = 7;  // lanes: the compiler keeps them in registers
-  static_assert(kLanes % kAtOnce == 0);
-  std::fill_n(out, n, 0.0F);
-  for (std::size_t i = 0; i < kLanes; i += kAtOnce) {
-    const std::size_t size = rows.size();
-    const float *r = row.data() + i, *lane = lanes.data() + i * size + k;
-    for (std::size_t q = 0; q < n; ++q) {
-      out[q] += r[0] * lane[q] + r[1] * lane[q + size] + r[2] * lane[q + 2 * size] +
-                r[3] * lane[q + 3 * size] + r[4] * lane[q + 4 * size] + r[5] * lane[q + 5 * size] +
-                r[6] * lane[q + 6 * size];
+      lanes[i * (n + kEndsAtOnce) + k] = row[i];
     }
   }
 }
 
 // Of the ends from..to - 1; the shape of the e-th end begins at the e-th row. This is where the needle's time
 // goes: row by row of the picture, all ends at once.
-std::vector<float> NeedleShape::gains(const Profiles& seen, const Look& look, int from, int to) {
+Vector<float> NeedleShape::gains(const Profiles& seen, const Look& look, int from, int to) {
   const int n = static_cast<int>(seen.size()), last = static_cast<int>(look.rows.size()) - 1;
-  std::vector<float> gain(static_cast<std::size_t>(to - from), 0.0F), sum(gain);
+  static_assert(kLanes == 21);
+  Vector<float> gain(static_cast<std::size_t>(to - from) + kEndsAtOnce, 0.0F);
   for (int j = from; j < n; ++j) {
     const Profile& row = seen[static_cast<std::size_t>(j)];
     // Of the ends so far ahead that the row lies behind their shape, the shaft goes on as the shape ends.
@@ -335,14 +387,15 @@ std::vector<float> NeedleShape::gains(const Profiles& seen, const Look& look, in
       std::for_each(gain.begin(), gain.begin() + (first - from), [shaft](float& g) { g += shaft; });
     }
     if (ends > 0) {
-      const std::size_t k = static_cast<std::size_t>(last - j + first), many = static_cast<std::size_t>(ends);
-      look.products(row, k, many, sum.data());
-      float* of_ends = gain.data() + (first - from);
-      for (std::size_t q = 0; q < many; ++q) {
-        of_ends[q] += gain_of_row(sum[q], look.power[k + q]);
-      }
+      // What the last eight have too many of belongs to ends whose shape this row lies ahead of: with rows
+      // beyond the first one of the shape, which are 0.
+      const std::size_t k = static_cast<std::size_t>(last - j + first), many = static_cast<std::size_t>(ends),
+                        room = look.rows.size() + kEndsAtOnce;
+      add_gains(row.data(), look.lanes.data() + k, room, look.power.data() + k,
+                (many + kEndsAtOnce - 1) / kEndsAtOnce * kEndsAtOnce, gain.data() + (first - from));
     }
   }
+  gain.resize(static_cast<std::size_t>(to - from));
   return gain;
 }
 
@@ -381,6 +434,8 @@ std::optional<NeedleShape::End> NeedleShape::end(const GradientField& field, con
   const int ends = static_cast<int>((back + ahead) / kStep_px) + 1;
   // A backdrop takes granules off, unless they have moved since; then it doubles them.
   Profiles plain, over;
+  plain.reserve(static_cast<std::size_t>(ends + kBehind));
+  over.reserve(plain.capacity());
   for (int j = -kAhead; j < ends + kBehind - kAhead; ++j) {
     const double behind = j * kStep_px - ahead;
     const auto light = light_across(field, needle, behind);
@@ -421,6 +476,7 @@ std::optional<double> NeedleShape::end_near(View view, const GradientField& fiel
                                             const NeedlePose& needle, double reach) {
   const int ends = static_cast<int>(2 * reach / kStep_px) + 1;
   Profiles seen;
+  seen.reserve(static_cast<std::size_t>(ends + kBehind));
   for (int j = -kAhead; j < ends + kBehind - kAhead; ++j) {
     const double behind = j * kStep_px - reach;
     const auto light = light_across(field, needle, behind);

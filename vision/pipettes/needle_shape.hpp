@@ -5,9 +5,9 @@
 #include <array>
 #include <cstddef>
 #include <optional>
-#include <vector>
 
 #include "vision/image/gradient.hpp"
+#include "vision/image/kept_vector.hpp"
 #include "vision/pipettes/backdrop.hpp"
 #include "vision/pipettes/needle_pose.hpp"
 
@@ -53,7 +53,7 @@ class NeedleShape {
   // Absorption across the needle, as a share of the light, without mean and slope.
   using Profile = std::array<float, kLanes>;
 
-  using Profiles = std::vector<Profile>;  // every half pixel along the needle, from ahead of the tip
+  using Profiles = Vector<Profile>;  // every half pixel along the needle, from ahead of the tip
   [[nodiscard]] static float product(const Profile& a, const Profile& b);
   static void remove_mean_and_slope(Profile& p);
   [[nodiscard]] std::optional<Profile> light_across(const GradientField& field, const NeedlePose& needle,
@@ -65,14 +65,13 @@ class NeedleShape {
 
   // The shape in one sharpness.
   struct Look {
-    Profiles rows;             // empty: not blurred since the shape was learnt
-    std::vector<float> power;  // of the rows, the last one first
-    std::vector<float> lanes;  // the rows lane by lane, in each the last row first
-    void arrange();            // power and lanes
-    void products(const Profile& row, std::size_t k, std::size_t n, float* out) const;
+    Profiles rows;        // empty: not blurred since the shape was learnt
+    Vector<float> power;  // of the rows, the last one first, and a few of nothing
+    Vector<float> lanes;  // the same rows lane by lane
+    void arrange();       // power and lanes
   };
   struct Fit {
-    std::vector<float> gain;  // of each end, over no needle; in squares of the absorption
+    Vector<float> gain;  // of each end, over no needle; in squares of the absorption
     int best = 0;
     double variance = 0;  // of a lane, once the needle is taken off
     View view;
@@ -80,7 +79,7 @@ class NeedleShape {
     [[nodiscard]] bool inside() const { return best >= 2 && best + 3 <= static_cast<int>(gain.size()); }
     [[nodiscard]] double ahead_of(double first) const;
   };
-  [[nodiscard]] static std::vector<float> gains(const Profiles& seen, const Look& look, int from, int to);
+  [[nodiscard]] static Vector<float> gains(const Profiles& seen, const Look& look, int from, int to);
   [[nodiscard]] const Look& look(std::size_t blurred);
   [[nodiscard]] Fit fit(const Profiles& seen, View view, int ends);
   [[nodiscard]] static std::optional<End> end_of(const Fit& fit, double ahead);

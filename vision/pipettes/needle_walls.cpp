@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <numbers>
 #include <opencv2/core.hpp>
-#include <vector>
 
 #include "vision/image/median.hpp"
 #include "vision/image/parabola.hpp"
@@ -24,24 +23,36 @@ std::optional<double> outer_edge(const GradientField& field, const NeedlePose& n
                                  double reach, double length, double floor) {
   constexpr double kStep_px = 0.5;
   // A wall is thin and its inner face may be twice as strong; an average over noise makes it three times.
-  const double outer_face = length > kPlain_px ? 0.35 : 0.5;
+  const float outer_face = length > kPlain_px ? 0.35F : 0.5F;
   constexpr double kAlong_px = 1.5;
   const int half = static_cast<int>(std::min(reach, kWallReachAtStart_px) / kStep_px);
   const std::size_t count = static_cast<std::size_t>(2 * half + 1);
   const int samples = 2 * static_cast<int>(length / (2 * kAlong_px)) + 1;
   const Point across(-needle.axis.y, needle.axis.x);
-  std::array<double, 2 * static_cast<std::size_t>(kWallReachAtStart_px / kStep_px) + 1> g{};
-  for (int k = 0; k <= 2 * half; ++k) {
-    double e = 0;
-    for (int i = 0; i < samples; ++i) {
-      const double t = s + (i - samples / 2) * kAlong_px;
-      const double u = u0 + std::copysign(needle.taper * (t - s), u0) + (k - half) * kStep_px;
-      e += field.gradient(needle.at(t, u)).dot(across) / samples;
+  std::array<float, 2 * static_cast<std::size_t>(kWallReachAtStart_px / kStep_px) + 1> g{};
+  std::array<float, g.size() + GradientField::kAtOnce> gx{}, gy{};
+  for (int i = 0; i < samples; ++i) {
+    const double t = s + (i - samples / 2) * kAlong_px;
+    const double u = u0 + std::copysign(needle.taper * (t - s), u0) - half * kStep_px;
+    const Point from = needle.at(t, u), step = kStep_px * across;
+    const int n = 2 * half + 1;
+    if (field.contains(from, step, n)) {
+      field.gradients(from, step, n, gx.data(), gy.data());
+    } else {
+      for (int k = 0; k < n; ++k) {
+        const Point here = field.gradient(from + k * step);
+        gx[static_cast<std::size_t>(k)] = static_cast<float>(here.x);
+        gy[static_cast<std::size_t>(k)] = static_cast<float>(here.y);
+      }
     }
-    g[static_cast<std::size_t>(k)] = std::abs(e);
+    const auto ax = static_cast<float>(across.x / samples), ay = static_cast<float>(across.y / samples);
+    for (std::size_t k = 0; k < count; ++k) {
+      g[k] += gx[k] * ax + gy[k] * ay;
+    }
   }
+  std::transform(g.begin(), g.end(), g.begin(), [](float e) { return std::abs(e); });
   const auto is_peak = [&g](std::size_t k) { return g[k] >= g[k - 1] && g[k] >= g[k + 1]; };
-  double strongest = 0;
+  float strongest = 0;
   for (std::size_t k = 1; k + 1 < count; ++k) {
     if (is_peak(k)) {
       strongest = std::max(strongest, g[k]);
@@ -50,10 +61,12 @@ std::optional<double> outer_edge(const GradientField& field, const NeedlePose& n
   for (std::size_t q = 1; q + 1 < count; ++q) {
     const std::size_t k = u0 > 0 ? count - 1 - q : q;  // from outside
     if (is_peak(k) && g[k] >= outer_face * strongest) {
-      if (strongest < floor) {
+      if (static_cast<double>(strongest) < floor) {
         return std::nullopt;
       }
-      const double at = static_cast<int>(k) - half + vertex_offset(g[k - 1], g[k], g[k + 1]);
+      const double at = static_cast<int>(k) - half +
+                        vertex_offset(static_cast<double>(g[k - 1]), static_cast<double>(g[k]),
+                                      static_cast<double>(g[k + 1]));
       return u0 + at * kStep_px;
     }
   }
@@ -61,14 +74,18 @@ std::optional<double> outer_edge(const GradientField& field, const NeedlePose& n
 }
 
 struct ShaftStations {
-  std::vector<double> along, middle, half;
+  Vector<double> along, middle, half;
   int tried = 0;
 };
 
 ShaftStations stations_along(const GradientField& field, const NeedlePose& needle, double reach,
                              double length, double floor) {
   const cv::Rect& a = field.area;
+  constexpr std::size_t kMost = 33;
   ShaftStations out;
+  for (Vector<double>* v : {&out.along, &out.middle, &out.half}) {
+    v->reserve(kMost);
+  }
   for (double s = 8; s < 170; s += 5) {
     const Point p = needle.at(s, 0);
     if (p.x < a.x + 3 || p.x > a.x + a.width - 4 || p.y < a.y + 3 || p.y > a.y + a.height - 4) {
@@ -101,12 +118,22 @@ std::optional<Profile> cross_profile(const GradientField& field, const NeedlePos
   Profile v{};
   double mean = 0, tilt = 0, xx = 0;
   const auto place = [](std::size_t i) { return 2.0 * static_cast<double>(i) / (kLanes - 1) - 1; };
+  const Point from = needle.at(s, -kProfileReach * w),
+              step = 1.0 / (kLanes - 1) * (needle.at(s, kProfileReach * w) - from);
+  std::array<float, kLanes + GradientField::kAtOnce> grey{};
+  const bool whole = field.contains(from, step, kLanes);
+  if (whole) {
+    field.greys(from, step, kLanes, grey.data());
+  }
   for (std::size_t i = 0; i < kLanes; ++i) {
-    const Point p = needle.at(s, place(i) * kProfileReach * w);
-    if (p.x < a.x + 1 || p.y < a.y + 1 || p.x > a.x + a.width - 2 || p.y > a.y + a.height - 2) {
-      return std::nullopt;
+    if (!whole) {
+      const Point p = from + static_cast<double>(i) * step;
+      if (p.x < a.x + 1 || p.y < a.y + 1 || p.x > a.x + a.width - 2 || p.y > a.y + a.height - 2) {
+        return std::nullopt;
+      }
+      grey[i] = static_cast<float>(field.grey(p));
     }
-    v[i] = field.grey(p);
+    v[i] = static_cast<double>(grey[i]);
     mean += v[i] / kLanes;
   }
   for (std::size_t i = 0; i < kLanes; ++i) {
@@ -162,7 +189,7 @@ double fit_walls_averaged(const GradientField& field, double noise, double radiu
   if (static_cast<double>(n) < std::max(4.0, 2.5 * length / kStations_px)) {  // fewer are not independent
     return 0;
   }
-  std::vector<double> weight(n, 1.0);
+  Vector<double> weight(n, 1.0);
   StraightLine middle, half;
   for (int round = 0; round < 5; ++round) {
     const auto new_middle = fit_line(stations.along, stations.middle, weight);
@@ -232,7 +259,10 @@ std::optional<double> end_of_profile(const GradientField& field, const NeedlePos
     return std::nullopt;
   }
   // How much of the shaft's profile each station holds, and its distance ahead of the tip.
-  std::vector<double> share, place;
+  Vector<double> share, place;
+  for (Vector<double>* v : {&share, &place}) {
+    v->reserve(static_cast<std::size_t>((back + ahead) / kStep_px) + 1);
+  }
   for (double s = back; s >= -ahead; s -= kStep_px) {
     const auto v = cross_profile(field, needle, s);
     if (!v) {
@@ -259,8 +289,8 @@ std::optional<double> end_of_profile(const GradientField& field, const NeedlePos
     return std::nullopt;
   }
   // Sub-pixel: half of the share just before the end. Blur does not move the middle of a step.
-  const std::vector<double> before(share.begin() + static_cast<std::ptrdiff_t>(last >= 24 ? last - 24 : 0),
-                                   share.begin() + static_cast<std::ptrdiff_t>(last - 6));
+  const Vector<double> before(share.begin() + static_cast<std::ptrdiff_t>(last >= 24 ? last - 24 : 0),
+                              share.begin() + static_cast<std::ptrdiff_t>(last - 6));
   const double half = 0.5 * median_of(before);
   for (std::size_t i = last - 6; i + 1 < std::min(share.size(), last + 8); ++i) {
     if (share[i] >= half && share[i + 1] < half) {
@@ -274,7 +304,7 @@ std::optional<double> steepest_wall_step(const GradientField& field, const Needl
                                          double floor, double sign) {
   constexpr double kStep_px = 0.25;
   const int n = 2 * static_cast<int>(reach / kStep_px) + 1;
-  std::vector<double> g(static_cast<std::size_t>(n), 0.0);
+  Vector<double> g(static_cast<std::size_t>(n), 0.0);
   for (int i = 0; i < n; ++i) {
     const double ahead = (i - n / 2) * kStep_px;
     double e = 0;

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
+#include <cstdint>
 
 #include "hal/math/elementary.hpp"
 
@@ -27,16 +27,37 @@ Polygon holder_polygon(const TubeTrace& tube, const Point& mouth, cv::Size pictu
   return {front - w * across, front + w * across, rear + w * across, rear - w * across};
 }
 
-void draw_mask(cv::Mat& mask, const std::vector<Polygon>& polygons) {
-  constexpr int kShift = 4;
-  for (const Polygon& p : polygons) {
-    std::vector<cv::Point> fixed;
-    for (const Point& q : p) {
-      fixed.emplace_back(static_cast<int>(std::lround(std::clamp(q.x, -3e4, 3e4) * (1 << kShift))),
-                         static_cast<int>(std::lround(std::clamp(q.y, -3e4, 3e4) * (1 << kShift))));
+// What of the border lies within half a pixel of the row spans it.
+cv::Range touched_in_row(const Polygon& polygon, int y, int columns) {
+  double left = columns, right = -1;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Point &a = polygon[i], &b = polygon[i + 1 < polygon.size() ? i + 1 : 0];
+    const double from = std::max(std::min(a.y, b.y), y - 0.5), to = std::min(std::max(a.y, b.y), y + 0.5);
+    if (!(from <= to)) {
+      continue;
     }
-    if (fixed.size() >= 3) {
-      cv::fillPoly(mask, std::vector<std::vector<cv::Point>>{fixed}, cv::Scalar(255), cv::LINE_8, kShift);
+    const bool level = std::abs(b.y - a.y) < 1e-9;
+    const double turn = level ? 0 : (b.x - a.x) / (b.y - a.y);
+    const double x0 = level ? a.x : a.x + (from - a.y) * turn, x1 = level ? b.x : a.x + (to - a.y) * turn;
+    left = std::min({left, x0, x1});
+    right = std::max({right, x0, x1});
+  }
+  const int end = static_cast<int>(std::lround(std::clamp(right, -1.0, columns - 1.0))) + 1;
+  return {std::min(static_cast<int>(std::lround(std::clamp(left, 0.0, static_cast<double>(columns)))), end),
+          end};
+}
+
+void draw_mask(cv::Mat& mask, std::span<const Polygon> polygons) {
+  for (const Polygon& p : polygons) {
+    double top = mask.rows, bottom = -1;
+    for (const Point& q : p) {
+      top = std::min(top, q.y);
+      bottom = std::max(bottom, q.y);
+    }
+    const int last = static_cast<int>(std::floor(std::min(bottom + 0.5, mask.rows - 1.0)));
+    for (int y = static_cast<int>(std::floor(std::max(top + 0.5, 0.0))); y <= last; ++y) {
+      const cv::Range x = touched_in_row(p, y, mask.cols);
+      std::fill(mask.ptr(y) + x.start, mask.ptr(y) + x.end, std::uint8_t{255});
     }
   }
 }

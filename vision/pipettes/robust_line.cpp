@@ -5,10 +5,10 @@
 
 namespace punctum::vision {
 
-RobustLine fit_robust_line(const std::vector<double>& x, const std::vector<double>& y,
-                           const std::vector<double>& weight, double scale) {
+RobustLine fit_robust_line(const Vector<double>& x, const Vector<double>& y, const Vector<double>& weight,
+                           double scale) {
   RobustLine out;
-  std::vector<double> w = weight;
+  Vector<double> w = weight;
   for (int round = 0; round < 5; ++round) {
     const auto line = fit_line(x, y, w);
     if (!line) {

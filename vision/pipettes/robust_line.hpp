@@ -2,8 +2,8 @@
 #pragma once
 
 #include <optional>
-#include <vector>
 
+#include "vision/image/kept_vector.hpp"
 #include "vision/image/straight_line.hpp"
 
 namespace punctum::vision {
@@ -15,7 +15,7 @@ struct RobustLine {
 
 // Points further than `scale` from the line count less (Cauchy's weights). Where the points do not determine
 // a line, it is y = 0 without residuals.
-[[nodiscard]] RobustLine fit_robust_line(const std::vector<double>& x, const std::vector<double>& y,
-                                         const std::vector<double>& weight, double scale);
+[[nodiscard]] RobustLine fit_robust_line(const Vector<double>& x, const Vector<double>& y,
+                                         const Vector<double>& weight, double scale);
 
 }  // namespace punctum::vision

@@ -37,6 +37,20 @@ void TipByStage::begin(const std::optional<Point>& stage) {
   variance_ += squared(kStageDrift_px);
 }
 
+void TipByStage::after_gap() {
+  constexpr double kDrift_px = 1;
+  stage_.reset();
+  rest_.reset();
+  disagreements_ = 0;
+  variance_ += squared(kDrift_px);
+}
+
+void TipByStage::forget() {
+  const auto stage = stage_;
+  *this = {};
+  stage_ = stage;
+}
+
 std::optional<Point> TipByStage::tip() const {
   return stage_ && frames_ > 0 ? std::optional(*stage_ + off_) : std::nullopt;
 }
@@ -51,7 +65,8 @@ NeedlePose TipByStage::most_likely(const NeedlePose& seen) {
   const double apart = (*told - seen.tip).dot(seen.axis);
   // What is wrong in every frame is wrong in both.
   const double of_both = squared(seen.constant_sd);
-  const double of_picture = squared(seen.sd) - of_both, of_stage = variance_ + scatter_;
+  const double of_stage = variance_ + scatter_;
+  double of_picture = squared(seen.sd) - of_both;
   const bool disagree = std::abs(apart) > std::max(kMost_px, kMost_sd * std::sqrt(of_picture + of_stage));
   disagreements_ = disagree ? disagreements_ + 1 : 0;
   if (disagreements_ > kDisagreements) {
@@ -59,6 +74,10 @@ NeedlePose TipByStage::most_likely(const NeedlePose& seen) {
   }
   if (disagree) {
     return seen;
+  }
+  // Something is taken for its end: the picture errs by as much as that.
+  if (squared(apart) > squared(kMost_sd) * (of_picture + of_stage)) {
+    of_picture = squared(apart);
   }
   NeedlePose both = seen;
   both.tip += of_picture / (of_picture + of_stage) * apart * seen.axis;

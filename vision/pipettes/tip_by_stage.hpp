@@ -20,6 +20,9 @@ class TipByStage {
   // Takes in how far off the stage is. Only while nothing touches the tip.
   void learn(const NeedlePose& seen);
   [[nodiscard]] double sd() const;  // of tip() along the axis, px
+  // No frame was seen for a while: it may have drifted, and moved by any distance.
+  void after_gap();
+  void forget();  // all but where the stage is
   // The manipulator has moved the needle, and what is seen as its tip stayed: it is something else.
   [[nodiscard]] bool picture_stays() const { return picture_stays_; }
 

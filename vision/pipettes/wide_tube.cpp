@@ -4,9 +4,10 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <numeric>
 #include <opencv2/core.hpp>
-#include <vector>
+#include <utility>
 
 #include "vision/image/parabola.hpp"
 #include "vision/pipettes/border_section.hpp"
@@ -16,15 +17,18 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr double kStride_px = 1.5;
+constexpr double kWideStride_px = 1.5;
 constexpr std::size_t kUsualStations = 10;  // at the border they tell what the walls look like
-constexpr double kContinued = 0.5;          // of that: the tube goes on
+constexpr double kWallContinued = 0.5;      // of that: the tube goes on
 constexpr double kSurely = 0.8;             // and its other wall tells so
+constexpr int kNoWallMost = 5;              // stations in a row without either wall: what follows is the cell
+constexpr int kCrossedMost = 16;            // stations in a row with a speck on one wall
+constexpr double kLong_px = 60;             // a tube that is traced so far is none of a speck
 constexpr double kAlike = 0.75;             // correlation of one look of a wall with another
-constexpr double kGiveUp = 3;               // so far below its best value the sum does not recover
+constexpr double kWallGiveUp = 3;           // so far below its best value the sum does not recover
 
 struct Stations {
-  std::vector<double> along, middle, half, similarity;
+  Vector<double> along, middle, half, similarity;
   void resize(std::size_t n) {
     for (auto* v : {&along, &middle, &half, &similarity}) {
       v->resize(n);
@@ -38,14 +42,19 @@ constexpr std::size_t kWallSamples = 17;
 using WallProfile = std::array<double, kWallSamples>;
 constexpr std::size_t kBeside = 6;  // steps to either side, in which a wall is looked for at the next station
 
+// Averaged over 2 `lines` of them, along the tube.
 template <std::size_t samples>
 std::array<double, samples> greys_across(const GradientField& field, const Point& p, const Point& along,
-                                         const Point& across) {
+                                         const Point& across, int lines) {
+  constexpr double kApart_px = 0.8;
   std::array<double, samples> out{};
   for (std::size_t i = 0; i < samples; ++i) {
     const double u = (static_cast<double>(i) - static_cast<double>(samples / 2)) * kWallStep_px;
-    const Point q = p + u * across;
-    out[i] = 0.5 * (field.grey(q - 0.4 * along) + field.grey(q + 0.4 * along));
+    for (int k = 0; k < lines; ++k) {
+      const double s = (k + 0.5) * kApart_px;
+      out[i] +=
+          (field.grey(p + u * across - s * along) + field.grey(p + u * across + s * along)) / (2 * lines);
+    }
   }
   return out;
 }
@@ -65,15 +74,16 @@ double dot(const WallProfile& a, const WallProfile& b) {
 }
 
 // Follows both outer edges, each near where it was, by what they look like at the border. The tube
-// ends where the sum of (similarity - kContinued) is largest. Empty when it does not end in the picture.
-std::optional<Stations> follow_edges(const GradientField& field, const TubeTrace& t, const Point& across) {
+// ends where the sum of (similarity - kWallContinued) is largest. Empty when it does not end in the picture.
+std::optional<Stations> follow_edges(const GradientField& field, const TubeTrace& t, const Point& across,
+                                     double noise) {
   std::array<double, 2> at{-t.half_width, t.half_width};
   std::array<WallProfile, 2> usual{};
   for (std::size_t k = 0; k < 2; ++k) {
     for (std::size_t i = 0; i < kUsualStations; ++i) {
-      const double s = static_cast<double>(i) * kStride_px;
+      const double s = static_cast<double>(i) * kWideStride_px;
       const WallProfile wall = without_mean(
-          greys_across<kWallSamples>(field, t.root + s * t.axis + at[k] * across, t.axis, across).data());
+          greys_across<kWallSamples>(field, t.root + s * t.axis + at[k] * across, t.axis, across, 1).data());
       for (std::size_t j = 0; j < wall.size(); ++j) {
         usual[k][j] += wall[j] / kUsualStations;
       }
@@ -82,16 +92,29 @@ std::optional<Stations> follow_edges(const GradientField& field, const TubeTrace
       return std::nullopt;
     }
   }
+  // Noise makes a wall unlike itself: it is averaged along the tube until a tenth of the wall's square is
+  // left of it.
+  constexpr double kNoiseLeft = 0.1;
+  constexpr int kLinesMost = 6;
+  const double smooth_noise = noise / (2 * field.sigma * std::sqrt(std::numbers::pi));
+  const double square = std::min(dot(usual[0], usual[0]), dot(usual[1], usual[1])) / kWallSamples;
+  constexpr double kClearWall = 4, kSureWall = 50;  // times the noise
+  if (square < kClearWall * smooth_noise * smooth_noise) {
+    return std::nullopt;
+  }
+  const int lines =
+      std::clamp(static_cast<int>(smooth_noise * smooth_noise / (kNoiseLeft * square)), 1, kLinesMost);
   Stations out;
   const double longest = 0.85 * field.area.width / std::abs(t.axis.x);
   double sum = 0, sum_best = 0;
   std::size_t last = 0;
-  for (double s = 0; s < longest; s += kStride_px) {
+  int one_wall = 0, no_wall = 0;  // stations in a row
+  for (double s = 0; s < longest; s += kWideStride_px) {
     std::array<double, 2> place = at, like{-1, -1};
     for (std::size_t k = 0; k < 2; ++k) {
       WallProfile most{};
       const auto greys = greys_across<kWallSamples + 2 * kBeside>(field, t.root + s * t.axis + at[k] * across,
-                                                                  t.axis, across);
+                                                                  t.axis, across, lines);
       for (std::size_t i = 0; i <= 2 * kBeside; ++i) {
         const WallProfile wall = without_mean(greys.data() + i);
         const double as_usual = dot(wall, usual[k]) / dot(usual[k], usual[k]);
@@ -107,48 +130,43 @@ std::optional<Stations> follow_edges(const GradientField& field, const TubeTrace
       like[k] = alike < kAlike ? std::min(like[k], 0.0) : std::min({like[k], 1.0, 2.5 - like[k]});
     }
     // A speck on one wall tells nothing. Where the tube ends, both walls do.
-    const bool crossed = std::max(like[0], like[1]) > kSurely && std::min(like[0], like[1]) < kContinued;
-    const double similarity = crossed ? kContinued : std::clamp(std::min(like[0], like[1]), 0.0, 1.0);
+    const bool crossed = std::max(like[0], like[1]) > kSurely &&
+                         std::min(like[0], like[1]) < kWallContinued && ++one_wall <= kCrossedMost;
+    one_wall = std::min(like[0], like[1]) < kWallContinued ? one_wall : 0;
+    const double similarity = crossed ? kWallContinued : std::clamp(std::min(like[0], like[1]), 0.0, 1.0);
     const std::size_t count = out.along.size();
     out.along.push_back(s);
     out.middle.push_back(0.5 * (place[0] + place[1]));
     out.half.push_back(0.5 * (place[1] - place[0]));
     out.similarity.push_back(crossed ? 0 : similarity);
-    sum += similarity - kContinued;
+    sum += similarity - kWallContinued;
     if (sum > sum_best) {
       sum_best = sum;
       last = count;
     }
-    if (sum < sum_best - kGiveUp) {
+    no_wall = std::max(like[0], like[1]) < kWallContinued ? no_wall + 1 : 0;
+    if (sum < sum_best - kWallGiveUp || no_wall == kNoWallMost) {
       break;
     }
-    if (similarity > kContinued) {
+    if (similarity > kWallContinued) {
       at[0] += 0.4 * (place[0] - at[0]);
       at[1] += 0.4 * (place[1] - at[1]);
     }
   }
-  if (last < 4 || last + 1 >= out.along.size()) {
+  // Noise looks like what was learnt of it, as far as that was learnt and averaged.
+  const bool sure = square > kSureWall * smooth_noise * smooth_noise;
+  const std::size_t least = sure ? 4 : kUsualStations + 2 * static_cast<std::size_t>(lines);
+  if (last < least || last + 1 >= out.along.size()) {
     return std::nullopt;
   }
   out.resize(last + 1);
   return out;
 }
 
-}  // namespace
-
-std::optional<TubeTrace> trace_wide_tube(const GradientField& field, Side side, double width_min,
-                                         double width_max, double noise) {
-  if (field.area.width < 48 || field.area.height < 48) {
-    return std::nullopt;
-  }
-  const double strip = std::clamp(0.03 * field.area.width, 8.0, 24.0);
-  auto found = border_section(field, side, width_min, width_max, noise, strip, 0.3, 20);
-  if (!found) {
-    return std::nullopt;
-  }
-  TubeTrace& t = *found;
+// From its section at the border to its end.
+std::optional<TubeTrace> trace_section(const GradientField& field, TubeTrace t, double noise) {
   const Point across = across_tube(t.axis);
-  const auto stations = follow_edges(field, t, across);
+  const auto stations = follow_edges(field, t, across, noise);
   if (!stations) {
     return std::nullopt;
   }
@@ -166,7 +184,33 @@ std::optional<TubeTrace> trace_wide_tube(const GradientField& field, Side side, 
   t.half_width = width.line.offset;
   t.end_half_width =
       std::clamp(width.line.offset + width.line.slope * t.length, 0.5 * t.half_width, 1.5 * t.half_width);
-  return found;
+  return t;
+}
+
+}  // namespace
+
+std::optional<TubeTrace> trace_wide_tube(const GradientField& field, Border border, double width_min,
+                                         double width_max, double noise) {
+  if (field.area.width < 48 || field.area.height < 48) {
+    return std::nullopt;
+  }
+  const WantedTube wanted{.width_min = width_min,
+                          .width_max = width_max,
+                          .strip = std::clamp(0.03 * field.area.width, 8.0, 24.0),
+                          .relative = 0.3,
+                          .tilt_max_deg = 20};
+  std::optional<TubeTrace> best;
+  const auto sure = [](const TubeTrace& t) { return t.similarity * std::min(t.length, kLong_px); };
+  for (const TubeTrace& section : border_sections(field, border, wanted, noise)) {
+    const auto tube = trace_section(field, section, noise);
+    if (tube && (!best || sure(*tube) > sure(*best))) {
+      best = tube;
+    }
+    if (best && best->length >= kLong_px) {
+      break;
+    }
+  }
+  return best;
 }
 
 std::optional<double> end_face(const GradientField& field, const Point& guess, const Point& axis,
@@ -174,25 +218,35 @@ std::optional<double> end_face(const GradientField& field, const Point& guess, c
   constexpr double kFine_px = 0.25;
   const Point across(-axis.y, axis.x);
   const int n = 2 * static_cast<int>(reach / kFine_px) + 1;
-  std::vector<double> g(static_cast<std::size_t>(n));
+  Vector<double> g(static_cast<std::size_t>(n));
   const double half = std::max(1.0, half_width);
-  const int lanes = 2 * static_cast<int>(half) + 1;
-  for (int i = 0; i < n; ++i) {
-    const double s = (i - n / 2) * kFine_px;
-    double sum = 0;
-    for (int k = 0; k < lanes; ++k) {
-      const double u = lanes > 1 ? (2.0 * k / (lanes - 1) - 1) * half : 0;
-      // The magnitudes are added, since wall and lumen may change in opposite senses.
-      sum += std::abs(field.gradient(guess + s * axis + u * across).dot(axis));
+  // The magnitudes of strips are added, since wall and lumen may change in opposite senses; within a strip
+  // noise averages out. A face that shows in strips of one line needs no wider ones.
+  const auto strongest = [&](int strip, double clear) -> std::optional<double> {
+    const int strips = std::max(1, (2 * static_cast<int>(half) + 1) / strip), lanes = strips * strip;
+    for (int i = 0; i < n; ++i) {
+      const double s = (i - n / 2) * kFine_px;
+      double sum = 0, of_strip = 0;
+      for (int k = 0; k < lanes; ++k) {
+        const double u = lanes > 1 ? (2.0 * k / (lanes - 1) - 1) * half : 0;
+        of_strip += field.gradient(guess + s * axis + u * across).dot(axis);
+        if ((k + 1) % strip == 0) {
+          sum += std::abs(std::exchange(of_strip, 0.0));
+        }
+      }
+      g[static_cast<std::size_t>(i)] = sum / lanes;
     }
-    g[static_cast<std::size_t>(i)] = sum / lanes;
-  }
-  const auto top = std::max_element(g.begin() + 1, g.end() - 1);
-  if (top == g.end() - 1 || *top < 3 * field.noise_of_gradient(noise)) {
-    return std::nullopt;
-  }
-  const auto i = static_cast<std::size_t>(top - g.begin());
-  return (static_cast<int>(i) - n / 2 + vertex_offset(g[i - 1], *top, g[i + 1])) * kFine_px;
+    const auto top = std::max_element(g.begin() + 1, g.end() - 1);
+    if (top == g.end() - 1 || *top < clear * field.noise_of_gradient(noise)) {
+      return std::nullopt;
+    }
+    const auto i = static_cast<std::size_t>(top - g.begin());
+    return (static_cast<int>(i) - n / 2 + vertex_offset(g[i - 1], *top, g[i + 1])) * kFine_px;
+  };
+  constexpr int kStrip = 6;
+  constexpr double kClear = 3, kClearStrip = 1.2;  // noise alone leaves 0.8, and 0.5 +- 0.13 in strips
+  const auto plain = strongest(1, kClear);
+  return plain ? plain : strongest(kStrip, kClearStrip);
 }
 
 }  // namespace punctum::vision

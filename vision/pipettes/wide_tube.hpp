@@ -4,13 +4,14 @@
 #include <optional>
 
 #include "vision/image/gradient.hpp"
+#include "vision/pipettes/border_section.hpp"
 #include "vision/pipettes/tube_trace.hpp"
 
 namespace punctum::vision {
 
 // Of a total width of width_min .. width_max px. noise: grey levels. Empty when nothing at that border is
 // straight, has two continuous edges, and ends.
-[[nodiscard]] std::optional<TubeTrace> trace_wide_tube(const GradientField& field, Side side,
+[[nodiscard]] std::optional<TubeTrace> trace_wide_tube(const GradientField& field, Border border,
                                                        double width_min, double width_max, double noise);
 
 // The end face of a tube, sub-pixel: the shift along `axis` (px) from `guess` with the strongest change of

@@ -14,9 +14,9 @@
 #include <cstddef>
 #include <span>
 #include <string_view>
-#include <vector>
 
 #include "vision/image/contour.hpp"
+#include "vision/image/kept_vector.hpp"
 #include "vision/surface/cubic_basis.hpp"
 
 namespace punctum::vision {
@@ -64,15 +64,15 @@ class NetFit {
   [[nodiscard]] std::string_view check(const MembraneNet& net, const Point& axis);
 
   int control_points_;
-  std::vector<CubicBasis> rows_,
-      checked_at_;                     // at the sections that are interpolated; where the net is checked
-  std::vector<double> pivot_, upper_;  // factors of the interpolation's matrix
-  Contour points_;                     // in the order of rising polar angle
-  std::vector<double> length_;         // along the polygon, to each of its points and round
-  double pole_ = 0;                    // the near pole's place on it
-  std::vector<Section> section_;
+  Vector<CubicBasis> rows_,
+      checked_at_;                // at the sections that are interpolated; where the net is checked
+  Vector<double> pivot_, upper_;  // factors of the interpolation's matrix
+  Contour points_;                // in the order of rising polar angle
+  Vector<double> length_;         // along the polygon, to each of its points and round
+  double pole_ = 0;               // the near pole's place on it
+  Vector<Section> section_;
   Section first_slope_, last_slope_;  // per unit of the parameter
-  std::vector<Section> checked_;
+  Vector<Section> checked_;
   Contour outline_, profile_;
 };
 

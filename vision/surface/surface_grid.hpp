@@ -3,8 +3,8 @@
 #pragma once
 
 #include <span>
-#include <vector>
 
+#include "vision/image/kept_vector.hpp"
 #include "vision/surface/membrane_net.hpp"
 
 namespace punctum::vision {
@@ -12,7 +12,7 @@ namespace punctum::vision {
 // One vector per place of the grid, [along][around] in a row each. Units and axes of the net's contour; z
 // points away from the observer, as the world's frame has it (hal/frames.hpp).
 struct GridVectors {
-  std::vector<double> x, y, z;
+  Vector<double> x, y, z;
 };
 
 // The basis functions are evaluated once. What fills a grid allocates nothing when the vectors have been used
@@ -29,8 +29,8 @@ class SurfaceGrid {
   void points_and_normals(const MembraneNet& net, GridVectors& points, GridVectors& normals) const;
 
  private:
-  std::vector<CubicBasis> rows_;
-  std::vector<double> cosine_, sine_;
+  Vector<CubicBasis> rows_;
+  Vector<double> cosine_, sine_;
 };
 
 }  // namespace punctum::vision

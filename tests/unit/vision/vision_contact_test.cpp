@@ -67,6 +67,72 @@ TEST(Contact, joins_over_as_many_rows_as_the_element_is_high_less_one) {
   }
 }
 
+// A tip that comes by `step` px a frame, measured with a scatter that is as large as it says.
+struct Approach {
+  std::mt19937 random;
+  double sd, step;
+  explicit Approach(unsigned seed, double sd_px, double step_px) : random(seed), sd(sd_px), step(step_px) {}
+  // Frames from the one in which the tip passes the membrane to that in which contact is told.
+  int told_after() {
+    std::normal_distribution<double> scatter(0, sd);
+    ContactTest contact;
+    const double from = 20 * step + std::uniform_real_distribution<double>(0, step)(random);
+    for (int k = 0; k < 60; ++k) {
+      const double gap = from - step * k;
+      if (contact.update(gap + scatter(random), sd)) {
+        return k - static_cast<int>(std::ceil(from / step));
+      }
+    }
+    return 60;
+  }
+};
+
+TEST(Contact, is_told_within_a_frame_of_a_needle_that_moves_a_pixel_a_frame) {
+  for (const double sd : {0.1, 0.2, 0.3}) {
+    int within = 0;
+    for (unsigned seed = 0; seed < 1000; ++seed) {
+      const int after = Approach(seed, sd, 1).told_after();
+      within += after >= -1 && after <= 1;
+    }
+    EXPECT_GE(within, 990) << sd;
+  }
+}
+
+TEST(Contact, is_not_told_of_a_needle_that_waits_outside) {
+  for (const double sd : {0.1, 0.5, 2.0}) {
+    std::mt19937 random(3);
+    std::normal_distribution<double> scatter(0, sd);
+    ContactTest contact;
+    int told = 0;
+    for (int k = 0; k < 10000; ++k) {  // three deviations away
+      told += contact.update(3 * sd + scatter(random), sd);
+    }
+    EXPECT_EQ(told, 0) << sd;
+  }
+}
+
+TEST(Contact, needs_more_frames_where_the_gap_is_less_certain_and_one_frame_may_be_wrong) {
+  const auto frames_until_told = [](double sd) {
+    ContactTest contact;
+    contact.update(20, sd);
+    int n = 1;
+    while (n < 100 && !contact.update(-1.5, sd)) {
+      ++n;
+    }
+    return n;
+  };
+  EXPECT_EQ(frames_until_told(0.2), 1);
+  EXPECT_GT(frames_until_told(2), 2);
+  EXPECT_LT(frames_until_told(2), 20);
+  ContactTest contact;
+  for (int k = 0; k < 20; ++k) {
+    contact.update(-6, 1);
+  }
+  EXPECT_TRUE(contact.update(1.2, 1));  // a glitch
+  EXPECT_TRUE(contact.update(-6, 1));
+  EXPECT_FALSE(contact.update(8, 1));  // and this is none
+}
+
 TEST(Contact, is_not_found_in_empty_pictures) {
   EXPECT_FALSE(merge_classes(cv::Mat(), cv::Mat(), cv::Mat(), 4).merged);
   const cv::Mat none(10, 10, CV_8U, cv::Scalar(0));
@@ -77,7 +143,7 @@ TEST(Contact, is_not_found_in_empty_pictures) {
 
 TEST(Impurities, are_small_components_away_from_the_membrane) {
   cv::Mat binary(120, 120, CV_8U, cv::Scalar(0));
-  std::vector<PixelRun> pixels;
+  Vector<PixelRun> pixels;
   cv::circle(binary, {60, 60}, 30, cv::Scalar(255), 2);
   binary(cv::Rect(5, 5, 6, 6)).setTo(255);    // impurity
   binary(cv::Rect(88, 58, 4, 4)).setTo(255);  // touches the membrane
@@ -91,7 +157,7 @@ TEST(Impurities, are_small_components_away_from_the_membrane) {
 }
 
 TEST(Components, touch_at_corners_and_join_from_both_sides) {
-  const auto drawn = [](const std::vector<std::string>& rows) {
+  const auto drawn = [](const Vector<std::string>& rows) {
     cv::Mat m(static_cast<int>(rows.size()), static_cast<int>(rows[0].size()), CV_8U, cv::Scalar(0));
     for (int y = 0; y < m.rows; ++y) {
       for (int x = 0; x < m.cols; ++x) {
@@ -138,8 +204,9 @@ TEST(Components, are_those_of_another_labelling) {
 struct Script {
   Puncture puncture{1.5};
   std::int64_t t = 0;
-  bool step(double tip, double membrane, bool contact = true) {
+  bool step(double tip, double membrane, bool contact = true, bool free = false) {
     PunctureInput in;
+    in.free = free;
     in.t_ns = t;
     t += 40'000'000;
     in.contact = contact;
@@ -197,6 +264,45 @@ TEST(Puncture, is_not_one_mistaken_contact_point) {
   EXPECT_FALSE(s.step(20, 40));  // far ahead of the needle
   EXPECT_FALSE(s.step(20, 19));
   EXPECT_FALSE(s.step(20, 19));
+}
+
+TEST(Puncture, is_told_at_once_where_the_picture_beside_the_needle_shows_it_too) {
+  Script s, alone;
+  s.push(20);
+  alone.push(20);
+  EXPECT_TRUE(s.step(20.5, 8, true, true));
+  EXPECT_FALSE(alone.step(20.5, 8));
+  Script held;
+  held.push(20);
+  for (int k = 0; k < 100; ++k) {  // the picture alone, while the contact points move with the needle
+    EXPECT_FALSE(held.step(20, 18.7, true, true)) << k;
+  }
+}
+
+TEST(Puncture, is_told_of_a_membrane_that_went_back_while_the_needle_was_not_seen) {
+  Script s;
+  s.push(20);
+  PunctureInput hidden;
+  hidden.t_ns = s.t;
+  hidden.contact = true;
+  EXPECT_FALSE(s.puncture.update(hidden));
+  EXPECT_FALSE(s.step(21, 5));
+  EXPECT_TRUE(s.step(21.5, 4));
+}
+
+// Scatter as large as it says, while a membrane is held for 10 000 frames.
+TEST(Puncture, is_not_the_scatter_of_the_contact_points) {
+  std::mt19937 random(5);
+  for (const double depth : {4.0, 8.0, 20.0}) {
+    Script s;
+    std::normal_distribution<double> scatter(0, std::min(0.7, depth / 12));
+    s.push(depth);
+    int told = 0;
+    for (int k = 0; k < 10000; ++k) {
+      told += s.step(depth, 0.95 * depth + scatter(random));
+    }
+    EXPECT_EQ(told, 0) << depth;
+  }
 }
 
 TEST(Puncture, lasts_until_the_needle_is_outside_and_then_the_next_one_is_detected) {

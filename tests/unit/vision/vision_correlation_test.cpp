@@ -99,7 +99,7 @@ cv::Mat blobs(const Point& shift, double gain, double slope, unsigned seed, doub
 
 TEST(Registration, tells_hundredths_of_a_pixel_under_uneven_light) {
   const cv::Rect box(30, 25, 52, 56);
-  const Registration pattern(blobs({}, 1, 0, 1, 0)(box), 0);
+  Registration pattern(blobs({}, 1, 0, 1, 0)(box), 0);
   for (const Point& shift : {Point(0, 0), Point(0.3, -0.4), Point(-0.85, 0.5), Point(1.4, 1.1)}) {
     for (const double gain : {0.6, 1.0, 1.3}) {
       const cv::Mat seen = blobs(shift, gain, 0.1, 2, 0);
@@ -114,7 +114,7 @@ TEST(Registration, tells_hundredths_of_a_pixel_under_uneven_light) {
 TEST(Registration, knows_how_well_it_knows) {
   const cv::Rect box(30, 25, 52, 56);
   constexpr double kNoise = 6;
-  const Registration pattern(blobs({}, 1, 0, 1, kNoise)(box), kNoise);
+  Registration pattern(blobs({}, 1, 0, 1, kNoise)(box), kNoise);
   double ss = 0, sd = 0;
   constexpr int kPictures = 60;
   Point mean;

@@ -79,7 +79,7 @@ ClearedPicture picture_with(const Ring& ring) { return noisy(drawn(ring), ring.n
 
 // What a search hands over: about right, and wavy.
 Contour rough(const Ring& ring, double offset, double waves) {
-  std::vector<double> r(kAngles);
+  Vector<double> r(kAngles);
   for (int i = 0; i < kAngles; ++i) {
     const double t = polar_angle(i, kAngles);
     r[static_cast<std::size_t>(i)] = outline(ring, t) + offset + waves * std::sin(29 * t);
@@ -88,7 +88,7 @@ Contour rough(const Ring& ring, double offset, double waves) {
 }
 
 std::optional<SeenOutline> place_edge(const ClearedPicture& picture, const Contour& contour,
-                                      const std::vector<double>& soft, const EdgeShape& edge) {
+                                      const Vector<double>& soft, const EdgeShape& edge) {
   EdgeLearnt learnt;
   return shaped_edge(picture, contour, soft, edge, learnt);
 }
@@ -110,7 +110,7 @@ Error error_against(const Contour& contour, const Ring& ring) {
   return e;
 }
 
-const std::vector<double> kNowhereSoft(kAngles, 0.0);
+const Vector<double> kNowhereSoft(kAngles, 0.0);
 EdgeShape wall_of(double px) {
   EdgeShape edge;
   edge.nearby = {-px, 0.15 * px};
@@ -145,6 +145,22 @@ TEST(EdgeShape, averages_the_noise_out_round_the_cell) {
     }
     const double bound = 0.344 * noise / 5 * std::sqrt(modes / (2 * std::numbers::pi * 75));
     EXPECT_LT(std::sqrt(square), std::hypot(1.7 * bound, 0.03)) << noise;
+  }
+}
+
+// What is handed over wanders from one side of the edge to the other, as a path does when focus or light
+// change.
+TEST(EdgeShape, of_the_last_frame_follows_a_contour_that_wanders) {
+  const Ring ring{.noise = 2, .ripple = 1.5};
+  const cv::Mat clean = drawn(ring);
+  EdgeLearnt learnt;
+  constexpr int kFrames = 31;
+  for (int k = 0; k < kFrames; ++k) {
+    const auto found =
+        shaped_edge(noisy(clean, ring.noise, 1 + static_cast<unsigned>(k)),
+                    rough(ring, -1.5 + 3.0 * k / (kFrames - 1), 0.3), kNowhereSoft, wall_of(5.6), learnt);
+    ASSERT_TRUE(found) << k;
+    EXPECT_LT(error_against(found->contour, ring).rms, 0.1) << k;
   }
 }
 
@@ -258,7 +274,7 @@ TEST(EdgeShape, is_not_pulled_by_a_line_beside_the_edge) {
 
 TEST(EdgeShape, keeps_a_dimple_where_the_membrane_may_have_any_shape) {
   const Ring ring{.noise = 2, .dimple = 8};
-  std::vector<double> soft(kAngles);
+  Vector<double> soft(kAngles);
   for (int i = 0; i < kAngles; ++i) {
     soft[static_cast<std::size_t>(i)] = angle_between(polar_angle(i, kAngles), 0) < 0.9 ? 1 : 0;
   }
@@ -285,7 +301,7 @@ TEST(EdgeShape, of_a_body_is_not_shifted_by_the_wall_around_it) {
 TEST(EdgeShape, of_a_body_is_not_shifted_where_the_wall_is_nearer_than_elsewhere) {
   const Ring ring{.gap = 5, .nearer = 2.5, .blur = 1.5, .noise = 0.5};
   const ClearedPicture picture = picture_with(ring);
-  std::vector<double> soft(kAngles);
+  Vector<double> soft(kAngles);
   Contour face, begun, body;
   for (int i = 0; i < kAngles; ++i) {
     const double t = polar_angle(i, kAngles), in = ring.R - ring.wall;

@@ -2,11 +2,14 @@
 // independent picture.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <random>
 
+#include "vision/image/cheapest_path.hpp"
 #include "vision/image/closed_path.hpp"
 #include "vision/image/hough_circles.hpp"
 #include "vision/image/noise.hpp"
@@ -49,6 +52,53 @@ GradientField field_of(const cv::Mat& grey) {
   GradientField f;
   f.compute(grey, cv::Rect(0, 0, grey.cols, grey.rows), 1.2);
   return f;
+}
+
+// All of them, one by one.
+float cheapest_by_trial(const Vector<float>& cost, int angles, int samples, const Vector<float>& bend) {
+  float least = 1e9F;
+  const int reach = static_cast<int>(bend.size()) - 1;
+  Vector<int> path(static_cast<std::size_t>(angles), 0);
+  const auto go_on = [&](const auto& self, int i, float so_far) -> void {
+    const auto at = [&](int k) { return path[static_cast<std::size_t>(k)]; };
+    if (i == angles) {
+      const int turn = std::abs(at(angles - 1) - at(0));
+      least = turn <= reach ? std::min(least, so_far + bend[static_cast<std::size_t>(turn)]) : least;
+      return;
+    }
+    const int from = i == 0 ? 0 : std::max(0, at(i - 1) - reach),
+              to = i == 0 ? samples - 1 : std::min(samples - 1, at(i - 1) + reach);
+    for (int j = from; j <= to; ++j) {
+      path[static_cast<std::size_t>(i)] = j;
+      const float turn = i == 0 ? 0 : bend[static_cast<std::size_t>(std::abs(j - at(i - 1)))];
+      self(self, i + 1, so_far + turn + cost[static_cast<std::size_t>(i * samples + j)]);
+    }
+  };
+  go_on(go_on, 0, 0);
+  return least;
+}
+
+TEST(CheapestPath, costs_no_more_than_any_other_that_closes) {
+  constexpr int kRound = 8, kWide = 9;
+  const Vector<float> bend{0, 0.3F, 0.9F};
+  std::mt19937 random(5);
+  std::uniform_int_distribution<int> any(0, 1000);
+  for (int trial = 0; trial < 20; ++trial) {
+    Vector<float> cost(kRound * kWide);
+    std::generate(cost.begin(), cost.end(), [&] { return 0.001F * static_cast<float>(any(random)); });
+    // Far cheaper somewhere in one row: every closed path goes through it.
+    cost[static_cast<std::size_t>(kRound / 2 * kWide + trial % kWide)] = -20;
+    const auto path = cheapest_closed_path(cost, kRound, kWide, bend);
+    float sum = 0;
+    for (int i = 0; i < kRound; ++i) {
+      const int here = path[static_cast<std::size_t>(i)],
+                next = path[static_cast<std::size_t>((i + 1) % kRound)];
+      ASSERT_LT(static_cast<std::size_t>(std::abs(here - next)), bend.size()) << trial;
+      sum += cost[static_cast<std::size_t>(i * kWide + here)] +
+             bend[static_cast<std::size_t>(std::abs(here - next))];
+    }
+    EXPECT_NEAR(sum, cheapest_by_trial(cost, kRound, kWide, bend), 1e-4F) << trial;
+  }
 }
 
 TEST(Noise, is_estimated_within_a_tenth_in_a_picture_with_edges) {
@@ -162,7 +212,7 @@ TEST(PeriodicSmoothing, equals_the_dense_solution_of_its_normal_equations) {
   std::mt19937 random(4);
   std::uniform_real_distribution<double> u(0, 1);
   const int n = 40;
-  std::vector<double> r(n), w(n), s(n);
+  Vector<double> r(n), w(n), s(n);
   for (std::size_t i = 0; i < n; ++i) {
     r[i] = 50 + 3 * u(random);
     w[i] = u(random) < 0.2 ? 0 : u(random);

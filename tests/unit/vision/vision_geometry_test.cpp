@@ -50,7 +50,7 @@ TEST(Polyline, finds_the_nearest_place) {
   std::mt19937 random(3);
   std::normal_distribution<double> step(0, 1);
   for (const std::size_t n : {2U, 15U, 17U, 400U}) {
-    std::vector<Point> walk{{0, 0}};
+    Vector<Point> walk{{0, 0}};
     while (walk.size() < n) {
       walk.push_back(walk.back() + Point(step(random), step(random)));
     }
@@ -110,7 +110,7 @@ TEST(PolarRadii, of_a_shifted_circle_follow_the_law_of_cosines) {
 
 TEST(Undeformed, is_the_circle_of_the_arcs_outside_the_dimple) {
   Contour c = circle_contour({{100, 100}, 70, 0}, 256);
-  std::vector<double> weight(c.size(), 1.0);
+  Vector<double> weight(c.size(), 1.0);
   for (std::size_t i = 0; i < c.size(); ++i) {
     const double t =
         std::remainder(2 * std::numbers::pi * static_cast<double>(i) / 256, 2 * std::numbers::pi);
@@ -140,7 +140,7 @@ TEST(EntryPoint, is_where_the_axis_first_meets_the_undeformed_membrane) {
 
 TEST(HalfWidth, is_where_the_depth_has_fallen_to_one_percent) {
   // Depth 12 (1 - (u/30)^2)^2: one per cent is left where u = 30 sqrt(1 - 0.1).
-  std::vector<ProfilePoint> profile;
+  Vector<ProfilePoint> profile;
   for (double u = -80; u <= 80; u += 0.5) {
     const double s = 1 - u * u / 900;
     profile.push_back({u, s > 0 ? 12 * s * s : 0});
@@ -156,7 +156,7 @@ TEST(HalfWidth, is_where_the_depth_has_fallen_to_one_percent) {
 TEST(HalfWidth, is_as_certain_as_the_profile_is_steep_where_it_ends) {
   // A cone: its depth falls by 0.4 per px, so an error of 0.2 in the depth is one of 0.5 px in the width of
   // each side, and of 0.5/sqrt(2) in their mean.
-  std::vector<ProfilePoint> profile;
+  Vector<ProfilePoint> profile;
   for (double u = -80; u <= 80; u += 0.5) {
     profile.push_back({u, 12 - 0.4 * std::abs(u)});
   }

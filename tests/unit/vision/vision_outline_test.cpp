@@ -29,10 +29,10 @@ struct Cell {
 };
 
 // Smooth errors of that sd, as a contour with 12 periods has.
-std::vector<double> errors(double sd, std::mt19937& random) {
+Vector<double> errors(double sd, std::mt19937& random) {
   constexpr int kModes = 12;
   std::normal_distribution<double> normal(0, sd / std::sqrt(kModes + 0.5));
-  std::vector<double> out(kRays, normal(random));
+  Vector<double> out(kRays, normal(random));
   for (int k = 1; k <= kModes; ++k) {
     const double a = normal(random), b = normal(random);
     for (int i = 0; i < kRays; ++i) {
@@ -43,8 +43,8 @@ std::vector<double> errors(double sd, std::mt19937& random) {
   return out;
 }
 
-SeenOutline seen(const Cell& cell, const std::vector<double>& off, double variance, double lasting) {
-  SeenOutline out{{}, std::vector<double>(kRays, variance), std::vector<double>(kRays, lasting)};
+SeenOutline seen(const Cell& cell, const Vector<double>& off, double variance, double lasting) {
+  SeenOutline out{{}, Vector<double>(kRays, variance), Vector<double>(kRays, lasting)};
   for (int i = 0; i < kRays; ++i) {
     out.contour.push_back(
         on_ray(cell.centre, i, kRays, cell.r(polar_angle(i, kRays)) + off[static_cast<std::size_t>(i)]));
@@ -57,7 +57,7 @@ struct Judged {
   int points = 0, within_one = 0, within_two = 0, wrong = 0;
   void take(const CarriedOutline& outline, const Cell& cell) {
     const Contour c = outline.contour();
-    const std::vector<double> sd = outline.sd();
+    const Vector<double> sd = outline.sd();
     ASSERT_EQ(c.size(), sd.size());
     for (std::size_t i = 0; i < c.size(); ++i) {
       const Point d = c[i] - cell.centre;
@@ -73,7 +73,7 @@ struct Judged {
   [[nodiscard]] double share(int n) const { return static_cast<double>(n) / points; }
 };
 
-const std::vector<double> kStill(kRays, 0.0);
+const Vector<double> kStill(kRays, 0.0);
 
 TEST(CarriedOutline, is_better_than_its_frames_while_the_cell_drifts_and_turns) {
   for (const double sd : {0.06, 0.1, 0.2, 0.4}) {
@@ -104,9 +104,9 @@ TEST(CarriedOutline, does_not_take_what_every_frame_repeats_for_new) {
   for (unsigned seed = 1; seed <= 30; ++seed) {
     std::mt19937 random(seed);
     CarriedOutline outline;
-    const std::vector<double> grains = errors(kGrains, random);
+    const Vector<double> grains = errors(kGrains, random);
     for (int frame = 0; frame < 20; ++frame) {
-      std::vector<double> off = errors(kNoise, random);
+      Vector<double> off = errors(kNoise, random);
       for (std::size_t i = 0; i < off.size(); ++i) {
         off[i] += grains[i];
       }
@@ -122,7 +122,7 @@ TEST(CarriedOutline, follows_at_once_what_changes_its_shape) {
   constexpr double kSd = 0.1;
   std::mt19937 random(3);
   for (const bool expected : {true, false}) {
-    std::vector<double> pushed = kStill;
+    Vector<double> pushed = kStill;
     for (int i = 0; i < kRays && expected; ++i) {
       if (angle_between(polar_angle(i, kRays), 0.4) < 0.6) {
         pushed[static_cast<std::size_t>(i)] = 2;
@@ -168,7 +168,7 @@ TEST(CarriedOutline, of_another_number_of_points_begins_anew) {
   }
   coarse.variance.assign(128, 0.04);
   coarse.lasting.assign(128, 0.01);
-  outline.update(coarse, std::vector<double>(128, 0.0));
+  outline.update(coarse, Vector<double>(128, 0.0));
   ASSERT_EQ(outline.contour().size(), 128U);
   EXPECT_NEAR(cv::norm(outline.contour().front() - Point(80, 60)), 0, 0.05);
   EXPECT_NEAR(outline.sd().front(), 0.2, 1e-12);

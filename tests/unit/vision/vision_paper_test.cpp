@@ -7,6 +7,7 @@
 #include <random>
 #include <vector>
 
+#include "tests/support/pictures.hpp"
 #include "vision/events/velocity_reversal.hpp"
 #include "vision/membrane/contact_points.hpp"
 #include "vision/membrane/snakes.hpp"
@@ -16,6 +17,7 @@ namespace {
 
 using namespace punctum;
 using namespace punctum::vision;
+using test::frame_of;
 
 constexpr int kWide = 320, kHigh = 280;
 constexpr double kLens_px = 1.2;
@@ -45,15 +47,6 @@ cv::Mat picture_of(const RoundCell& cell, double noise = 0, unsigned seed = 1) {
   return m;
 }
 
-hal::Frame frame_with(const cv::Mat& m) {
-  hal::Frame f;
-  f.pixels = m.data;
-  f.width = m.cols;
-  f.height = m.rows;
-  f.stride = static_cast<int>(m.step);
-  return f;
-}
-
 // The paper's method, and a picture with a cell and nothing else.
 VisionConfig config_of_the_cell_alone() {
   VisionConfig config;
@@ -79,9 +72,9 @@ double rms_distance(const Contour& c, const RoundCell& cell) {
   return std::sqrt(sum);
 }
 
-ClearedPicture cleared(const cv::Mat& m, const std::vector<Polygon>& pipettes) {
+ClearedPicture cleared(const cv::Mat& m, const Vector<Polygon>& pipettes) {
   ClearedPicture p;
-  EXPECT_EQ(p.load(frame_with(m), m.cols, m.rows), "");
+  EXPECT_EQ(p.load(frame_of(m), m.cols, m.rows), "");
   p.compute_gradient({0, 0, m.cols, m.rows});
   p.cover(pipettes);
   (void)p.cover_impurities({}, 5 * p.gradient_noise, 30);
@@ -98,7 +91,7 @@ TEST(PaperMethod, finds_the_outer_face_of_round_cells_as_often_as_the_paper_says
     const RoundCell cell{
         .centre = {160 + at(random), 140 + at(random)}, .R = radius(random), .gap = gap(random)};
     Tracker tracker(config_of_the_cell_alone(), kWide, kHigh);
-    const Membrane& outer = tracker.process(frame_with(picture_of(cell))).outer;
+    const Membrane& outer = tracker.process(frame_of(picture_of(cell))).outer;
     right += outer.ok && outer.nodes.size() == 16 && worst_distance(outer.contour, cell) < 2;
   }
   EXPECT_GE(right, cells * 8 / 10);
@@ -109,7 +102,7 @@ TEST(PaperMethod, errs_no_more_than_its_published_error_at_noise_five) {
   for (const unsigned seed : {1U, 2U, 3U, 4U}) {
     const RoundCell cell{.centre = {160.3, 139.6}, .R = 70 + 2.3 * seed};
     Tracker tracker(config_of_the_cell_alone(), kWide, kHigh);
-    const Membrane& outer = tracker.process(frame_with(picture_of(cell, 5, seed))).outer;
+    const Membrane& outer = tracker.process(frame_of(picture_of(cell, 5, seed))).outer;
     ASSERT_TRUE(outer.ok) << seed;
     EXPECT_LT(rms_distance(outer.contour, cell) * 0.825, 1.14) << seed;
   }
@@ -135,7 +128,7 @@ TEST(PaperMethod, comes_to_rest_where_equation_three_with_the_squared_gradient_i
   int least = 0;
   for (std::size_t i = 0; i < 16; ++i) {
     const Point before = v[(i + 15) % 16], after = v[(i + 1) % 16];
-    std::vector<double> elastic, bending, gradient2;
+    Vector<double> elastic, bending, gradient2;
     for (int dy = -2; dy <= 2; ++dy) {
       for (int dx = -2; dx <= 2; ++dx) {
         const Point p = v[i] + Point(dx, dy);
@@ -146,10 +139,10 @@ TEST(PaperMethod, comes_to_rest_where_equation_three_with_the_squared_gradient_i
         gradient2.push_back(g.dot(g));
       }
     }
-    const auto top = [](const std::vector<double>& e) { return *std::max_element(e.begin(), e.end()); };
+    const auto top = [](const Vector<double>& e) { return *std::max_element(e.begin(), e.end()); };
     const double high = top(gradient2),
                  low = std::min(*std::min_element(gradient2.begin(), gradient2.end()), high - noise2);
-    std::vector<double> total;
+    Vector<double> total;
     for (std::size_t k = 0; k < 25; ++k) {
       total.push_back(0.6 * elastic[k] / top(elastic) + 0.5 * bending[k] / top(bending) -
                       1.2 * (gradient2[k] - low) / (high - low));

@@ -57,6 +57,24 @@ TEST_F(StageTip, is_off_by_what_nothing_but_clear_frames_tell) {
   EXPECT_NEAR(told_.moved()->x, -1, 1e-12);
 }
 
+// No frame was seen while the needle went 300 px back: how far off the stage is, was learnt before.
+TEST_F(StageTip, is_told_after_a_pause_wherever_the_needle_is_by_then) {
+  approach(20);
+  const double sd = told_.sd();
+  told_.after_gap();
+  x_ += 300;
+  told_.begin(Point(x_ - 40, 103));
+  EXPECT_FALSE(told_.moved());
+  ASSERT_TRUE(told_.tip());
+  EXPECT_NEAR(told_.tip()->x, x_, 0.2);
+  EXPECT_GT(told_.sd(), sd) << "it may have drifted";
+  told_.forget();
+  EXPECT_FALSE(told_.tip());
+  told_.learn(seen_at({x_, 100}, 0.25));
+  ASSERT_TRUE(told_.tip()) << "where the stage is in this frame is still known";
+  EXPECT_NEAR(told_.tip()->x, x_, 0.3);
+}
+
 // A needle whose walls end 0.8 px before its glass in every frame: stage and picture share that.
 TEST_F(StageTip, is_no_more_certain_than_the_picture_that_it_was_learnt_from) {
   std::normal_distribution<double> noise(0, 0.2);

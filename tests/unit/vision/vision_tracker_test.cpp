@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <opencv2/imgproc.hpp>
@@ -12,6 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "tests/support/counted_memory.hpp"
+#include "tests/support/pictures.hpp"
 #include "tools/vision/live_tracker.hpp"
 #include "vision/overlay.hpp"
 #include "vision/tracker.hpp"
@@ -20,6 +23,7 @@ namespace {
 
 using namespace punctum;
 using namespace punctum::vision;
+using test::frame_of;
 
 constexpr int kW = 640, kH = 420;
 const Point kCentre(280.3, 206.8);
@@ -110,17 +114,6 @@ cv::Mat draw(const Drawing& d) {
   return out;
 }
 
-hal::Frame frame_of(const cv::Mat& m, std::uint64_t sequence = 0) {
-  hal::Frame f;
-  f.pixels = m.data;
-  f.width = m.cols;
-  f.height = m.rows;
-  f.stride = static_cast<int>(m.step);
-  f.sequence = sequence;
-  f.exposure_ns = static_cast<std::int64_t>(sequence) * 40'000'000;
-  return f;
-}
-
 double rms_error(const Contour& c, double base, double depth, double share) {
   double ss = 0;
   for (const Point& p : c) {
@@ -131,23 +124,31 @@ double rms_error(const Contour& c, double base, double depth, double share) {
   return std::sqrt(ss);
 }
 
-// Told what time it is once a picture has been looked at.
+// Told what time it is when a picture is taken up, and when it has been looked at.
 class ToldClock final : public hal::Clock {
  public:
-  [[nodiscard]] std::int64_t now_ns() const noexcept override { return now_ns_; }
+  [[nodiscard]] std::int64_t now_ns() const noexcept override {
+    looking_ = !looking_;
+    return looking_ ? from_ns : to_ns;
+  }
   void sleep_until_ns(std::int64_t /*t_ns*/) noexcept override {}
 
-  std::int64_t now_ns_ = 0;
+  std::int64_t from_ns = 0, to_ns = 0;
+
+ private:
+  mutable bool looking_ = false;
 };
 
 struct Watched {
   ToldClock clock;
   tools::LiveTracker tracker{VisionConfig{}, kW, kH, {}, clock};
 
-  std::string at(const cv::Mat& picture, double t_s, double search_s = 0.02) {
+  std::string at(const cv::Mat& picture, double t_s) { return looked(picture, t_s, t_s + 0.01, t_s + 0.02); }
+  std::string looked(const cv::Mat& picture, double t_s, double from_s, double to_s) {
     hal::Frame frame = frame_of(picture);
-    frame.exposure_ns = static_cast<std::int64_t>(t_s * 1e9);
-    clock.now_ns_ = static_cast<std::int64_t>((t_s + search_s) * 1e9);
+    frame.exposure_ns = std::llround(t_s * 1e9);
+    clock.from_ns = std::llround(from_s * 1e9);
+    clock.to_ns = std::llround(to_s * 1e9);
     return tracker.process(frame).verdict;
   }
 };
@@ -177,12 +178,33 @@ TEST(LiveTracker, starts_anew_after_a_second_without_a_picture) {
 TEST(LiveTracker, does_not_start_anew_because_it_searched_for_seconds_itself) {
   const cv::Mat cell = draw({});
   Watched camera;
-  EXPECT_EQ(camera.at(cell, 0, 4.1), "ok");
-  EXPECT_EQ(camera.at(cell, 0.16, 4.2 - 0.16), "ok");
+  EXPECT_EQ(camera.looked(cell, 0, 0.01, 4.1), "ok");
+  EXPECT_EQ(camera.looked(cell, 0.16, 4.11, 4.2), "ok");
   EXPECT_EQ(camera.at(cell, 4.24), "ok");
   EXPECT_EQ(camera.tracker.restarts(), 0);
   EXPECT_EQ(camera.at(cell, 5.5), "ok");
   EXPECT_EQ(camera.tracker.restarts(), 1) << "a gap that is the camera's";
+}
+
+// The process is stopped for five seconds; a picture of before waits in the camera's buffer.
+TEST(LiveTracker, starts_anew_although_a_picture_of_before_the_pause_comes_first) {
+  const cv::Mat cell = draw({});
+  Watched between;  // two pictures
+  EXPECT_EQ(between.at(cell, 0), "ok");
+  EXPECT_EQ(between.at(cell, 0.04), "ok");
+  EXPECT_EQ(between.looked(cell, 0.08, 5.1, 5.11), "ok");
+  EXPECT_EQ(between.tracker.restarts(), 0);
+  EXPECT_EQ(between.at(cell, 5.14), "ok");
+  EXPECT_EQ(between.tracker.restarts(), 1);
+  Watched within;  // while it looked at one that it could follow
+  EXPECT_EQ(within.at(cell, 0), "ok");
+  EXPECT_EQ(within.looked(cell, 0.04, 0.05, 5.1), "ok");
+  EXPECT_EQ(within.looked(cell, 0.08, 5.11, 5.12), "ok");
+  EXPECT_EQ(within.tracker.restarts(), 0);
+  EXPECT_EQ(within.at(cell, 5.14), "ok");
+  EXPECT_EQ(within.tracker.restarts(), 1);
+  EXPECT_EQ(within.at(cell, 5.18), "ok");
+  EXPECT_EQ(within.tracker.restarts(), 1) << "once for a pause";
 }
 
 TEST(Tracker, follows_a_whole_injection_within_its_errors) {
@@ -682,6 +704,7 @@ TEST(Tracker, finds_a_holding_pipette_that_comes_while_everything_else_is_follow
   EXPECT_TRUE(found);
 }
 
+#ifndef PUNCTUM_SANITIZED  // these measure time
 double thread_ms() {
   timespec t{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
@@ -704,6 +727,19 @@ std::vector<double> times_of(const std::vector<cv::Mat>& pictures) {
   return least;
 }
 
+// Of processor time; to smooth the whole picture once.
+double pass_ms(const cv::Mat& picture) {
+  cv::Mat wide, smooth;
+  picture.convertTo(wide, CV_32F);
+  double least = 1e9;
+  for (int run = 0; run < 10; ++run) {
+    const double before = thread_ms();
+    cv::GaussianBlur(wide, smooth, {9, 9}, 1.2);
+    least = std::min(least, thread_ms() - before);
+  }
+  return least;
+}
+
 TEST(Tracker, spreads_the_search_for_what_is_missing_over_frames) {
   const auto pictures = [](bool needle, bool cell, bool holder) {
     std::vector<cv::Mat> out;
@@ -719,17 +755,66 @@ TEST(Tracker, spreads_the_search_for_what_is_missing_over_frames) {
     }
     return out;
   };
-  const auto complete = pictures(true, true, true);
-  // Measured: 0.6 to 1.1, and 1.2 on pictures of another renderer.
-  constexpr double kMost = 1.5;
+  constexpr double kMost = 12;  // measured: 3 to 5; all at once takes five times as much
   for (const auto& [missing, without] :
        {std::pair("cell", pictures(true, false, true)), std::pair("needle", pictures(false, true, true)),
         std::pair("holding pipette", pictures(true, true, false)),
         std::pair("everything", pictures(false, false, false))}) {
-    const auto usual = times_of(complete), now = times_of(without);
-    EXPECT_LT(now.back(), kMost * usual[usual.size() / 2]) << missing;
-    RecordProperty(missing, std::to_string(now.back() / usual[usual.size() / 2]));
+    const double passes = times_of(without).back() / pass_ms(without[0]);
+    EXPECT_LT(passes, kMost) << missing;
+    RecordProperty(missing, std::to_string(passes));
   }
+}
+
+TEST(Tracker, follows_without_looking_at_the_whole_picture_again_and_again) {
+  std::vector<cv::Mat> pictures;
+  for (int i = 0; i < 16; ++i) {
+    pictures.push_back(draw({.tip = 470.0 - 2 * i, .dent = std::max(0.0, 2.0 * i - 15), .noise = 5}));
+  }
+  const auto times = times_of(pictures);
+  const double ratio = times[times.size() / 2] / pass_ms(pictures[0]);
+  RecordProperty("passes", std::to_string(ratio));
+  constexpr double kMost = 7;  // measured: 3.5
+  EXPECT_LT(ratio, kMost);
+}
+#endif
+
+TEST(ClearedPicture, covers_in_a_frame_what_is_covered_in_that_frame) {
+  const cv::Mat m = draw({});
+  ClearedPicture picture;
+  const Point inside(300, 200);
+  for (const bool covered : {true, false, true}) {
+    ASSERT_EQ(picture.load(frame_of(m), kW, kH), "");
+    Vector<Polygon> pipettes;
+    if (covered) {
+      pipettes.push_back({{280, 180}, {320, 180}, {320, 220}, {280, 220}});
+    }
+    picture.cover(pipettes);
+    EXPECT_EQ(picture.hidden(inside), covered);
+    EXPECT_FALSE(picture.hidden(inside + Point(0, 60)));
+  }
+}
+
+// Before contact, in contact, after it, and while the needle goes back; everything on.
+TEST(Tracker, takes_no_memory_in_a_followed_frame) {
+#ifdef PUNCTUM_COUNTS_MEMORY
+  constexpr int kFirst = 2;  // the second frame is the first that is followed
+  VisionConfig config;
+  config.surface = true;
+  Tracker tracker(config, kW, kH);
+  const auto tip_of = [](int i) { return i < 26 ? 440.0 - 4 * i : 340.0 + 4 * (i - 26); };
+  for (int i = 0; i < 40; ++i) {
+    const double tip = tip_of(i), dent = std::max(0.0, kCentre.x + kR - tip);
+    const cv::Mat m = draw({.tip = tip, .dent = dent, .noise = 5, .seed = static_cast<unsigned>(i) + 1});
+    const long before = memory_taken;
+    ASSERT_EQ(tracker.process(frame_of(m, static_cast<std::uint64_t>(i))).verdict, "ok") << i;
+    if (i >= kFirst) {
+      EXPECT_EQ(memory_taken - before, 0) << "frame " << i;
+    }
+  }
+#else
+  GTEST_SKIP() << "the sanitizer has the memory";
+#endif
 }
 
 TEST(Tracker, gives_a_reason_and_no_membrane_for_pictures_that_show_nothing) {

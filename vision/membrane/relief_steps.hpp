@@ -1,0 +1,43 @@
+// Where an edge lies in what turns with the light, in relief: the slope of what the light crosses.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <opencv2/core.hpp>
+#include <optional>
+
+#include "vision/membrane/edge_shape.hpp"
+
+namespace punctum::vision {
+
+// The own face and the nearby one, blurred. A round body is crossed by light over a length that grows as the
+// root of the depth below its face, and more slowly further in; of a sheet, the length jumps at its edge.
+class ReliefSteps {
+ public:
+  // turning: grey levels, from edge.inside px within the contour outwards.
+  // noise: of the picture.
+  ReliefSteps(const Vector<double>& turning, const EdgeShape& edge, double noise)
+      : turning_(turning), edge_(edge), noise_(noise) {}
+
+  struct Fit {
+    double own = 0;   // where the own face lies, px from the contour
+    double left = 0;  // rms of what the fit leaves, grey levels
+  };
+  // The better of the two. Empty when neither explains the edge.
+  [[nodiscard]] std::optional<Fit> fit() const;
+
+ private:
+  enum class Body : std::uint8_t { round, sheet };
+  struct Trial {
+    cv::Vec3d x;  // own place, blur, place of the nearby face against the own one
+    double cost = 0;
+  };
+  [[nodiscard]] double cost_of(const cv::Vec3d& x, Body body) const;
+  [[nodiscard]] Trial best_of(Body body) const;
+
+  const Vector<double>& turning_;
+  const EdgeShape& edge_;
+  double noise_;
+};
+
+}  // namespace punctum::vision

@@ -24,6 +24,12 @@ using Vec3 = Eigen::Vector3d;
 using Mat3 = Eigen::Matrix3d;
 using Quat = Eigen::Quaternion<double, Eigen::DontAlign>;
 
+// Of three numbers: times zero, infinity is no number.
+template <class Vector>
+[[nodiscard]] bool is_finite(const Vector& v) NONBLOCKING {
+  return 0 * v.x() + 0 * v.y() + 0 * v.z() == 0;
+}
+
 enum class Status : std::uint8_t {
   ok,            // fresh, valid data
   no_data,       // nothing new since the last call; the caller keeps what it has and its age grows

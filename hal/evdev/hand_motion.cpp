@@ -6,9 +6,6 @@
 namespace punctum::evdev {
 namespace {
 
-constexpr double kLongest_s = 0.05;  // between two readings; in a longer gap the hand goes no further
-constexpr double kThere_m = 1e-8;
-
 // As the kernel's drivers report them: Documentation/input/gamepad.rst; a mouse counts towards the operator,
 // a knob towards the operator (y) and down (z).
 constexpr Layout kLayouts[] = {
@@ -129,15 +126,14 @@ void HandMotion::take_relative(std::uint16_t code, int value) NONBLOCKING {
     if (layout_.counts == Counts::deflections) {
       way_m = beyond_dead_zone(value / kFullCounts) * params_.speed_m_s / kReports_1_s;
     }
-    ahead_m_[static_cast<Eigen::Index>(i)] += axis.sign * way_m;
+    follower_.move(i, axis.sign * way_m);
   }
 }
 
 void HandMotion::deflect(std::size_t axis, int value) NONBLOCKING {
   const double min = ranges_[axis].min, max = ranges_[axis].max;
   const double deflection = (2.0 * value - min - max) / (max - min);
-  speed_m_s_[static_cast<Eigen::Index>(axis)] =
-      layout_.axes[axis].sign * beyond_dead_zone(deflection) * params_.speed_m_s;
+  follower_.steer(axis, layout_.axes[axis].sign * beyond_dead_zone(deflection) * params_.speed_m_s);
 }
 
 // From -1 to 1, finer near the middle.
@@ -151,24 +147,8 @@ double HandMotion::beyond_dead_zone(double deflection) const NONBLOCKING {
 }
 
 hal::HandState HandMotion::at(std::int64_t now_ns) NONBLOCKING {
-  const double since_s = begun_ ? 1e-9 * static_cast<double>(now_ns - at_ns_) : 0;
-  const double dt_s = std::clamp(since_s, 0.0, kLongest_s);
-  begun_ = true;
-  at_ns_ = now_ns;
-  for (int i = 0; i < 3; ++i) {
-    ahead_m_[i] = std::clamp(ahead_m_[i] + dt_s * speed_m_s_[i], -kReach_m, kReach_m);
-  }
-  hal::Vec3 gap_m = ahead_m_ - at_m_;
-  const double most_m = params_.speed_m_s * kAhead_s;
-  if (const double length_m = gap_m.norm(); length_m > most_m) {
-    gap_m *= most_m / length_m;
-    ahead_m_ = at_m_ + gap_m;
-  }
-  const double length_m = gap_m.norm();
-  const double step_m = std::min(length_m * dt_s / (kLag_s + dt_s), params_.speed_m_s * dt_s);
-  at_m_ = length_m < kThere_m ? ahead_m_ : hal::Vec3(at_m_ + gap_m * (step_m / length_m));
   hal::HandState state;
-  state.position_m = at_m_;
+  state.position_m = follower_.at(now_ns);
   state.buttons = buttons_;
   state.sample_ns = now_ns;
   return state;

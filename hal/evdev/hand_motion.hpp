@@ -1,10 +1,8 @@
 // From the events of a mouse, a gamepad or a SpaceMouse to a hand: pure, so that it can be tested without a
 // device.
 //
-// The counts of a mouse are ways, the deflection of a stick or a knob is a speed. Either moves a point that
-// the hand follows with a lag of kLag_s and never faster than params.speed_m_s. The point is never further
-// ahead than the hand goes in kAhead_s at that speed; what is beyond is forgotten. So the position is
-// continuous whatever the device says, and at rest a tenth of a second after the fingers are.
+// The counts of a mouse are ways, the deflection of a stick or a knob is a speed: hal/hand_follower.hpp makes
+// the hand of them.
 #pragma once
 
 #include <linux/input.h>
@@ -15,6 +13,7 @@
 
 #include "hal/devices.hpp"
 #include "hal/evdev/config.hpp"
+#include "hal/hand_follower.hpp"
 #include "hal/realtime.hpp"
 
 namespace punctum::evdev {
@@ -73,17 +72,13 @@ struct Range {
 
 class HandMotion {
  public:
-  static constexpr double kLag_s = 0.02;
-  static constexpr double kAhead_s =
-      0.04;  // more than comes at once from a device that reports 50 times a second
   // A movement that waited for longer is not made late: the program was held up, and the hand is elsewhere.
   static constexpr std::int64_t kStale_ns = 50'000'000;
-  static constexpr double kReach_m = 1;  // from the origin
   // A knob that tells its deflection as counts: as many are full deflection, so often.
   static constexpr double kFullCounts = 350, kReports_1_s = 100;
 
   HandMotion(const EvdevParams& params, const Layout& layout, const std::array<Range, 3>& ranges)
-      : params_(params), layout_(layout), ranges_(ranges) {}
+      : params_(params), layout_(layout), ranges_(ranges), follower_(params.speed_m_s) {}
 
   // now_ns: on the clock of the event's own time.
   void take(const input_event& event, std::int64_t now_ns) NONBLOCKING;
@@ -104,12 +99,8 @@ class HandMotion {
   const EvdevParams params_;
   const Layout& layout_;
   const std::array<Range, 3> ranges_;
-  hal::Vec3 ahead_m_ = hal::Vec3::Zero();  // where the hand is going
-  hal::Vec3 at_m_ = hal::Vec3::Zero();
-  hal::Vec3 speed_m_s_ = hal::Vec3::Zero();  // of `ahead_m_`, by deflections
+  hal::HandFollower follower_;
   std::uint32_t buttons_ = 0;
-  std::int64_t at_ns_ = 0;
-  bool begun_ = false;
   bool losing_ = false;  // until the next report
   bool wants_state_ = false;
 };

@@ -12,7 +12,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <span>
 #include <type_traits>
+#include <utility>
 
 #include "hal/realtime.hpp"
 
@@ -57,11 +59,15 @@ struct Words {
   std::array<W, kCount> words{};
 
   void store(const T& value) NONBLOCKING {
-    std::array<std::uint64_t, kCount> raw;
-    std::memcpy(raw.data(), static_cast<const void*>(&value), sizeof(T));
-    for (std::size_t i = 0; i < kCount; ++i) {
-      words[i].store(raw[i], std::memory_order_release);
-    }
+    // Each word once, and no loop round it: a tick writes many.
+    const auto* bytes = reinterpret_cast<const std::byte*>(&value);
+    const auto store_word = [&](std::size_t i) NONBLOCKING {
+      std::uint64_t word = 0;
+      std::memcpy(&word, bytes + 8 * i, 8);
+      words[i].store(word, std::memory_order_release);
+    };
+    [&]<std::size_t... i>(std::index_sequence<i...>)
+        NONBLOCKING { (store_word(i), ...); }(std::make_index_sequence<kCount>{});
   }
 
   void load(T& out) const NONBLOCKING {
@@ -249,6 +255,19 @@ class Histogram {
     if (t > max_ns_.load(std::memory_order_relaxed)) {
       max_ns_.store(t, std::memory_order_relaxed);
     }
+  }
+
+  // What another histogram told: `bins` from 0 on, the rest empty.
+  void show(std::span<const std::uint64_t> bins, std::uint64_t overflow, std::uint64_t max_ns) NONBLOCKING {
+    std::uint64_t all = overflow;
+    for (std::size_t k = 0; k < Bins; ++k) {
+      const std::uint64_t n = k < bins.size() ? bins[k] : 0;
+      bins_[k].store(n, std::memory_order_relaxed);
+      all += n;
+    }
+    overflow_.store(overflow, std::memory_order_relaxed);
+    count_.store(all, std::memory_order_relaxed);
+    max_ns_.store(max_ns, std::memory_order_relaxed);
   }
 
   [[nodiscard]] std::uint64_t count() const NONBLOCKING { return count_.load(std::memory_order_relaxed); }

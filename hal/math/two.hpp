@@ -82,8 +82,9 @@ template <std::size_t n>
   } else if constexpr (n == 2) {
     return c[0] + c[1] * x;
   } else {
+    static_assert(n <= 32);
     double pairs[(n + 1) / 2]{};
-    for (std::size_t i = 0; i < n / 2; ++i) {
+    for (std::size_t i = 0; i < n / 2; ++i) {  // at most 16 rounds
       pairs[i] = c[2 * i] + c[2 * i + 1] * x;
     }
     if constexpr (n % 2 == 1) {

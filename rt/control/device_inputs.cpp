@@ -9,7 +9,6 @@
 namespace punctum::rt {
 namespace {
 
-constexpr double kRounding_s = 1e-9;
 constexpr double kLongest_s = 1e6;  // times that are only compared with limits count no further
 
 constexpr double kEstopSilent_s = 0.02;     // an e-stop chain without data for longer: estop_lost
@@ -277,7 +276,8 @@ Fault DeviceInputs::read_stage(const TickTime& time, const LastOutput& last) NON
     return Fault::stage_fault;
   }
   const bool answered = status == hal::Status::ok;
-  const bool believed = answered && axis_can_be_true(read.axis.normalized(), last);
+  const hal::Vec3 told_axis = answered ? read.axis.normalized() : read.axis;
+  const bool believed = answered && axis_can_be_true(told_axis, last);
   const SampleIs sample = believed ? stage_clock_.take(read.sample_ns, time.now_ns) : SampleIs::untimely;
   if (sample == SampleIs::untimely || stage_clock_.timed_out()) {
     readings_.alarms |= alarm_sensor;
@@ -291,7 +291,7 @@ Fault DeviceInputs::read_stage(const TickTime& time, const LastOutput& last) NON
     }
     return first_of(fault, not_enabled(time, last));
   }
-  const hal::Vec3 axis = turned(read, last);
+  const hal::Vec3 axis = turned(told_axis, read.sample_ns, last);
   readings_.stage = read;
   readings_.stage.axis = axis;
   readings_.stage_seen = true;
@@ -319,12 +319,12 @@ bool DeviceInputs::axis_can_be_true(const hal::Vec3& axis, const LastOutput& las
          near(mounted_axis_, 2 * config_.mapping.max_tilt_rad + kTurn_rad);
 }
 
-hal::Vec3 DeviceInputs::turned(const hal::StageState& read, const LastOutput& last) const NONBLOCKING {
-  const hal::Vec3 axis = read.axis.normalized();
+hal::Vec3 DeviceInputs::turned(const hal::Vec3& axis, std::int64_t sample_ns, const LastOutput& last) const
+    NONBLOCKING {
   if (!last.running || !readings_.stage_seen) {
     return axis;
   }
-  const double since_s = 1e-9 * static_cast<double>(read.sample_ns - readings_.stage.sample_ns);
+  const double since_s = 1e-9 * static_cast<double>(sample_ns - readings_.stage.sample_ns);
   const double most = kTurnSpeed_rad_s * std::clamp(since_s, 0.0, kLongestTurn_s);
   const hal::Vec3 turn = axis - readings_.stage.axis;
   const double length = turn.norm();

@@ -97,7 +97,8 @@ class DeviceInputs {
   void release_buttons() NONBLOCKING;
   [[nodiscard]] bool axis_can_be_true(const hal::Vec3& axis, const LastOutput& last) NONBLOCKING;
   // The axis that is told, no further from the last one than drives turn a needle.
-  [[nodiscard]] hal::Vec3 turned(const hal::StageState& read, const LastOutput& last) const NONBLOCKING;
+  [[nodiscard]] hal::Vec3 turned(const hal::Vec3& axis, std::int64_t sample_ns, const LastOutput& last) const
+      NONBLOCKING;
   [[nodiscard]] Fault judge_stage(const LastOutput& last) NONBLOCKING;
   [[nodiscard]] Fault not_enabled(const TickTime& time, const LastOutput& last) NONBLOCKING;
   [[nodiscard]] Fault read_vacuum(const TickTime& time, const LastOutput& last) NONBLOCKING;

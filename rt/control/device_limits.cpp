@@ -48,7 +48,7 @@ struct Complex {
   double sum = 0;
   const double half = 0.5 * n;
   if ((n + 1) * theta < 2) {
-    for (int i = 0; 2 * i < n; ++i) {
+    for (int i = 0; 2 * i < n; ++i) {  // at most Foaw::kMaxWindow rounds
       sum += 2 * (half - i) * math::sin((half - i) * theta);
     }
   } else {
@@ -139,6 +139,7 @@ void visit_real_values(int waves, Curve curve, Visit visit) NONBLOCKING {
   const double widest = pi / (kPerWave * waves);
   double from = kFirst;
   bool below = curve(from).im < 0;
+  // At most 200 + 24 * (Foaw::kMaxWindow + 16) rounds: up by a tenth from 1e-7, then evenly.
   while (from < pi) {
     const double to = std::min({from * kRatio, from + widest, pi});
     const bool next_below = curve(to).im < 0;
@@ -190,7 +191,7 @@ double passive_stiffness_N_m(const HandDevice& device, double T_s) NONBLOCKING {
 double stable_damping_Ns_m(const HandDevice& device, double T_s, const VelocityParams& velocity) NONBLOCKING {
   const VelocityResponse V(velocity, T_s);
   double least = kInfinite;
-  for (int n = 1; n <= V.windows(); ++n) {
+  for (int n = 1; n <= V.windows(); ++n) {  // at most Foaw::kMaxWindow rounds
     least = std::min(least, largest_damping(device.delay_ticks, V, n));
   }
   return least * device.mass_kg / T_s;
@@ -209,7 +210,7 @@ double stable_stiffness_N_m(const HandDevice& device, double T_s, const Velocity
   const double unit = device.mass_kg / T_s;
   const Handle handle(device.damping_Ns_m / unit, device.delay_ticks);
   double least = kInfinite;
-  for (int n = 1; n <= (damped ? V.windows() : 1); ++n) {
+  for (int n = 1; n <= (damped ? V.windows() : 1); ++n) {  // at most Foaw::kMaxWindow rounds
     least = std::min(least, largest_stiffness(handle, device.delay_ticks, B_Ns_m / unit, V, n));
   }
   return least * unit / T_s;

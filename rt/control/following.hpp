@@ -22,7 +22,7 @@ class FollowingCheck {
 
   void sent(const hal::Vec3& set_point_m) NONBLOCKING {
     if (count_ == 0 || since_s(newest_) >= age_s_ / kPast) {
-      newest_ = (newest_ + 1) % kPoints;
+      newest_ = newest_ + 1 < kPoints ? newest_ + 1 : 0;
       count_ = std::min(count_ + 1, kPoints);
       begun_ns_[newest_] = now_ns_;
     }
@@ -38,7 +38,7 @@ class FollowingCheck {
     if (count_ == 0 || (tip_m - point(0)).norm() <= limit_m) {
       return true;
     }
-    for (std::size_t ago = 1; ago < count_; ++ago) {
+    for (std::size_t ago = 1; ago < count_; ++ago) {  // at most kPoints rounds
       // The point before was left longer ago than a reading may be old: the tip cannot come from there any
       // more.
       if (ago > 1 && since_s(place(ago - 1)) > age_s_) {
@@ -61,7 +61,7 @@ class FollowingCheck {
   static constexpr std::size_t kPoints = kPast + 2;
 
   [[nodiscard]] std::size_t place(std::size_t ago) const NONBLOCKING {
-    return (newest_ + kPoints - ago) % kPoints;
+    return newest_ >= ago ? newest_ - ago : newest_ + kPoints - ago;
   }
   [[nodiscard]] const hal::Vec3& point(std::size_t ago) const NONBLOCKING { return path_[place(ago)]; }
 

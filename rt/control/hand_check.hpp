@@ -33,9 +33,9 @@ class HandCheck {
       candidate_.agreeing = 0;
       return bad();
     }
-    if (trusted_.agreeing > 0 && fits(trusted_, sample)) {
-      watch_leaps(sample);
-      advance(trusted_, sample);
+    if (const Step step = from(trusted_, sample); trusted_.agreeing > 0 && fits(trusted_, step, sample)) {
+      watch_leaps(step, sample);
+      advance(trusted_, step, sample);
       suspicion_ = std::max(suspicion_ - 1, 0);
       return leapt_ ? Is::leaps : Is::good;
     }
@@ -45,13 +45,14 @@ class HandCheck {
       }
       // At the start nothing tells which of two samples is wrong: the later one counts until it is confirmed.
       const bool contradicts = trusted_.agreeing > 0;
-      trusted_ = from(sample);
+      trusted_ = begun_by(sample);
       return contradicts && bad() == Is::invalid ? Is::invalid : Is::begins;
     }
-    if (candidate_.agreeing > 0 && fits(candidate_, sample)) {
-      advance(candidate_, sample);
+    if (const Step step = from(candidate_, sample);
+        candidate_.agreeing > 0 && fits(candidate_, step, sample)) {
+      advance(candidate_, step, sample);
     } else {
-      candidate_ = from(sample);
+      candidate_ = begun_by(sample);
     }
     if (candidate_.agreeing < kAgreeing) {
       return Is::invalid;
@@ -107,6 +108,14 @@ class HandCheck {
     double deviation_m = 0;  // mean distance from where the samples before point to
   };
 
+  // From the newest sample of a track to another one.
+  struct Step {
+    double dt_s;
+    hal::Vec3 gone_m;
+    double
+        deviation_m;  // from the way that leads on at the last velocity; its beginning is a hand that stands
+  };
+
   [[nodiscard]] static bool possible(const hal::HandState& sample) NONBLOCKING {
     for (const double x_m : {sample.position_m.x(), sample.position_m.y(), sample.position_m.z()}) {
       if (!(std::abs(x_m) <= kReach_m)) {
@@ -124,29 +133,26 @@ class HandCheck {
 
   [[nodiscard]] static double seconds(std::int64_t ns) NONBLOCKING { return 1e-9 * static_cast<double>(ns); }
 
-  // From the way that leads on at the last velocity; its beginning is a hand that stands.
-  [[nodiscard]] static double deviation_m(const Track& track, const hal::Vec3& at_m, double dt_s)
-      NONBLOCKING {
+  [[nodiscard]] static Step from(const Track& track, const hal::HandState& sample) NONBLOCKING {
+    const double dt_s = seconds(sample.sample_ns - track.sample_ns);
     const hal::Vec3 way_m = track.velocity_m_s * dt_s;
-    const hal::Vec3 gone_m = at_m - track.at_m;
+    const hal::Vec3 gone_m = sample.position_m - track.at_m;
     const double length2 = way_m.squaredNorm();
     const double along = length2 > 0 ? std::clamp(gone_m.dot(way_m) / length2, 0.0, 1.0) : 0.0;
-    return (gone_m - along * way_m).norm();
+    return {dt_s, gone_m, (gone_m - along * way_m).norm()};
   }
 
   [[nodiscard]] static double sped_up_m(const Track& track, double dt_s) NONBLOCKING {
     return kAcceleration_m_s2 * (track.between_s + dt_s) / 2 * dt_s;
   }
 
-  [[nodiscard]] bool is_leap(const Track& track, const hal::HandState& sample) const NONBLOCKING {
-    const double dt_s = seconds(sample.sample_ns - track.sample_ns);
-    return sped_up_m(track, dt_s) > kLeap_m &&
-           (sample.position_m - track.at_m - dt_s * track.velocity_m_s).norm() >
-               kLeap_m + kRounding_steps * step_m_;
+  [[nodiscard]] bool is_leap(const Track& track, const Step& step) const NONBLOCKING {
+    return sped_up_m(track, step.dt_s) > kLeap_m &&
+           (step.gone_m - step.dt_s * track.velocity_m_s).norm() > kLeap_m + kRounding_steps * step_m_;
   }
 
-  void watch_leaps(const hal::HandState& sample) NONBLOCKING {
-    if (is_leap(trusted_, sample)) {
+  void watch_leaps(const Step& step, const hal::HandState& sample) NONBLOCKING {
+    if (is_leap(trusted_, step)) {
       leapt_ = true;
       leapt_ns_ = sample.sample_ns;
       since_leap_ = 0;
@@ -156,20 +162,21 @@ class HandCheck {
     leapt_ = leapt_ && (since_leap_ < kAgreeing || seconds(sample.sample_ns - leapt_ns_) < kBrief_s);
   }
 
-  [[nodiscard]] bool fits(const Track& track, const hal::HandState& sample) const NONBLOCKING {
-    const double dt_s = seconds(sample.sample_ns - track.sample_ns);
-    if (!(dt_s > 0)) {
+  [[nodiscard]] bool fits(const Track& track, const Step& step, const hal::HandState& sample) const
+      NONBLOCKING {
+    if (!(step.dt_s > 0)) {
       return false;
     }
     const double noise_m = kRounding_steps * step_m_ + kDeviations * track.deviation_m;
-    const double turned = std::min((sample.orientation.coeffs() - track.orientation.coeffs()).norm(),
-                                   (sample.orientation.coeffs() + track.orientation.coeffs()).norm());
-    return (sample.position_m - track.at_m).norm() <= speed_m_s_ * dt_s + noise_m &&
-           deviation_m(track, sample.position_m, dt_s) <= sped_up_m(track, dt_s) + noise_m &&
-           turned <= 0.5 * (kTurn_rad_s * dt_s + kTurnNoise_rad);
+    const double turned =
+        std::sqrt(std::min((sample.orientation.coeffs() - track.orientation.coeffs()).squaredNorm(),
+                           (sample.orientation.coeffs() + track.orientation.coeffs()).squaredNorm()));
+    return step.gone_m.norm() <= speed_m_s_ * step.dt_s + noise_m &&
+           step.deviation_m <= sped_up_m(track, step.dt_s) + noise_m &&
+           turned <= 0.5 * (kTurn_rad_s * step.dt_s + kTurnNoise_rad);
   }
 
-  [[nodiscard]] Track from(const hal::HandState& sample) const NONBLOCKING {
+  [[nodiscard]] Track begun_by(const hal::HandState& sample) const NONBLOCKING {
     Track track;
     track.agreeing = 1;
     track.sample_ns = sample.sample_ns;
@@ -179,13 +186,12 @@ class HandCheck {
     return track;
   }
 
-  void advance(Track& track, const hal::HandState& sample) const NONBLOCKING {
-    const double dt_s = seconds(sample.sample_ns - track.sample_ns);
+  void advance(Track& track, const Step& step, const hal::HandState& sample) const NONBLOCKING {
     const double loudest_m = kLoudest_steps * step_m_;
-    const double deviates_m = std::min(deviation_m(track, sample.position_m, dt_s), loudest_m);
+    const double deviates_m = std::min(step.deviation_m, loudest_m);
     track.deviation_m += (deviates_m - track.deviation_m) / kDeviation_samples;
-    track.velocity_m_s = (sample.position_m - track.at_m) / dt_s;
-    track.between_s = dt_s;
+    track.velocity_m_s = step.gone_m / step.dt_s;
+    track.between_s = step.dt_s;
     track.at_m = sample.position_m;
     track.orientation = sample.orientation;
     track.sample_ns = sample.sample_ns;

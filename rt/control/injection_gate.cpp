@@ -1,11 +1,8 @@
 #include "rt/control/injection_gate.hpp"
 
+#include "rt/control/sample_clock.hpp"
+
 namespace punctum::rt {
-namespace {
-
-constexpr double kRounding_s = 1e-9;
-
-}  // namespace
 
 bool InjectionGate::step(const Readings& readings, const GateInput& in, double elapsed_s) NONBLOCKING {
   if (in.new_cell) {

@@ -25,10 +25,6 @@ constexpr int kCornerRounds = 3;
 // Nearer to a region than this, the direction away from it is found anew on every tick.
 constexpr double kNear_m = 20e-6;
 
-[[nodiscard]] bool is_finite(const hal::Vec3& v) NONBLOCKING {
-  return std::isfinite(v.x()) && std::isfinite(v.y()) && std::isfinite(v.z());
-}
-
 [[nodiscard]] hal::Vec3 shortened(const hal::Vec3& v, double longest) NONBLOCKING {
   const double length = v.norm();
   return length > longest ? hal::Vec3(v * (longest / length)) : v;
@@ -41,20 +37,6 @@ constexpr double kNear_m = 20e-6;
 }
 
 }  // namespace
-
-double Membrane3D::depth_m(const hal::Vec3& p) const NONBLOCKING {
-  const hal::Vec3 V = p - entry_m;
-  const double along = axis.dot(V);
-  const double r2 = std::min((V - along * axis).squaredNorm(), R_m * R_m);
-  // The sphere falls back from the entry plane with the distance from the axis.
-  return along - r2 / (R_m + std::sqrt(R_m * R_m - r2));
-}
-
-double Membrane3D::chord_m(const hal::Vec3& p) const NONBLOCKING {
-  const hal::Vec3 V = p - entry_m;
-  const double r2 = (V - axis.dot(V) * axis).squaredNorm();
-  return 2 * std::sqrt(std::max(R_m * R_m - r2, 0.0));
-}
 
 StageLimits::StageLimits(const LimitParams& limits, const MappingParams& mapping, double rate_Hz,
                          const std::optional<ForbiddenParams>& forbidden,
@@ -75,11 +57,31 @@ StageLimits::StageLimits(const LimitParams& limits, const MappingParams& mapping
   if (forbidden) {
     regions_.emplace(*forbidden);
   }
+  place(set_point_.tip_m);
+}
+
+void StageLimits::place(const hal::Vec3& tip_m) NONBLOCKING {
+  set_point_.tip_m = tip_m;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    low_here_m_[i] = std::min(low_m_[i], tip_m[i]);
+    high_here_m_[i] = std::max(high_m_[i], tip_m[i]);
+    clear_low_m_[i] = low_here_m_[i] + kAtLimit_m;
+    clear_high_m_[i] = high_here_m_[i] - kAtLimit_m;
+  }
+}
+
+bool StageLimits::is_in_workspace(const hal::Vec3& p) const NONBLOCKING {
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    if (p[i] < low_here_m_[i] || p[i] > high_here_m_[i]) {
+      return false;
+    }
+  }
+  return true;
 }
 
 void StageLimits::restart(const hal::Vec3& tip_m, const hal::Vec3& axis) NONBLOCKING {
-  set_point_ = {tip_m, axis};
-  velocity_m_s_.setZero();
+  place(tip_m);
+  set_point_.axis = axis;
   ahead_m_ = tip_m;
   ahead_m_s_.setZero();
   bounds_jerk_.restart(tip_m);
@@ -97,10 +99,12 @@ void StageLimits::look_for_regions() NONBLOCKING {
       continue;
     }
     hal::Vec3& away = away_[static_cast<std::size_t>(region)];
-    if (regions_->apart_m(region, away, needle) < kNear_m) {
+    double apart_m = regions_->apart_m(region, away, needle);
+    if (apart_m < kNear_m) {
       away = regions_->away(region, needle);
+      apart_m = regions_->apart_m(region, away, needle);
     }
-    free_m_ = std::min(free_m_, regions_->apart_m(region, away, needle));
+    free_m_ = std::min(free_m_, apart_m);
   }
 }
 
@@ -122,7 +126,7 @@ hal::Vec3 StageLimits::within_workspace(const hal::Vec3& point_m) const NONBLOCK
   const hal::Vec3 way = point_m - here;
   double part = 1;
   for (Eigen::Index i = 0; i < 3; ++i) {
-    const double end = way[i] > 0 ? std::max(high_m_[i], here[i]) : std::min(low_m_[i], here[i]);
+    const double end = way[i] > 0 ? high_here_m_[i] : low_here_m_[i];
     if (std::abs(way[i]) > std::abs(end - here[i]) + kRounding_m) {
       part = std::min(part, (end - here[i]) / way[i]);
     }
@@ -134,7 +138,7 @@ StageLimits::Checked StageLimits::check_cell(const hal::Vec3& wanted_m, const St
     NONBLOCKING {
   const hal::Vec3& here = set_point_.tip_m;
   Checked out{wanted_m, 0};
-  if (c.frozen || !is_finite(wanted_m)) {
+  if (c.frozen || !hal::is_finite(wanted_m)) {
     return {here, 0};
   }
 
@@ -143,21 +147,19 @@ StageLimits::Checked StageLimits::check_cell(const hal::Vec3& wanted_m, const St
     out.point_m = here + made(wanted_m - here);
   }
 
-  // Workspace; a needle that is outside already may stay or come back.
+  // Workspace.
   for (Eigen::Index i = 0; i < 3; ++i) {
-    const double low = std::min(low_m_[i], here[i]);
-    const double high = std::max(high_m_[i], here[i]);
-    if (out.point_m[i] < low + kAtLimit_m || out.point_m[i] > high - kAtLimit_m) {
+    double& x_m = out.point_m[i];
+    if (x_m < clear_low_m_[i] || x_m > clear_high_m_[i]) {
       out.alarms |= alarm_travel_limited;
+      x_m = std::clamp(x_m, low_here_m_[i], high_here_m_[i]);
     }
-    out.point_m[i] = std::clamp(out.point_m[i], low, high);
   }
   if (reach_) {
     out.point_m = within_workspace(here + made(out.point_m - here));
   }
 
   const Membrane3D& m = c.membrane;
-  const hal::Vec3 inward = made(m.axis);
   if (c.withdrawal_only) {
     // Outward along the axis, nothing else, and not out of the workspace.
     const double wanted = std::max(-m.axis.dot(wanted_m - here), 0.0);
@@ -168,28 +170,30 @@ StageLimits::Checked StageLimits::check_cell(const hal::Vec3& wanted_m, const St
       if (direction == 0) {
         continue;
       }
-      const double room =
-          direction > 0 ? std::max(high_m_[i], here[i]) - here[i] : std::min(low_m_[i], here[i]) - here[i];
+      const double room = (direction > 0 ? high_here_m_[i] : low_here_m_[i]) - here[i];
       outward = std::min(outward, room / direction);
     }
     if (outward < wanted) {
       out.alarms |= alarm_travel_limited;
     }
-    out.point_m = here - std::max(outward, 0.0) * inward;
+    out.point_m = here - std::max(outward, 0.0) * made(m.axis);
     return out;
   }
   if (c.insertion) {
-    out.alarms |= keep_to_line(out.point_m, *c.insertion);
-    out.point_m = within_workspace(out.point_m);  // an oblique line leads out of it
+    if (const std::uint32_t held = keep_to_line(out.point_m, *c.insertion); held != 0) {
+      out.alarms |= held;
+      out.point_m = within_workspace(out.point_m);  // an oblique line leads out of it
+    }
   }
-  const double beyond = m.axis.dot(out.point_m) - std::max(c.inward_limit_m, m.axis.dot(here));
-  if (beyond > -kAtLimit_m) {
-    out.alarms |= alarm_depth_limited;
-  }
-  if (beyond > 0) {
-    out.point_m -= beyond * inward;
-    for (Eigen::Index i = 0; i < 3; ++i) {
-      if (out.point_m[i] < std::min(low_m_[i], here[i]) || out.point_m[i] > std::max(high_m_[i], here[i])) {
+  const double inward_m = m.axis.dot(out.point_m);
+  if (inward_m - c.inward_limit_m > -kAtLimit_m) {
+    const double beyond = inward_m - std::max(c.inward_limit_m, m.axis.dot(here));
+    if (beyond > -kAtLimit_m) {
+      out.alarms |= alarm_depth_limited;
+    }
+    if (beyond > 0) {
+      out.point_m -= beyond * made(m.axis);
+      if (!is_in_workspace(out.point_m)) {
         out.point_m = here;
       }
     }
@@ -204,13 +208,17 @@ StageLimits::Checked StageLimits::check_cell(const hal::Vec3& wanted_m, const St
   if (depth <= 0) {
     return out;
   }
-  const double depth_here = std::max(m.depth_m(here), 0.0);
   const double at_most_m = std::min(limits_.penetration_depth_m, c.depth_limit_m);
   const auto room = [&](const hal::Vec3& p) {
     return std::max(std::min(at_most_m, m.chord_m(p) - limits_.far_wall_m), 0.0);
   };
+  const double room_there = room(out.point_m);
+  if (!c.no_deeper && depth <= room_there - kAtLimit_m) {
+    return out;  // whatever room a needle that is too deep is left besides
+  }
+  const double depth_here = std::max(m.depth_m(here), 0.0);
   const double excess = std::max(depth_here - room(here), 0.0);
-  double deepest = room(out.point_m) + excess;
+  double deepest = room_there + excess;
   if (depth > deepest - kAtLimit_m) {
     out.alarms |= alarm_depth_limited;
   }
@@ -219,12 +227,9 @@ StageLimits::Checked StageLimits::check_cell(const hal::Vec3& wanted_m, const St
     out.alarms |= alarm_tip_force;
   }
   if (depth > deepest) {
-    out.point_m -= (depth - deepest) * inward;
-    for (Eigen::Index i = 0; i < 3; ++i) {
-      // Out of the cell but out of the workspace too: stay.
-      if (out.point_m[i] < std::min(low_m_[i], here[i]) || out.point_m[i] > std::max(high_m_[i], here[i])) {
-        out.point_m = here;
-      }
+    out.point_m -= (depth - deepest) * made(m.axis);
+    if (!is_in_workspace(out.point_m)) {
+      out.point_m = here;  // out of the cell but out of the workspace too: stay
     }
   }
   return out;
@@ -304,6 +309,9 @@ void StageLimits::keep_out(Checked& out, const StageConstraint& c) const NONBLOC
 
 // Whether the needle may be turned to this axis where it is: not into a region, nor further into one.
 bool StageLimits::may_point(const hal::Vec3& axis) const NONBLOCKING {
+  if (axis == set_point_.axis) {
+    return true;
+  }
   for (const Region region : kRegions) {
     if (!regions_->has(region)) {
       continue;
@@ -420,7 +428,7 @@ void StageLimits::settle(const hal::Vec3& wanted_m, const hal::Vec3& held_m) NON
 const hal::StageCommand& StageLimits::step(const hal::StageCommand& target, const StageConstraint& c)
     NONBLOCKING {
   alarms_ = 0;
-  finite_ = is_finite(target.tip_m) && is_finite(target.axis);
+  finite_ = hal::is_finite(target.tip_m) && hal::is_finite(target.axis);
   if (c.frozen) {
     restart(set_point_.tip_m, set_point_.axis);
     return set_point_;
@@ -442,8 +450,7 @@ const hal::StageCommand& StageLimits::step(const hal::StageCommand& target, cons
     }
   }
   settle(wanted_m, next.point_m);
-  set_point_.tip_m = next.point_m;
-  velocity_m_s_ = (next.point_m - here) / dt_s_;
+  place(next.point_m);
   if (!finite_) {
     look_for_regions();
     return set_point_;
@@ -461,7 +468,7 @@ const hal::StageCommand& StageLimits::step(const hal::StageCommand& target, cons
 
 LimitedForce limit_hand_force(const hal::Vec3& wanted_N, double max_N) NONBLOCKING {
   LimitedForce out;
-  if (!is_finite(wanted_N)) {
+  if (!hal::is_finite(wanted_N)) {
     out.finite = false;
     return out;
   }

@@ -1,7 +1,9 @@
 // What the needle and the hand may do. Checked on every set-point and on every force, after everything else.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <iterator>
 #include <limits>
@@ -56,9 +58,19 @@ struct Membrane3D {
   double R_m = 0;
 
   // Depth of a point past the undeformed membrane along the axis; < 0 outside.
-  [[nodiscard]] double depth_m(const hal::Vec3& p) const NONBLOCKING;
+  [[nodiscard]] double depth_m(const hal::Vec3& p) const NONBLOCKING {
+    const hal::Vec3 V = p - entry_m;
+    const double along = axis.dot(V);
+    const double r2 = std::min((V - along * axis).squaredNorm(), R_m * R_m);
+    // The sphere falls back from the entry plane with the distance from the axis.
+    return along - r2 / (R_m + std::sqrt(R_m * R_m - r2));
+  }
   // Depth of the far wall on the same line.
-  [[nodiscard]] double chord_m(const hal::Vec3& p) const NONBLOCKING;
+  [[nodiscard]] double chord_m(const hal::Vec3& p) const NONBLOCKING {
+    const hal::Vec3 V = p - entry_m;
+    const double r2 = (V - axis.dot(V) * axis).squaredNorm();
+    return 2 * std::sqrt(std::max(R_m * R_m - r2, 0.0));
+  }
 };
 
 struct StageConstraint {
@@ -111,11 +123,13 @@ class StageLimits {
   [[nodiscard]] double lag_s() const NONBLOCKING { return lag_s_; }
 
   [[nodiscard]] const hal::StageCommand& set_point() const NONBLOCKING { return set_point_; }
-  [[nodiscard]] const hal::Vec3& velocity() const NONBLOCKING { return velocity_m_s_; }
   [[nodiscard]] std::uint32_t alarms() const NONBLOCKING { return alarms_; }  // of the last step
   [[nodiscard]] bool finite() const NONBLOCKING { return finite_; }           // the last target was
 
  private:
+  // The set-point's tip is here from now on.
+  void place(const hal::Vec3& tip_m) NONBLOCKING;
+  [[nodiscard]] bool is_in_workspace(const hal::Vec3& point_m) const NONBLOCKING;
   // Workspace, cell and line of insertion.
   [[nodiscard]] Checked check_cell(const hal::Vec3& wanted_m, const StageConstraint& c) const NONBLOCKING;
   // The part of a motion that the stage can make.
@@ -145,6 +159,10 @@ class StageLimits {
   LimitParams limits_;
   hal::Vec3 low_m_;
   hal::Vec3 high_m_;
+  hal::Vec3 low_here_m_;  // the workspace and the set-point: outside already, it may stay or come back
+  hal::Vec3 high_here_m_;
+  hal::Vec3 clear_low_m_;  // of these; a point between them is held by neither
+  hal::Vec3 clear_high_m_;
   std::optional<hal::Mat3> reach_;
   std::optional<ForbiddenRegions> regions_;
   // Directions in which needle and regions lie apart: as long as they do, nothing more is computed.
@@ -158,7 +176,6 @@ class StageLimits {
   hal::Vec3 ahead_m_s_ = hal::Vec3::Zero();
   MovingAverage bounds_jerk_;
   hal::StageCommand set_point_;
-  hal::Vec3 velocity_m_s_ = hal::Vec3::Zero();
   std::uint32_t alarms_ = 0;
   bool finite_ = true;
 };

@@ -71,7 +71,7 @@ bool PoseHistory::at(std::int64_t t_ns, TipPose& out) const NONBLOCKING {
   }
   std::size_t low = 0;  // the last pose not after t
   std::size_t high = size_;
-  while (high - low > 1) {
+  while (high - low > 1) {  // at most 13 rounds: each halves kSize
     const std::size_t middle = (low + high) / 2;
     (pose(middle).t_ns <= t_ns ? low : high) = middle;
   }

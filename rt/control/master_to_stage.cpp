@@ -1,6 +1,7 @@
 #include "rt/control/master_to_stage.hpp"
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "hal/frames.hpp"
@@ -12,19 +13,28 @@ namespace {
 constexpr double kButterworth = std::numbers::sqrt2 / 2;  // damping ratio
 
 // One step of x'' = w^2 (u - x) - 2 zeta w x' by the implicit mid-point rule: stable for every dt.
-void low_pass(hal::Vec3& x, hal::Vec3& v, const hal::Vec3& u, double cutoff_Hz, double dt_s) NONBLOCKING {
-  if (!(cutoff_Hz > 0)) {
-    x = u;
-    v.setZero();
-    return;
+class LowPass {
+ public:
+  LowPass(double cutoff_Hz, double dt_s) NONBLOCKING : wt_(2 * std::numbers::pi * cutoff_Hz * dt_s),
+                                                       dt_s_(dt_s) {}
+
+  void step(hal::Vec3& x, hal::Vec3& v, const hal::Vec3& u) const NONBLOCKING {
+    if (!(wt_ > 0)) {
+      x = u;
+      v.setZero();
+      return;
+    }
+    const double damp = kButterworth * wt_;
+    const double spring = wt_ * wt_ / 4;
+    const hal::Vec3 v_next = (v * (1 - damp - spring) + (u - x) * (wt_ * wt_ / dt_s_)) / (1 + damp + spring);
+    x += (v + v_next) * (dt_s_ / 2);
+    v = v_next;
   }
-  const double wt = 2 * std::numbers::pi * cutoff_Hz * dt_s;
-  const double damp = kButterworth * wt;
-  const double spring = wt * wt / 4;
-  const hal::Vec3 v_next = (v * (1 - damp - spring) + (u - x) * (wt * wt / dt_s)) / (1 + damp + spring);
-  x += (v + v_next) * (dt_s / 2);
-  v = v_next;
-}
+
+ private:
+  double wt_;
+  double dt_s_;
+};
 
 // The handle's rotation vector in world axes, without its part along `axis`.
 [[nodiscard]] hal::Vec3 tilt_of(const hal::Quat& q, const hal::Vec3& axis) NONBLOCKING {
@@ -49,7 +59,8 @@ void low_pass(hal::Vec3& x, hal::Vec3& v, const hal::Vec3& u, double cutoff_Hz, 
   if (!(angle > 1e-12)) {
     return axis;
   }
-  return (math::cos(angle) * axis + math::sin(angle) / angle * tilt.cross(axis)).normalized();
+  const math::SinCos turn = math::sin_cos(angle);
+  return (turn.cos * axis + turn.sin / angle * tilt.cross(axis)).normalized();
 }
 
 }  // namespace
@@ -58,7 +69,11 @@ void MasterToStage::anchor(const hal::HandState& hand, const hal::Vec3& tip_m, c
     NONBLOCKING {
   if (!anchored_) {
     base_axis_ = axis;
+    handle_ = hal::Quat::Identity();
+    handle_tilt_rad_.setZero();
   }
+  tilt_stands_ = false;
+  turned_by_rad_.setConstant(std::numeric_limits<double>::quiet_NaN());
   anchored_ = true;
   anchor_hand_m_ = hand.position_m;
   anchor_tip_m_ = tip_m;
@@ -88,17 +103,27 @@ void MasterToStage::step(const hal::HandState& hand, bool coupled, bool tilting)
   if (!(params_.max_tilt_rad > 0)) {
     return;
   }
-  const hal::Vec3 handle = tilt_of(hand.orientation, base_axis_);
   if (coupled && tilting) {
+    if (tilt_stands_) {
+      tilt_anchor_rad_ = tilt_wanted_rad_ - handle_tilt_rad(stood_at_);
+    }
     has_tilted_ = true;
-    tilt_wanted_rad_ = bounded(handle + tilt_anchor_rad_, params_.max_tilt_rad);
+    tilt_stands_ = false;
+    tilt_wanted_rad_ = bounded(handle_tilt_rad(hand.orientation) + tilt_anchor_rad_, params_.max_tilt_rad);
   } else {
     tilt_wanted_rad_ = tilt_rad_;
     tilt_velocity_rad_s_.setZero();
-    if (has_tilted_) {
-      tilt_anchor_rad_ = tilt_rad_ - handle;
-    }
+    tilt_stands_ = has_tilted_;
+    stood_at_ = hand.orientation;
   }
+}
+
+const hal::Vec3& MasterToStage::handle_tilt_rad(const hal::Quat& handle) NONBLOCKING {
+  if (handle.coeffs() != handle_.coeffs()) {
+    handle_ = handle;
+    handle_tilt_rad_ = tilt_of(handle_, base_axis_);
+  }
+  return handle_tilt_rad_;
 }
 
 void MasterToStage::slip(const hal::Vec3& to) NONBLOCKING {
@@ -115,11 +140,15 @@ const hal::StageCommand& MasterToStage::filter(double dt_s) NONBLOCKING {
   if (!(dt_s > 0)) {
     return set_point_;
   }
-  low_pass(set_point_.tip_m, filter_velocity_m_s_, hand_point_m_, params_.tremor_cutoff_Hz, dt_s);
+  const LowPass low_pass(params_.tremor_cutoff_Hz, dt_s);
+  low_pass.step(set_point_.tip_m, filter_velocity_m_s_, hand_point_m_);
   if (params_.max_tilt_rad > 0) {
-    low_pass(tilt_rad_, tilt_velocity_rad_s_, tilt_wanted_rad_, params_.tremor_cutoff_Hz, dt_s);
+    low_pass.step(tilt_rad_, tilt_velocity_rad_s_, tilt_wanted_rad_);
     tilt_rad_ = bounded(tilt_rad_, params_.max_tilt_rad);
-    set_point_.axis = turned(base_axis_, tilt_rad_);
+    if (tilt_rad_ != turned_by_rad_) {
+      turned_by_rad_ = tilt_rad_;
+      set_point_.axis = turned(base_axis_, tilt_rad_);
+    }
   }
   return set_point_;
 }

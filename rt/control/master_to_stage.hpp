@@ -72,9 +72,13 @@ class MasterToStage {
   [[nodiscard]] const hal::StageCommand& set_point() const NONBLOCKING { return set_point_; }
 
  private:
+  [[nodiscard]] const hal::Vec3& handle_tilt_rad(const hal::Quat& handle) NONBLOCKING;
+
   MappingParams params_;
   bool anchored_ = false;
   bool has_tilted_ = false;
+  bool tilt_stands_ = false;                    // the handle turned freely, and the needle's tilt stayed
+  hal::Quat stood_at_ = hal::Quat::Identity();  // the handle, when it was seen last meanwhile
   hal::Vec3 anchor_hand_m_ = hal::Vec3::Zero();
   hal::Vec3 anchor_tip_m_ = hal::Vec3::Zero();
   hal::Vec3 hand_point_m_ = hal::Vec3::Zero();
@@ -85,6 +89,10 @@ class MasterToStage {
   hal::Vec3 tilt_rad_ = hal::Vec3::Zero();         // behind the filter
   hal::Vec3 tilt_velocity_rad_s_ = hal::Vec3::Zero();
   hal::StageCommand set_point_;
+  // What was worked out once: of a handle that has not turned since, and of a tilt that is the same.
+  hal::Quat handle_ = hal::Quat::Identity();
+  hal::Vec3 handle_tilt_rad_ = hal::Vec3::Zero();
+  hal::Vec3 turned_by_rad_ = hal::Vec3::Zero();  // the axis of set_point_; not a number: another way
 };
 
 }  // namespace punctum::rt

@@ -23,7 +23,7 @@ class MovingAverage {
   void restart(const hal::Vec3& at) NONBLOCKING {
     origin_ = at;
     sum_.setZero();
-    for (std::size_t i = 0; i < samples_; ++i) {
+    for (std::size_t i = 0; i < samples_; ++i) {  // at most kMost rounds
       past_[i].setZero();
     }
   }
@@ -31,7 +31,7 @@ class MovingAverage {
   // The path had no part along `normal` (unit), and has led to `to` instead of the mean `from`.
   void flatten(const hal::Vec3& from, const hal::Vec3& to, const hal::Vec3& normal) NONBLOCKING {
     sum_.setZero();
-    for (std::size_t i = 0; i < samples_; ++i) {
+    for (std::size_t i = 0; i < samples_; ++i) {  // at most kMost rounds
       const hal::Vec3 off = origin_ + past_[i] - from;
       past_[i] = to - origin_ + off - normal.dot(off) * normal;
       sum_ += past_[i];
@@ -44,7 +44,7 @@ class MovingAverage {
     next_ = next_ + 1 < samples_ ? next_ + 1 : 0;
     if (next_ == 0) {  // the sum is made anew, so that rounding does not add up
       sum_.setZero();
-      for (std::size_t i = 0; i < samples_; ++i) {
+      for (std::size_t i = 0; i < samples_; ++i) {  // at most kMost rounds
         sum_ += past_[i];
       }
     }

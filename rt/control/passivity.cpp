@@ -73,15 +73,18 @@ constexpr double kFaster = 2.5;
 // Below what a finger feels: the work of such a force within an encoder step is no surplus.
 constexpr double kSteadyForce_N = 0.02;
 
+// 0 if it is finite, otherwise not a number.
+[[nodiscard]] double nothing(double x) NONBLOCKING { return 0 * x; }
+[[nodiscard]] double nothing(const hal::Vec3& v) NONBLOCKING { return 0 * v.x() + 0 * v.y() + 0 * v.z(); }
+
 [[nodiscard]] bool finite(const GuardInput& in) NONBLOCKING {
-  bool good = in.position_m.allFinite() && in.dissipative_N.allFinite() && in.active_N.allFinite() &&
-              std::isfinite(in.stiffness_N_m) && std::isfinite(in.damping_Ns_m) &&
-              std::isfinite(in.elapsed_s) && in.elapsed_s > 0 && std::isfinite(in.stored_J) &&
-              std::isfinite(in.between_s) && std::isfinite(in.age_s);
+  double zero = nothing(in.position_m) + nothing(in.dissipative_N) + nothing(in.active_N) +
+                nothing(in.stiffness_N_m) + nothing(in.damping_Ns_m) + nothing(in.elapsed_s) +
+                nothing(in.stored_J) + nothing(in.between_s) + nothing(in.age_s);
   for (const StoringForce& s : in.storing) {
-    good = good && s.force_N.allFinite() && s.point_m.allFinite();
+    zero += nothing(s.force_N) + nothing(s.point_m);
   }
-  return good;
+  return zero == 0 && in.elapsed_s > 0;
 }
 
 [[nodiscard]] double square(double x) NONBLOCKING { return x * x; }
@@ -397,7 +400,7 @@ hal::Vec3 PassivityGuard::step(const GuardInput& in) NONBLOCKING {
 void PassivityGuard::wrote(const hal::Vec3& force_N) NONBLOCKING {
   newest_ = (newest_ + 1) % kRing;
   written_[newest_] = {};
-  if (force_N.allFinite()) {
+  if (hal::is_finite(force_N)) {
     // A limit takes the same part of both.
     const double asked_N = (asked_.passive_N + asked_.active_N).norm();
     const double written_N = force_N.norm();

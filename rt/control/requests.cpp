@@ -34,7 +34,7 @@ const Requested& Requests::take(double dt_s) NONBLOCKING {
   approach_targets(dt_s);
   requested_.taken_count = 0;
   std::uint32_t writer = 0;
-  for (const CommandInput& from : station_.commands) {
+  for (const CommandInput& from : station_.commands) {  // at most kCommandWriterCount rounds
     Command command;
     for (std::size_t i = 0; i < kCommandsPerTick && from.queue->try_pop(command); ++i) {
       const bool obeyed = obey(command, from.role);
@@ -51,6 +51,9 @@ const Requested& Requests::take(double dt_s) NONBLOCKING {
 }
 
 void Requests::approach_targets(double dt_s) NONBLOCKING {
+  if (at_targets_) {
+    return;
+  }
   const double most = kRampRate_1_s * dt_s;
   approach(requested_.force_scale, force_scale_target_, most);
   for (std::size_t i = 0; i < effect_count; ++i) {
@@ -58,6 +61,9 @@ void Requests::approach_targets(double dt_s) NONBLOCKING {
   }
   approach(requested_.hand_force_N, hand_force_target_N_, most * most_hand_force_N_);
   approach(requested_.depth_limit_m, depth_target_m_, most * most_depth_m_);
+  at_targets_ =
+      requested_.force_scale == force_scale_target_ && requested_.effect_gain == effect_gain_target_ &&
+      requested_.hand_force_N == hand_force_target_N_ && requested_.depth_limit_m == depth_target_m_;
 }
 
 bool Requests::obey(const Command& command, CommandKinds role) NONBLOCKING {
@@ -65,6 +71,7 @@ bool Requests::obey(const Command& command, CommandKinds role) NONBLOCKING {
     return false;
   }
   const bool fraction = command.value >= 0 && command.value <= 1;
+  at_targets_ = false;
   switch (command.kind) {
     case Command::stop:
       requested_.stop = true;

@@ -62,6 +62,7 @@ class Requests {
   EffectGains effect_gain_target_ = kFullGains;
   double hand_force_target_N_;
   double depth_target_m_;
+  bool at_targets_ = true;
 };
 
 }  // namespace punctum::rt

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
+#include "rt/control/sample_clock.hpp"
+
 namespace punctum::rt {
 namespace {
-
-constexpr double kRounding_s = 1e-9;
 
 [[nodiscard]] bool asks_for_reset(Fault cause) NONBLOCKING {
   return cause != Fault::none && safety_rule(cause).cleared_by != ClearedBy::release_and_press;

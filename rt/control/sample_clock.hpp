@@ -14,11 +14,15 @@
 
 namespace punctum::rt {
 
+inline constexpr double kRounding_s = 1e-9;  // of a sum of the ticks' times
+
 enum class SampleIs : std::uint8_t { fresh, repeated, untimely };
 
 class SampleClock {
  public:
-  explicit SampleClock(double timeout_s) NONBLOCKING : timeout_s_(timeout_s) {}
+  explicit SampleClock(double timeout_s) NONBLOCKING
+      : timeout_s_(timeout_s),
+        timeout_ns_(static_cast<std::int64_t>(timeout_s * 1e9 + 0.5)) {}
 
   // Once per tick, before its reading.
   void step(double elapsed_s) NONBLOCKING {
@@ -30,12 +34,14 @@ class SampleClock {
 
   // A fresh sample counts as the newest one from here on.
   [[nodiscard]] SampleIs take(std::int64_t sample_ns, std::int64_t now_ns) NONBLOCKING {
-    const bool is_newest = begun_ && sample_ns == newest_ns_;
-    const double older_s = is_newest ? 1e-9 * static_cast<double>(now_ns - sample_ns) - age_s() : 0;
-    // It arrived when the clock was wrong: two readings in a row say that it is older.
-    age_at_arrival_s_ += std::max(0.0, std::min(older_s, was_older_s_));
+    double older_s = 0;
+    if (begun_ && sample_ns == newest_ns_) {
+      older_s = 1e-9 * static_cast<double>(now_ns - sample_ns) - age_s();
+      // It arrived when the clock was wrong: two readings in a row say that it is older.
+      age_at_arrival_s_ += std::max(0.0, std::min(older_s, was_older_s_));
+    }
     was_older_s_ = older_s;
-    if (sample_ns > now_ns + kAhead_ns || sample_ns < now_ns - nanoseconds(timeout_s_)) {
+    if (sample_ns > now_ns + kAhead_ns || sample_ns < now_ns - timeout_ns_) {
       return SampleIs::untimely;
     }
     // A device that has been silent for too long begins anew, but not with the sample that it had.
@@ -64,13 +70,9 @@ class SampleClock {
   // the rounding of their times.
   static constexpr std::int64_t kNearest_ns = 50'000;
   static constexpr double kLongest_s = 1e6;
-  static constexpr double kRounding_s = 1e-9;
-
-  [[nodiscard]] static std::int64_t nanoseconds(double s) NONBLOCKING {
-    return static_cast<std::int64_t>(s * 1e9 + 0.5);
-  }
 
   double timeout_s_;
+  std::int64_t timeout_ns_;
   double silent_s_ = 0;  // since the newest sample arrived
   double age_at_arrival_s_ = 0;
   double was_older_s_ = 0;  // than it was counted, on the tick before

@@ -81,7 +81,7 @@ std::uint32_t Servo::follow_hand(const TickTime& time, const Readings& readings,
       {.running = last_.output.running,
        .vision_fresh = last_cell.vision_fresh,
        .clutched = readings.button(hal::kButtonClutch) || task_.ending(requested),
-       .may_tilt = last_task.phase == Phase::free,
+       .may_tilt = last_task.phase == Phase::free && !last_task.inside_cell,  // there may be no phases
        .constraint = constraint(last_cell, last_task, requested, force_limits_.last_tip_force_soft()),
        .elapsed_s = time.elapsed_s,
        .position_scale = requested.position_scale,

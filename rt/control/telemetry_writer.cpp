@@ -63,6 +63,7 @@ void TelemetryWriter::publish(const TickRecord& tick) NONBLOCKING {
 // Before the sample: whoever has seen a sample finds its events.
 void TelemetryWriter::tell_events(const Seen& last, const Requested& requested) NONBLOCKING {
   const TelemetrySample& s = sample_;
+  // At most kCommandsPerTick * kCommandWriterCount rounds.
   for (std::size_t i = 0; i < requested.taken_count; ++i) {
     const TakenCommand& taken = requested.taken[i];
     tell({.kind = taken.obeyed ? Event::command : Event::command_refused,
@@ -76,15 +77,22 @@ void TelemetryWriter::tell_events(const Seen& last, const Requested& requested) 
     tell({.kind = latched ? Event::fault : Event::fault_cleared,
           .what = static_cast<std::uint64_t>(latched ? s.fault : last.fault)});
   }
-  for (std::uint32_t bit = 0; bit < std::size(kAlarmNames); ++bit) {
-    if (((s.alarms ^ last.alarms) >> bit & 1U) != 0) {
-      tell({.kind = (s.alarms >> bit & 1U) != 0 ? Event::alarm_on : Event::alarm_off, .what = bit});
-    }
+  if (s.alarms != last.alarms) {
+    tell_alarms(last.alarms);
   }
   if (s.phase != last.phase || s.cell != last.cell) {
     tell({.kind = Event::phase,
           .what = static_cast<std::uint64_t>(s.phase),
           .value = static_cast<double>(s.cell)});
+  }
+}
+
+void TelemetryWriter::tell_alarms(std::uint32_t last) NONBLOCKING {
+  const std::uint32_t now = sample_.alarms;
+  for (std::uint32_t bit = 0; bit < std::size(kAlarmNames); ++bit) {
+    if (((now ^ last) >> bit & 1U) != 0) {
+      tell({.kind = (now >> bit & 1U) != 0 ? Event::alarm_on : Event::alarm_off, .what = bit});
+    }
   }
 }
 

@@ -46,6 +46,7 @@ class TelemetryWriter {
     std::uint32_t cell;
   };
   void tell_events(const Seen& last, const Requested& requested) NONBLOCKING;
+  void tell_alarms(std::uint32_t last) NONBLOCKING;
   void tell(Event event) NONBLOCKING;
   void fill_forces(const Rendering& rendering, const SafetyOutput& safety, double depth_sd_m) NONBLOCKING;
   void fill_cell(const CellFacts& cell) NONBLOCKING;

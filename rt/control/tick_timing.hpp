@@ -6,16 +6,9 @@
 #include "hal/realtime.hpp"
 #include "rt/control/config.hpp"
 #include "rt/station/fault.hpp"
+#include "rt/station/tick_info.hpp"
 
 namespace punctum::rt {
-
-struct TickInfo {
-  std::uint64_t tick = 0;              // of the absolute grid, from 0; gaps are missed releases
-  std::int64_t release_ns = 0;         // of this tick on the grid
-  std::int64_t start_ns = 0;           // when it really began; devices are read at this time
-  double period_s = 0;                 // really elapsed since the previous tick
-  std::uint64_t missed_in_window = 0;  // missed releases in the last ServoConfig::overrun_window_s
-};
 
 struct TickTime {
   std::int64_t now_ns = 0;  // rises: where the clock goes back it stands still until the clock is there again

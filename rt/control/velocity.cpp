@@ -71,7 +71,7 @@ BasicKalman<Real>::BasicKalman(const VelocityParams& params, double T_s) NONBLOC
 
 template <class Real>
 typename BasicKalman<Real>::Vector BasicKalman<Real>::step(const Vector& position_m, Real dt_s) NONBLOCKING {
-  if (!position_m.allFinite() || (begun_ && !(dt_s > 0))) {
+  if (!hal::is_finite(position_m) || (begun_ && !(dt_s > 0))) {
     return velocity_;
   }
   if (!begun_ || dt_s > kGap_s) {
@@ -122,7 +122,7 @@ BasicFoaw<Real>::BasicFoaw(const VelocityParams& params) NONBLOCKING
 // costs the same whatever the window.
 template <class Real>
 typename BasicFoaw<Real>::Vector BasicFoaw<Real>::step(const Vector& position_m, Real dt_s) NONBLOCKING {
-  if (!position_m.allFinite() || (count_ > 0 && !(dt_s > 0))) {
+  if (!hal::is_finite(position_m) || (count_ > 0 && !(dt_s > 0))) {
     return velocity_;
   }
   constexpr int kRing = kMaxWindow + 1;
@@ -140,6 +140,7 @@ typename BasicFoaw<Real>::Vector BasicFoaw<Real>::step(const Vector& position_m,
   std::array<bool, 3> grows{true, true, true};
   Real t = 0, St = 0, Stt = 0;
   const int longest = std::min(window_, count_ - 1);
+  // At most kMaxWindow rounds.
   for (int n = 1, at = newest_; n <= longest && (grows[0] || grows[1] || grows[2]); ++n) {
     t -= samples_[static_cast<std::size_t>(at)].since_s;
     at = at > 0 ? at - 1 : kRing - 1;

@@ -24,13 +24,14 @@ bool Executive::valid() const NONBLOCKING {
   if (config_.period_ns <= 0 || slots_.empty() || slots_.size() > kMaxSlots) {
     return false;
   }
+  // At most kMaxSlots rounds.
   return std::all_of(slots_.begin(), slots_.end(), [](const Slot& s) {
     return s.run != nullptr && s.divisor >= 1 && s.offset < s.divisor;
   });
 }
 
 void Executive::announce() NONBLOCKING {
-  for (std::size_t i = 0; i < slots_.size(); ++i) {
+  for (std::size_t i = 0; i < slots_.size(); ++i) {  // at most kMaxSlots rounds
     status_.slots[i].name.set(slots_[i].name);
     status_.slots[i].divisor.store(slots_[i].divisor, kRelaxed);
     progress_[i] = {.due = slots_[i].offset};
@@ -58,7 +59,8 @@ std::uint64_t Executive::next_release_after(std::uint64_t index, std::int64_t no
 
 After Executive::run_slots(Tick& tick) NONBLOCKING {
   After after = After::go_on;
-  for (std::size_t i = 0; i < slots_.size(); ++i) {
+  longest_slot_ns_ = 0;
+  for (std::size_t i = 0; i < slots_.size(); ++i) {  // at most kMaxSlots rounds
     const Slot& slot = slots_[i];
     Progress& progress = progress_[i];
     if (tick.index < progress.due) {
@@ -77,13 +79,31 @@ After Executive::run_slots(Tick& tick) NONBLOCKING {
     if (slot.run(slot.self, tick) == After::end) {
       after = After::end;
     }
-    status.execution.add(stopwatch_.now_ns() - begin);
+    const std::int64_t took_ns = stopwatch_.now_ns() - begin;
+    status.execution.add(took_ns);
+    if (took_ns > longest_slot_ns_) {
+      longest_slot_ns_ = took_ns;
+      longest_slot_ = i;
+    }
     bump(status.runs);
     if (skipped > 0) {
       bump(status.skipped, skipped);
     }
   }
   return after;
+}
+
+void Executive::keep_late(std::uint64_t planned, const Tick& tick, std::uint64_t next, std::int64_t end_ns)
+    NONBLOCKING {
+  LateTick late;
+  late.index = planned;
+  late.release_ns = release_ns(planned);
+  late.wake_ns = tick.wake_ns;
+  late.end_ns = end_ns;
+  late.missed = next - planned - 1;
+  late.longest_slot = longest_slot_;
+  late.longest_slot_ns = longest_slot_ns_;
+  status_.late.push(late);
 }
 
 Executive::Ended Executive::run(const std::atomic<bool>& stop) noexcept {
@@ -95,6 +115,7 @@ Executive::Ended Executive::run(const std::atomic<bool>& stop) noexcept {
 
   std::uint64_t planned = 0;
   std::int64_t worst_ns = 0;
+  const std::int64_t late_after_ns = config_.late_after_ns.value_or(config_.period_ns);
   for (;;) {
     clock_.sleep_until_ns(release_ns(planned));
     if (stop.load(kRelaxed)) {
@@ -104,15 +125,15 @@ Executive::Ended Executive::run(const std::atomic<bool>& stop) noexcept {
     Tick tick;
     tick.wake_ns = clock_.now_ns();
     const std::int64_t begin = stopwatch_.now_ns();
-    const std::int64_t late_ns = tick.wake_ns - release_ns(planned);
+    tick.late_ns = tick.wake_ns - release_ns(planned);
     tick.index = index_after_wake(planned, tick.wake_ns);
     tick.release_ns = release_ns(tick.index);
     missed_ += tick.index - planned;
     tick.missed = missed_;
     tick.missed_in_window = window_.advance(tick.index);
 
-    worst_ns = std::max(worst_ns, late_ns);
-    status_.wake.add(late_ns);
+    worst_ns = std::max(worst_ns, tick.late_ns);
+    status_.wake.add(tick.late_ns);
     status_.worst_lateness_ns.store(static_cast<std::uint64_t>(worst_ns), kRelaxed);
     status_.missed.store(missed_, kRelaxed);
     status_.missed_in_window.store(tick.missed_in_window, kRelaxed);
@@ -122,11 +143,15 @@ Executive::Ended Executive::run(const std::atomic<bool>& stop) noexcept {
 
     const After after = run_slots(tick);
     status_.tick.add(stopwatch_.now_ns() - begin);
+    const std::int64_t end_ns = clock_.now_ns();
+    const std::uint64_t next = next_release_after(tick.index, end_ns);
+    if (end_ns - release_ns(planned) > late_after_ns) {
+      keep_late(planned, tick, next, end_ns);
+    }
     if (after == After::end) {
       return Ended::by_slot;
     }
-
-    planned = next_release_after(tick.index, clock_.now_ns());
+    planned = next;
     missed_ += planned - (tick.index + 1);
   }
 }

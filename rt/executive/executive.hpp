@@ -13,17 +13,24 @@
 #include "hal/realtime.hpp"
 #include "rt/executive/missed_window.hpp"
 #include "rt/station/core_status.hpp"
+#include "rt/station/tick_info.hpp"
 
 namespace punctum::rt {
 
 // What a slot is told about the tick it runs in.
 struct Tick {
-  std::uint64_t index = 0;             // on the grid: gaps are missed releases
-  std::int64_t release_ns = 0;         // start + index T
-  std::int64_t wake_ns = 0;            // when the thread really woke
-  std::int64_t period_ns = 0;          // really elapsed since this slot ran last; nominal on its first run
-  std::uint64_t missed = 0;            // releases of the base tick skipped since the start of the loop
+  std::uint64_t index = 0;      // on the grid: gaps are missed releases
+  std::int64_t release_ns = 0;  // start + index T
+  std::int64_t wake_ns = 0;     // when the thread really woke
+  std::int64_t late_ns = 0;     // of that: after the release it slept for, an older one if some were missed
+  std::int64_t period_ns = 0;   // really elapsed since this slot ran last; nominal on its first run
+  std::uint64_t missed = 0;     // releases of the base tick skipped since the start of the loop
   std::uint64_t missed_in_window = 0;  // of them within the sliding window that ends with this tick
+
+  // For the servo.
+  [[nodiscard]] TickInfo info() const NONBLOCKING {
+    return {index, release_ns, wake_ns, static_cast<double>(period_ns) * 1e-9, missed_in_window};
+  }
 };
 
 enum class After : std::uint8_t { go_on, end };  // end: the loop ends when this tick's slots have run
@@ -53,6 +60,9 @@ struct ExecutiveConfig {
   std::int64_t period_ns = 1'000'000;         // of the base tick
   std::optional<std::int64_t> start_ns = {};  // release of tick 0; none: one period after run() begins
   std::uint32_t overrun_window_ticks = 1000;  // 1 .. MissedWindow::kMaxTicks
+  // A tick that ends later than this after the release it slept for is kept in CoreStatus::late. None: a
+  // period, and it has missed a release.
+  std::optional<std::int64_t> late_after_ns = {};
 };
 
 class Executive {
@@ -78,6 +88,8 @@ class Executive {
   [[nodiscard]] std::uint64_t index_after_wake(std::uint64_t planned, std::int64_t wake_ns) const NONBLOCKING;
   [[nodiscard]] std::uint64_t next_release_after(std::uint64_t index, std::int64_t now_ns) const NONBLOCKING;
   [[nodiscard]] After run_slots(Tick& tick) NONBLOCKING;
+  void keep_late(std::uint64_t planned, const Tick& tick, std::uint64_t next, std::int64_t end_ns)
+      NONBLOCKING;
 
   struct Progress {                 // of one slot
     std::uint64_t due = 0;          // its next release on the grid
@@ -94,6 +106,8 @@ class Executive {
   std::array<Progress, kMaxSlots> progress_{};
   std::int64_t start_ns_ = 0;
   std::uint64_t missed_ = 0;
+  std::uint64_t longest_slot_ = 0;  // of the tick under way
+  std::int64_t longest_slot_ns_ = 0;
 };
 
 }  // namespace punctum::rt

@@ -21,7 +21,7 @@ class MissedWindow {
     if (index - next_ >= ticks_) {  // longer than the window: whatever was before is gone
       next_ = index - (ticks_ - 1);
     }
-    for (; next_ < index; ++next_) {
+    for (; next_ < index; ++next_) {  // at most kMaxTicks rounds
       mark(next_, true);
     }
     mark(next_++, false);

@@ -49,7 +49,7 @@ void follow_frame(FixtureFrame& frame, const FixtureFrame& target, double tau_s,
 
 }  // namespace
 
-PotentialForce cone_pull(const ConeParams& params, double position_scale, const FixtureFrame& frame,
+PotentialForce cone_pull(const Cone& cone, double position_scale, const FixtureFrame& frame,
                          const hal::Vec3& tip_m) NONBLOCKING {
   const hal::Vec3 V = tip_m - frame.entry_m;
   const double along = frame.axis.dot(V);
@@ -58,34 +58,32 @@ PotentialForce cone_pull(const ConeParams& params, double position_scale, const 
   const double r = lateral.norm();
 
   PotentialForce pull;
-  if (params.method == ConeParams::Method::paper) {
-    const double f = params.d0_m / (params.d0_m + std::max(d, 0.0));
-    pull.force_N = -params.K_N_m * f * position_scale * lateral;
-    pull.energy_J = 0.5 * params.K_N_m * f * position_scale * position_scale * r * r;
+  if (cone.method == ConeParams::Method::paper) {
+    const double f = cone.d0_m / (cone.d0_m + std::max(d, 0.0));
+    pull.force_N = -cone.K_N_m * f * position_scale * lateral;
+    pull.energy_J = 0.5 * cone.K_N_m * f * position_scale * position_scale * r * r;
     return pull;
   }
 
-  const Widening f = weight(d, params.d0_m);
+  const Widening f = weight(d, cone.d0_m);
   if (f.value == 0 && f.slope == 0) {
     return pull;
   }
-  const Widening core = widening(d, kCoreBlend * params.d0_m);
-  const double cos_alpha = math::cos(params.alpha_rad);
-  const double tan_alpha = math::tan(params.alpha_rad);
-  const double delta = (r - params.r0_m - tan_alpha * core.value) * cos_alpha;
+  const Widening core = widening(d, kCoreBlend * cone.d0_m);
+  const double delta = (r - cone.r0_m - cone.tan_alpha * core.value) * cone.cos_alpha;
   if (delta <= 0) {
     return pull;
   }
 
-  const double spring = soft_spring(delta, params.eps_m);
-  const double energy = soft_spring_energy(delta, params.eps_m);
-  const double letting_go = 1 + 2 * energy / (params.reach_m * params.reach_m);
+  const double spring = soft_spring(delta, cone.eps_m);
+  const double energy = soft_spring_energy(delta, cone.eps_m);
+  const double letting_go = 1 + 2 * energy / (cone.reach_m * cone.reach_m);
   const double phi = energy / letting_go;
   const double phi_slope = spring / (letting_go * letting_go);
 
-  const double KkP = params.K_N_m * position_scale;
-  const double from_r = f.value * phi_slope * cos_alpha;
-  const double from_d = f.slope * phi - f.value * phi_slope * tan_alpha * core.slope * cos_alpha;
+  const double KkP = cone.K_N_m * position_scale;
+  const double from_r = f.value * phi_slope * cone.cos_alpha;
+  const double from_d = f.slope * phi - f.value * phi_slope * cone.tan_alpha * core.slope * cone.cos_alpha;
   // delta > 0 and r0 >= 0 mean r > 0. The gradient of d is -b.
   pull.force_N = -KkP * from_r / r * lateral + KkP * from_d * frame.axis;
   pull.energy_J = KkP * position_scale * f.value * phi;
@@ -136,7 +134,6 @@ double cone_stiffness_bound_N_m(const ConeParams& params) NONBLOCKING {
 
 EffectOutput ConeGuide::step(const EffectInput& in) NONBLOCKING {
   EffectOutput out;
-  out.point = EnergyPoint::fixture_point;
   const bool on = in.cell_known && !in.punctured;
   const double last_gain = ramp_.gain();
   if (!on && last_gain == 0) {
@@ -149,11 +146,11 @@ EffectOutput ConeGuide::step(const EffectInput& in) NONBLOCKING {
   if (last_gain == 0) {
     frame_ = target;
   } else {
-    last_energy_J = last_gain * cone_pull(params_, in.position_scale, frame_, in.fixture_point_m).energy_J;
-    follow_frame(frame_, target, params_.ramp_s / 4, in.dt_s);
+    last_energy_J = last_gain * cone_pull(cone_, in.position_scale, frame_, in.fixture_point_m).energy_J;
+    follow_frame(frame_, target, cone_.ramp_s / 4, in.dt_s);
   }
-  ramp_.step(on, params_.ramp_s, params_.ramp_s, in.dt_s);
-  const PotentialForce pull = cone_pull(params_, in.position_scale, frame_, in.fixture_point_m);
+  ramp_.step(on, cone_.ramp_s, cone_.ramp_s, in.dt_s);
+  const PotentialForce pull = cone_pull(cone_, in.position_scale, frame_, in.fixture_point_m);
   stored_J_ = ramp_.gain() * pull.energy_J;
   const double last_injected_J = injected_J_;
   injected_J_ += stored_J_ - last_energy_J;

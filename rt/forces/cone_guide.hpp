@@ -14,6 +14,7 @@
 #pragma once
 
 #include "hal/devices.hpp"
+#include "hal/math/elementary.hpp"
 #include "hal/parameters.hpp"
 #include "hal/realtime.hpp"
 #include "rt/forces/effect.hpp"
@@ -43,9 +44,19 @@ constexpr auto keys_of(const ConeParams*) {
       hal::micro("reach_um", &ConeParams::reach_m, 0.1, 5000));
 }
 
+// The parameters, and the functions of their angle that every tick needs.
+struct Cone : ConeParams {
+  // Not explicit: parameters are a cone.
+  Cone(const ConeParams& params) NONBLOCKING : ConeParams(params),  // NOLINT(google-explicit-constructor)
+                                               cos_alpha(math::cos(params.alpha_rad)),
+                                               tan_alpha(math::tan(params.alpha_rad)) {}
+  double cos_alpha;
+  double tan_alpha;
+};
+
 // The standing field: a pure function of the tip (needle scale, stage frame).
-[[nodiscard]] PotentialForce cone_pull(const ConeParams& params, double position_scale,
-                                       const FixtureFrame& frame, const hal::Vec3& tip_m) NONBLOCKING;
+[[nodiscard]] PotentialForce cone_pull(const Cone& cone, double position_scale, const FixtureFrame& frame,
+                                       const hal::Vec3& tip_m) NONBLOCKING;
 
 // N/m at the hand: no eigenvalue of the standing field's Hessian is larger in magnitude. Grows as
 // (reach/d0)^2 once the attraction reaches further than it decays. Of `paper`, which has no Hessian: K, the
@@ -55,9 +66,10 @@ constexpr auto keys_of(const ConeParams*) {
 class ConeGuide {
  public:
   using Params = ConeParams;
+  static constexpr Gives kGives{.point = EnergyPoint::fixture_point, .storing = true};
 
   ConeGuide(const ConeParams& params, const EffectSetup& /*setup*/) NONBLOCKING
-      : params_(params),
+      : cone_(params),
         stiffness_bound_N_m_(cone_stiffness_bound_N_m(params)) {}
 
   // On while the cell is known and not punctured: the frame follows the entry point and the gain rises or
@@ -70,7 +82,7 @@ class ConeGuide {
   [[nodiscard]] double gain() const NONBLOCKING { return ramp_.gain(); }
 
  private:
-  ConeParams params_;
+  Cone cone_;
   double stiffness_bound_N_m_;
   FixtureFrame frame_;
   Ramp ramp_;

@@ -23,6 +23,7 @@ constexpr auto keys_of(const DampingParams*) {
 class Damping {
  public:
   using Params = DampingParams;
+  static constexpr Gives kGives{.dissipative = true};
 
   Damping(const DampingParams& params, const EffectSetup&) NONBLOCKING : params_(params) {}
 

@@ -2,6 +2,7 @@
 //
 // An effect is a class with
 //   using Params = ...;                                     its scene table
+//   static constexpr Gives kGives{...};                     its kinds of force
 //   Effect(const Params&, const EffectSetup&) noexcept;
 //   [[nodiscard]] EffectOutput step(const EffectInput&) noexcept;   once per tick, real-time safe
 // and a line in list.hpp. SI units. Forces are at the hand, in world axes.
@@ -74,9 +75,14 @@ enum class EnergyPoint : std::uint8_t {
 };
 inline constexpr std::size_t kEnergyPoints = 3;
 
+// The kinds of force that an effect gives: the others are zero, and nobody adds them.
+struct Gives {
+  EnergyPoint point = EnergyPoint::handle;  // of the stored energy
+  bool storing = false, dissipative = false, active = false;
+};
+
 // What one effect does on one tick, before force_fade.
 struct EffectOutput {
-  EnergyPoint point = EnergyPoint::handle;
   hal::Vec3 storing_N = hal::Vec3::Zero();      // the force of its stored energy
   hal::Vec3 dissipative_N = hal::Vec3::Zero();  // a force against a velocity
   hal::Vec3 active_N = hal::Vec3::Zero();       // a force with a bounded energy of its own

@@ -3,32 +3,50 @@
 namespace punctum::rt {
 namespace {
 
-// Of all fixtures, before fixture_gain.
-struct FixtureEnergy {
-  double stored_J = 0;
-  double injected_J = 0;
-  double stiffness_N_m = 0;
+struct Energy {
+  double stored_J;
+  double injected_J;
+  double stiffness_N_m;
 };
 
-void add(FixtureEnergy& fixtures, const EffectOutput& out) NONBLOCKING {
-  fixtures.stored_J += out.stored_J;
-  fixtures.injected_J += out.injected_J;
-  fixtures.stiffness_N_m += out.stiffness_N_m;
+constexpr bool is_fixture(const Gives& gives) NONBLOCKING {
+  return gives.point == EnergyPoint::fixture_point;
 }
 
+// What the effects of one tick add up to besides their parts.
+struct Sums {
+  hal::Vec3 force_N = hal::Vec3::Zero();
+  Energy fixtures{};                        // before fixture_gain
+  std::array<Energy, effect_count> others;  // each by itself: they are added after the fixtures
+  std::size_t other_count = 0;
+};
+
 // Returns the effect's whole force.
+template <Gives gives>
 [[nodiscard]] hal::Vec3 add(ForceParts& parts, const EffectOutput& out, double gain) NONBLOCKING {
-  const hal::Vec3 dissipative_N = gain * out.dissipative_N;
-  const hal::Vec3 passive_N = gain * (out.storing_N + out.dissipative_N);
-  const hal::Vec3 active_N = gain * out.active_N;
-  // Not "+= gain * storing_N": the order of additions is that of the reference runs.
-  hal::Vec3& storing_N = parts.storing[static_cast<std::size_t>(out.point)].force_N;
-  storing_N += passive_N;
-  storing_N -= dissipative_N;
-  parts.dissipative_N += dissipative_N;
-  parts.active_N += active_N;
-  parts.damping_Ns_m += out.damping_Ns_m;
-  return passive_N + active_N;
+  hal::Vec3 whole_N = hal::Vec3::Zero();
+  hal::Vec3& storing_N = parts.storing[static_cast<std::size_t>(gives.point)].force_N;
+  if constexpr (gives.storing && !gives.dissipative) {
+    whole_N = gain * out.storing_N;
+    storing_N += whole_N;
+  }
+  if constexpr (gives.dissipative) {
+    const hal::Vec3 dissipative_N = gain * out.dissipative_N;
+    whole_N = gives.storing ? hal::Vec3(gain * (out.storing_N + out.dissipative_N)) : dissipative_N;
+    if constexpr (gives.storing) {
+      // Not "+= gain * storing_N": the order of additions is that of the reference runs.
+      storing_N += whole_N;
+      storing_N -= dissipative_N;
+    }
+    parts.dissipative_N += dissipative_N;
+    parts.damping_Ns_m += out.damping_Ns_m;
+  }
+  if constexpr (gives.active) {
+    const hal::Vec3 active_N = gain * out.active_N;
+    parts.active_N += active_N;
+    whole_N += active_N;
+  }
+  return whole_N;
 }
 
 void fade(ForceParts& parts, double force_fade) NONBLOCKING {
@@ -41,23 +59,17 @@ void fade(ForceParts& parts, double force_fade) NONBLOCKING {
 }
 
 // Less of an effect, as commanded. At a standing hand, d(g U) is what the effect and its gain g did.
-[[nodiscard]] EffectOutput scaled(const EffectOutput& out, double gain, double last_gain) NONBLOCKING {
+void scale(EffectOutput& out, double gain, double last_gain) NONBLOCKING {
   if (gain == 1 && last_gain == 1) {
-    return out;
+    return;
   }
-  EffectOutput less = out;
-  less.storing_N *= gain;
-  less.dissipative_N *= gain;
-  less.active_N *= gain;
-  less.stored_J *= gain;
-  less.injected_J = gain * out.stored_J - last_gain * (out.stored_J - out.injected_J);
-  less.stiffness_N_m *= gain;
-  less.damping_Ns_m *= gain;
-  return less;
-}
-
-[[nodiscard]] bool is_fixture(const EffectOutput& out) NONBLOCKING {
-  return out.point == EnergyPoint::fixture_point;
+  out.injected_J = gain * out.stored_J - last_gain * (out.stored_J - out.injected_J);
+  out.storing_N *= gain;
+  out.dissipative_N *= gain;
+  out.active_N *= gain;
+  out.stored_J *= gain;
+  out.stiffness_N_m *= gain;
+  out.damping_Ns_m *= gain;
 }
 
 }  // namespace
@@ -71,34 +83,35 @@ Effects::Effects(const EffectParams& params, const EffectSetup& setup) NONBLOCKI
 #undef PUNCTUM_EFFECT
 }
 
-// The stored energy changes only along the ways that the stage can make.
-EffectOutput Effects::reachable(EffectOutput out) const NONBLOCKING {
-  if (reach_ && out.point != EnergyPoint::handle) {
-    out.storing_N = reach_->lazyProduct(hal::Vec3(out.storing_N));
-  }
-  return out;
-}
-
 const EffectSum& Effects::step(const EffectInput& in, const EffectGains& gain) NONBLOCKING {
-  hal::Vec3 force_N = hal::Vec3::Zero();
-  ForceParts parts;
-  FixtureEnergy fixtures;
-  const auto add_effect = [&](const EffectOutput& out, double& effect_N) {
-    const hal::Vec3 whole_N = add(parts, out, is_fixture(out) ? in.fixture_gain : 1);
-    effect_N = whole_N.norm();
-    force_N += whole_N;
-    if (is_fixture(out)) {
-      add(fixtures, out);
+  ForceParts& parts = sum_.parts = {};
+  Sums sums;
+  const auto take = [&]<class Class>(std::optional<Class>& effect, Effect which) {
+    if (!effect) {
+      return;
+    }
+    constexpr Gives gives = Class::kGives;
+    EffectOutput out = effect->step(in);
+    scale(out, gain[which], last_gain_[which]);
+    // The stored energy changes only along the ways that the stage can make.
+    if (gives.storing && gives.point != EnergyPoint::handle && reach_) {
+      out.storing_N = reach_->lazyProduct(hal::Vec3(out.storing_N));
+    }
+    const hal::Vec3 whole_N = add<gives>(parts, out, is_fixture(gives) ? in.fixture_gain : 1);
+    sum_.effect_N[which] = whole_N.norm();
+    sums.force_N += whole_N;
+    if constexpr (is_fixture(gives)) {
+      sums.fixtures.stored_J += out.stored_J;
+      sums.fixtures.injected_J += out.injected_J;
+      sums.fixtures.stiffness_N_m += out.stiffness_N_m;
+    } else if constexpr (gives.storing || gives.active) {
+      sums.others[sums.other_count++] = {out.stored_J, out.injected_J, out.stiffness_N_m};
     }
   };
-#define PUNCTUM_EFFECT(name, Class)                                                           \
-  if (name##_) {                                                                              \
-    outputs_[effect_##name] =                                                                 \
-        reachable(scaled(name##_->step(in), gain[effect_##name], last_gain_[effect_##name])); \
-    add_effect(outputs_[effect_##name], sum_.effect_N[effect_##name]);                        \
-  }
+#define PUNCTUM_EFFECT(name, Class) take(name##_, effect_##name);
   PUNCTUM_EFFECTS(PUNCTUM_EFFECT)
 #undef PUNCTUM_EFFECT
+  const Energy& fixtures = sums.fixtures;
 
   fade(parts, in.force_fade);
   parts.storing[static_cast<std::size_t>(EnergyPoint::fixture_point)].point_m =
@@ -107,7 +120,7 @@ const EffectSum& Effects::step(const EffectInput& in, const EffectGains& gain) N
   parts.storing[static_cast<std::size_t>(EnergyPoint::handle)].point_m = in.handle_m;
   parts.stiffness_N_m = in.force_fade * in.fixture_gain * fixtures.stiffness_N_m;
   sum_.force_fade = in.force_fade;
-  sum_.force_N = in.force_fade * force_N;
+  sum_.force_N = in.force_fade * sums.force_N;
 
   // At a standing hand, d(g U) is what the fixtures and their gain g did since the last tick.
   sum_.stored_J = in.fixture_gain * fixtures.stored_J;
@@ -115,21 +128,13 @@ const EffectSum& Effects::step(const EffectInput& in, const EffectGains& gain) N
       in.fixture_gain * fixtures.stored_J - last_fixture_gain_ * (fixtures.stored_J - fixtures.injected_J);
   last_fixture_gain_ = in.fixture_gain;
   last_gain_ = gain;
-  const auto add_energy = [&](const EffectOutput& out) {
-    if (!is_fixture(out)) {
-      sum_.stored_J += out.stored_J;
-      sum_.injected_J += out.injected_J;
-      parts.stiffness_N_m += in.force_fade * out.stiffness_N_m;
-    }
-  };
-#define PUNCTUM_EFFECT(name, Class)      \
-  if (name##_) {                         \
-    add_energy(outputs_[effect_##name]); \
+  for (std::size_t i = 0; i < sums.other_count; ++i) {  // at most effect_count rounds
+    const Energy& other = sums.others[i];
+    sum_.stored_J += other.stored_J;
+    sum_.injected_J += other.injected_J;
+    parts.stiffness_N_m += in.force_fade * other.stiffness_N_m;
   }
-  PUNCTUM_EFFECTS(PUNCTUM_EFFECT)
-#undef PUNCTUM_EFFECT
   parts.stored_J = in.force_fade * sum_.stored_J;
-  sum_.parts = parts;
   return sum_;
 }
 

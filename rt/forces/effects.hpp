@@ -40,10 +40,8 @@ class Effects {
 #define PUNCTUM_EFFECT(name, Class) std::optional<Class> name##_;
   PUNCTUM_EFFECTS(PUNCTUM_EFFECT)
 #undef PUNCTUM_EFFECT
-  [[nodiscard]] EffectOutput reachable(EffectOutput out) const NONBLOCKING;
 
   std::optional<hal::Mat3> reach_;
-  std::array<EffectOutput, effect_count> outputs_;  // of the effects that are there
   EffectSum sum_;
   double last_fixture_gain_ = 0;
   EffectGains last_gain_ = kFullGains;

@@ -27,7 +27,6 @@ PotentialForce ForbiddenWalls::push(Region region, const NeedlePose& needle) NON
 
 EffectOutput ForbiddenWalls::step(const EffectInput& in) NONBLOCKING {
   EffectOutput out;
-  out.point = EnergyPoint::handle;
   if (in.coupling_gain > 0) {
     const NeedlePose needle{in.fixture_point_m, in.needle_axis};
     for (const Region region : kRegions) {

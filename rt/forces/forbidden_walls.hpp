@@ -24,6 +24,7 @@ namespace punctum::rt {
 class ForbiddenWalls {
  public:
   using Params = ForbiddenParams;
+  static constexpr Gives kGives{.point = EnergyPoint::handle, .storing = true};
 
   ForbiddenWalls(const ForbiddenParams& params, const EffectSetup& setup) NONBLOCKING : params_(params),
                                                                                         regions_(params),

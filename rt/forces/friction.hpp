@@ -25,6 +25,7 @@ constexpr auto keys_of(const FrictionParams*) {
 class Friction {
  public:
   using Params = FrictionParams;
+  static constexpr Gives kGives{.point = EnergyPoint::handle, .storing = true};
 
   Friction(const FrictionParams& params, const EffectSetup&) NONBLOCKING : params_(params) {}
 
@@ -43,7 +44,6 @@ class Friction {
       adheres_at_m_ = in.handle_m - z_m;
     }
     EffectOutput out;
-    out.point = EnergyPoint::handle;
     out.storing_N = -params_.K_N_m * z_m;
     out.stored_J = 0.5 * params_.K_N_m * z_m.squaredNorm();
     out.stiffness_N_m = adheres_ ? params_.K_N_m : 0;

@@ -128,15 +128,18 @@ double dimple_reach(double R_m, double wd_m, double scale) NONBLOCKING {
   return scale * std::sqrt(std::clamp(2 * R_m * wd_m, 0.0, std::numeric_limits<double>::max()));
 }
 
+MembraneLaw::MembraneLaw(const MembraneParams& params) NONBLOCKING : params_(params) {
+  for (const double x : {params.E_Pa, params.nu, params.h_m, params.c_m, params.seat_m, params.prestrain}) {
+    finite_ = finite_ && std::isfinite(x);
+  }
+}
+
 MembraneState MembraneLaw::at(double wd_m, double R_m, double scale) NONBLOCKING {
   MembraneState s;
-  for (const double x : {params_.E_Pa, params_.nu, params_.h_m, params_.c_m, params_.seat_m,
-                         params_.prestrain, wd_m, R_m, scale}) {
-    if (!std::isfinite(x)) {
-      s.force_N = std::numeric_limits<double>::quiet_NaN();
-      s.shallow = false;
-      return s;
-    }
+  if (!finite_ || !std::isfinite(wd_m) || !std::isfinite(R_m) || !std::isfinite(scale)) {
+    s.force_N = std::numeric_limits<double>::quiet_NaN();
+    s.shallow = false;
+    return s;
   }
   s.valid = true;
   if (wd_m <= 0) {
@@ -194,7 +197,6 @@ EffectOutput Membrane::step(const EffectInput& in) NONBLOCKING {
 
   const double k_p = in.position_scale;
   EffectOutput out;
-  out.point = EnergyPoint::needle;
   out.storing_N = last_force_N_;
   out.stored_J = scale * state_.energy_J * k_p;
   out.injected_J = force_N * in.depth_correction_m * k_p;

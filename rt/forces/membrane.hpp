@@ -153,11 +153,12 @@ inline constexpr double kMembraneSlopeMax = 0.7;
 // does not depend on the depth is kept for as long as R_m stays.
 class MembraneLaw {
  public:
-  explicit MembraneLaw(const MembraneParams& params) NONBLOCKING : params_(params) {}
+  explicit MembraneLaw(const MembraneParams& params) NONBLOCKING;
   [[nodiscard]] MembraneState at(double wd_m, double R_m, double scale) NONBLOCKING;
 
  private:
   MembraneParams params_;
+  bool finite_ = true;  // params_ are
   double curve_R_m_ = std::numeric_limits<double>::quiet_NaN();
   DeflectionCurve curve_;
 };
@@ -179,6 +180,7 @@ using RimForces = std::array<hal::Vec3, kRimPoints>;
 class Membrane {
  public:
   using Params = MembraneParams;
+  static constexpr Gives kGives{.point = EnergyPoint::needle, .storing = true};
 
   Membrane(const MembraneParams& params, const EffectSetup& setup) NONBLOCKING : law_(params), setup_(setup) {
     rim_.fill(hal::Vec3::Zero());

@@ -59,6 +59,9 @@ class Ramp {
 
   // up_s, down_s: time for the whole way; 0 = at once.
   constexpr void step(bool up, double up_s, double down_s, double dt_s) NONBLOCKING {
+    if (at_ == (up ? 1.0 : 0.0)) {
+      return;
+    }
     const double whole_s = up ? up_s : down_s;
     const double part = whole_s > 0 ? dt_s / whole_s : 1.0;
     at_ = std::clamp(at_ + (up ? part : -part), 0.0, 1.0);

@@ -20,7 +20,6 @@ PotentialForce repulsive_push(const RepulsiveParams& params, double position_sca
 
 EffectOutput RepulsiveRegion::step(const EffectInput& in) NONBLOCKING {
   EffectOutput out;
-  out.point = EnergyPoint::fixture_point;
   const double last_gain = ramp_.gain();
   if (!in.cell_known && last_gain == 0) {
     stored_J_ = 0;

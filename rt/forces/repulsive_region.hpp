@@ -39,6 +39,7 @@ constexpr auto keys_of(const RepulsiveParams*) {
 class RepulsiveRegion {
  public:
   using Params = RepulsiveParams;
+  static constexpr Gives kGives{.point = EnergyPoint::fixture_point, .storing = true};
 
   RepulsiveRegion(const RepulsiveParams& params, const EffectSetup& /*setup*/) NONBLOCKING : params_(params) {
   }

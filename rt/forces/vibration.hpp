@@ -31,6 +31,7 @@ constexpr auto keys_of(const VibrationParams*) {
 class Vibration {
  public:
   using Params = VibrationParams;
+  static constexpr Gives kGives{.active = true};
 
   Vibration(const VibrationParams& params, const EffectSetup& setup) NONBLOCKING;
 

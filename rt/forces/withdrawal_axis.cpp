@@ -26,7 +26,6 @@ PotentialForce axis_pull(const AxisParams& params, double position_scale, const 
 
 EffectOutput WithdrawalAxis::step(const EffectInput& in) NONBLOCKING {
   EffectOutput out;
-  out.point = EnergyPoint::fixture_point;
   const bool on = in.cell_known && in.inside_cell;
   const double last_gain = ramp_.gain();
   if (last_gain == 0) {

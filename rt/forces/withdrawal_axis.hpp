@@ -33,6 +33,7 @@ constexpr auto keys_of(const AxisParams*) {
 class WithdrawalAxis {
  public:
   using Params = AxisParams;
+  static constexpr Gives kGives{.point = EnergyPoint::fixture_point, .storing = true, .dissipative = true};
 
   WithdrawalAxis(const AxisParams& params, const EffectSetup& /*setup*/) NONBLOCKING : params_(params) {}
 

@@ -7,6 +7,7 @@
 
 #include "hal/ipc/exchange.hpp"
 #include "hal/realtime.hpp"
+#include "rt/station/late_tick.hpp"
 
 namespace punctum::rt {
 
@@ -18,7 +19,7 @@ struct Text {
   char text[N] = {};
   void set(const char* from) NONBLOCKING {
     std::size_t n = 0;
-    while (n + 1 < N && from[n] != '\0') {
+    while (n + 1 < N && from[n] != '\0') {  // at most N rounds
       ++n;
     }
     std::memcpy(text, from, n);
@@ -85,6 +86,8 @@ struct CoreStatus {
   TimeHistogram tick;  // wake-up -> end of the last slot
   Word slot_count{};   // stored last: the names before it are then whole
   SlotStatus slots[kMaxSlots];
+
+  LateRing late;  // the newest ticks that ended too late
 };
 
 }  // namespace punctum::rt

@@ -12,6 +12,7 @@
 #include "rt/station/command.hpp"
 #include "rt/station/core_status.hpp"
 #include "rt/station/event.hpp"
+#include "rt/station/input.hpp"
 #include "rt/station/observation.hpp"
 #include "rt/station/run_end.hpp"
 #include "rt/station/surface.hpp"
@@ -20,8 +21,10 @@
 namespace punctum::rt {
 
 using TelemetryRing = hal::SeqRing<TelemetrySample, 8192>;
-using ObservationSlot = hal::SeqRing<Observation, 4>;  // newest wins
-using SurfaceSlot = hal::SeqRing<CellSurface, 4>;      // the same
+// The newest counts; a recorder that is late in virtual time takes them all.
+using ObservationSlot = hal::SeqRing<Observation, 64>;
+using SurfaceSlot = hal::SeqRing<CellSurface, 64>;
+using InputRing = hal::SeqRing<InputSample, 8192>;
 using EventRing = hal::SeqRing<Event, 4096>;
 using CommandQueue = hal::CommandQueue<Command, 64>;
 
@@ -29,7 +32,7 @@ using CommandQueue = hal::CommandQueue<Command, 64>;
 struct CoreSegment {
   static constexpr bool kOneWriter = true;
   static constexpr std::uint64_t kMagic = 0x00000065726f6350ULL;  // "Pcore"
-  static constexpr std::uint64_t kVersion = 4;                    // raise when a meaning changes
+  static constexpr std::uint64_t kVersion = 5;                    // raise when a meaning changes
   static const std::uint64_t kLayout;                             // version, sizes and offsets
 
   hal::SegmentHeader header;
@@ -40,8 +43,22 @@ struct CoreSegment {
 inline constexpr std::uint64_t CoreSegment::kLayout =
     hal::fingerprint(CoreSegment::kVersion, sizeof(CoreSegment), sizeof(TelemetrySample), sizeof(CoreStatus),
                      offsetof(TelemetrySample, x_m), offsetof(TelemetrySample, effect_N),
-                     offsetof(TelemetrySample, obs_age_s), offsetof(CoreSegment, status),
+                     offsetof(TelemetrySample, obs_age_s), offsetof(CoreSegment, status), sizeof(LateTick),
                      offsetof(CoreSegment, telemetry), sizeof(Event), offsetof(CoreSegment, events));
+
+// Written by the core alone, and there only where it is recorded: what each tick was given.
+struct InputSegment {
+  static constexpr bool kOneWriter = true;
+  static constexpr std::uint64_t kMagic = 0x007475706e694350ULL;  // "PCinput"
+  static constexpr std::uint64_t kVersion = 1;
+  static const std::uint64_t kLayout;
+
+  hal::SegmentHeader header;
+  InputRing ring;
+};
+inline constexpr std::uint64_t InputSegment::kLayout = hal::fingerprint(
+    InputSegment::kVersion, sizeof(InputSegment), sizeof(InputSample), offsetof(InputSample, hand_m),
+    offsetof(InputSample, tip_m), offsetof(InputSample, axial_N), offsetof(InputSegment, ring));
 
 // Written by vision alone.
 struct ObservationSegment {
@@ -80,7 +97,8 @@ template <class Segment>
 inline constexpr bool kShareable =
     std::is_standard_layout_v<Segment> && std::is_trivially_destructible_v<Segment> &&
     offsetof(Segment, header) == 0;
-static_assert(kShareable<CoreSegment> && kShareable<ObservationSegment> && kShareable<CommandSegment>);
+static_assert(kShareable<CoreSegment> && kShareable<InputSegment> && kShareable<ObservationSegment> &&
+              kShareable<CommandSegment>);
 static_assert(offsetof(CoreSegment, status) == 64 && offsetof(CoreSegment, telemetry) % 64 == 0);
 
 // A queue that the core empties, and what it takes from it; in the order of kCommandWriters.

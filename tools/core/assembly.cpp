@@ -14,6 +14,7 @@
 #include "hal/falcon/falcon_handle.hpp"
 #include "hal/falcon/libusb_link.hpp"
 #endif
+#include "hal/browser/browser_hand.hpp"
 #include "hal/evdev/evdev_hand.hpp"
 #include "hal/gpiod/gpiod_devices.hpp"
 #include "hal/zaber/zaber_positioner.hpp"
@@ -104,6 +105,13 @@ std::unique_ptr<hal::Device> make_evdev(const Surroundings& around, const Roles&
   return std::make_unique<evdev::EvdevHand>(around.scene.evdev.value_or(evdev::EvdevParams{}), around.clock);
 }
 
+std::unique_ptr<hal::Device> make_browser(const Surroundings& around, const Roles&) {
+  if (around.fingers == nullptr) {
+    throw std::runtime_error("no console is served here");
+  }
+  return std::make_unique<browser::BrowserHand>(*around.fingers, around.clock);
+}
+
 // Nobody moves it while a run goes on: it is held so that nobody can.
 std::unique_ptr<hal::Device> make_zaber(const Surroundings& around, const Roles&) {
   const zaber::ZaberParams& params = around.scene.zaber.value();
@@ -124,6 +132,7 @@ std::span<const Backend> backends() {
       Backend{kCia402, {Role::stage, Role::force_sensor}, make_cia402},
       Backend{kFalcon, {Role::haptic}, make_falcon},
       Backend{kEvdev, {Role::haptic}, make_evdev},
+      Backend{kBrowser, {Role::haptic}, make_browser},
       Backend{kZaber, {Role::positioner}, make_zaber},
   };
   return table;

@@ -15,6 +15,7 @@
 #include <tl/expected.hpp>
 #include <vector>
 
+#include "hal/browser/fingers.hpp"
 #include "hal/device_life.hpp"
 #include "hal/sim/simulated_devices.hpp"
 #include "rt/control/servo.hpp"
@@ -59,6 +60,7 @@ struct Surroundings {
   const Scene& scene;
   hal::Clock& clock;            // the station's, for sample times and for waits of the set-up
   sim::Bench* bench = nullptr;  // null: the simulated plant publishes nothing
+  const browser::FingersSegment* fingers = nullptr;  // null: no page moves a hand
 };
 
 // One line of the table. A name may stand on several lines: each makes a device of its own.

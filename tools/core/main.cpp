@@ -25,6 +25,7 @@
 #include "rt/platform/real_time_rights.hpp"
 #include "rt/station/station.hpp"
 #include "tools/core/assembly.hpp"
+#include "tools/core/input_tape.hpp"
 #include "tools/core/shut_down.hpp"
 #include "tools/scene/scene.hpp"
 #include "tools/shared/exit_codes.hpp"
@@ -87,10 +88,18 @@ class Core {
   Core(const Core&) = delete;
   Core& operator=(const Core&) = delete;
 
-  void set_up(const tools::Scene& scene, tools::Assembly& assembly, rt::Station& station, bool degraded) {
+  // `inputs`: what the servo is given is written there; null: nobody records it.
+  void set_up(const tools::Scene& scene, tools::Assembly& assembly, rt::Station& station, bool degraded,
+              rt::InputRing* inputs) {
     world_ = assembly.world();
     limit_ns_ = scene.seconds > 0 ? std::llround(scene.seconds * 1e9) : 0;
-    servo_.emplace(scene.servo, assembly.devices(), station, degraded);
+    if (inputs == nullptr) {
+      servo_.emplace(scene.servo, assembly.devices(), station, degraded);
+      return;
+    }
+    tape_.emplace(assembly.devices(), station.observation, degraded, *inputs);
+    station.observation = tape_->observation();
+    servo_.emplace(scene.servo, tape_->devices(), station, degraded);
   }
 
   rt::After step_plant(const rt::Tick& tick) NONBLOCKING {
@@ -99,8 +108,10 @@ class Core {
   }
 
   rt::After tick_servo(const rt::Tick& tick) NONBLOCKING {
+    std::uint32_t asked = 0;
     if (stop_signal::count() > 0) {
       servo_->request_stop();
+      asked |= rt::InputSample::stop;
     }
     if (first_) {
       first_release_ns_ = tick.release_ns;
@@ -110,21 +121,24 @@ class Core {
     if (limit_ns_ > 0 && t_ns >= limit_ns_) {
       limit_reached_ = true;
       servo_->request_end();
+      asked |= rt::InputSample::end;
       const double past_s = 1e-9 * static_cast<double>(t_ns - limit_ns_);
       if (past_s >= kTimeToWithdraw_s) {
         servo_->request_end_here();
+        asked |= rt::InputSample::end_here;
       }
       if (past_s >= kTimeToWithdraw_s + kTimeToRest_s) {
         return rt::After::end;
       }
     }
-    rt::TickInfo now;
-    now.tick = tick.index;
-    now.release_ns = tick.release_ns;
-    now.start_ns = tick.wake_ns;
-    now.period_s = static_cast<double>(tick.period_ns) * 1e-9;
-    now.missed_in_window = tick.missed_in_window;
+    const rt::TickInfo now = tick.info();
+    if (tape_) {
+      tape_->begin(now, asked);
+    }
     servo_->tick(now);
+    if (tape_) {
+      tape_->end();
+    }
     const bool stopped_at_limit = limit_reached_ && servo_->stop_stage() == rt::StopStage::stopped;
     return servo_->finished() || stopped_at_limit ? rt::After::end : rt::After::go_on;
   }
@@ -134,6 +148,7 @@ class Core {
 
  private:
   sim::World* world_ = nullptr;
+  std::optional<tools::InputTape> tape_;
   std::optional<rt::Servo> servo_;
   std::int64_t limit_ns_ = 0, first_release_ns_ = 0;
   bool first_ = true, limit_reached_ = false;
@@ -207,6 +222,8 @@ struct StationSegments {
   std::optional<hal::Shared<const rt::ObservationSegment>> observation = {};  // none: the scene has no vision
   std::optional<hal::Shared<sim::Bench>> bench = {};                          // none: nothing is simulated
   std::optional<hal::Shared<sim::CameraAnswers>> camera = {};                 // likewise
+  std::optional<hal::Shared<rt::InputSegment>> inputs = {};                   // none: nobody records them
+  std::optional<hal::Shared<const browser::FingersSegment>> fingers = {};     // none: no page moves the hand
 };
 
 tl::expected<StationSegments, std::string> attach_station(const tools::HandedSegments& handed,
@@ -247,6 +264,20 @@ tl::expected<StationSegments, std::string> attach_station(const tools::HandedSeg
       return tl::unexpected(camera.error());
     }
     segments.camera = std::move(*camera);
+  }
+  if (const int descriptor = handed.descriptor(tools::kInputSegment); descriptor >= 0) {
+    auto inputs = hal::Shared<rt::InputSegment>::claim(tools::kInputSegment, descriptor);
+    if (!inputs) {
+      return tl::unexpected(inputs.error());
+    }
+    segments.inputs = std::move(*inputs);
+  }
+  if (const int descriptor = handed.descriptor(tools::kFingersSegment); descriptor >= 0) {
+    auto fingers = hal::Shared<const browser::FingersSegment>::attach(tools::kFingersSegment, descriptor);
+    if (!fingers) {
+      return tl::unexpected(fingers.error());
+    }
+    segments.fingers = std::move(*fingers);
   }
   return segments;
 }
@@ -331,6 +362,9 @@ rt::RealTimeRights become_real_time(const tools::Scene& scene, const StationSegm
   if (segments.bench) {
     rt::prefault_writable(segments.bench->get(), sizeof(sim::Bench));
   }
+  if (segments.inputs) {
+    rt::prefault_writable(segments.inputs->get(), sizeof(rt::InputSegment));
+  }
   return rights;
 }
 
@@ -396,7 +430,8 @@ int control(const tools::Scene& scene, StationSegments& segments, StationClock& 
   }
   rt::Station station{*segments.core, segments.observation ? &(*segments.observation)->slot : nullptr,
                       commands};
-  core.set_up(scene, assembly, station, rights && rights->degraded());
+  core.set_up(scene, assembly, station, rights && rights->degraded(),
+              segments.inputs ? &(*segments.inputs)->ring : nullptr);
   std::vector<rt::Slot> slots;
   if (assembly.world() != nullptr) {
     slots.push_back(rt::slot<&Core::step_plant>("plant", core));
@@ -446,7 +481,8 @@ int run(int argc, char** argv) {
   segments->core->status.pid.store(static_cast<std::uint64_t>(getpid()));
   StationClock clock(*scene, *segments);
   const auto assembly =
-      tools::Assembly::open({*scene, clock.now(), segments->bench ? segments->bench->get() : nullptr});
+      tools::Assembly::open({*scene, clock.now(), segments->bench ? segments->bench->get() : nullptr,
+                             segments->fingers ? segments->fingers->get() : nullptr});
   if (!assembly) {
     return bad(assembly.error());
   }

@@ -1,12 +1,24 @@
 #include "tools/jitter/audit.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <linux/ethtool.h>
+#include <linux/sockios.h>
+#include <net/if.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
+#include <utility>
 
-#include "rt/platform/real_time_rights.hpp"
+#include "rt/platform/kernel_facts.hpp"
+#include "tools/jitter/interrupts.hpp"
+#include "tools/shared/whole_file.hpp"
 
 namespace punctum::jitter {
 namespace {
@@ -18,6 +30,21 @@ std::string line_of(const std::string& path) {
   return line;
 }
 
+// "0-2,5" of 0 1 2 5.
+std::string cpu_list(const std::vector<int>& cpus) {
+  std::string out;
+  for (std::size_t i = 0; i < cpus.size();) {
+    std::size_t end = i;
+    while (end + 1 < cpus.size() && cpus[end + 1] == cpus[end] + 1) {
+      ++end;
+    }
+    out += (out.empty() ? "" : ",") + std::to_string(cpus[i]);
+    out += end > i ? "-" + std::to_string(cpus[end]) : "";
+    i = end + 1;
+  }
+  return out;
+}
+
 Finding clock_source(const std::string& root) {
   const std::string source =
       line_of(root + "/sys/devices/system/clocksource/clocksource0/current_clocksource");
@@ -26,6 +53,7 @@ Finding clock_source(const std::string& root) {
   if (source != "tsc" && source != "kvm-clock" && source != "arch_sys_counter" &&
       source != "hyperv_clocksource_tsc_page") {
     f.remedy = "boot with clocksource=tsc tsc=reliable, if the processor's counter is invariant";
+    f.mend.boot = "clocksource=tsc tsc=reliable";
   }
   return f;
 }
@@ -41,12 +69,13 @@ Finding swap_areas(const std::string& root) {
             false};
   if (areas > 0) {
     f.remedy = "swapoff -a, and no swap line in /etc/fstab";
+    f.mend.command = "swapoff -a";
   }
   return f;
 }
 
 // Interrupts that may be served on the loop's CPU.
-Finding interrupts(int cpu, const std::string& root) {
+Finding interrupts(int cpu, const std::string& others, const std::string& root) {
   const std::string allowed = line_of(root + "/proc/irq/default_smp_affinity");
   Finding f{"interrupts elsewhere", "default mask " + (allowed.empty() ? "cannot be read" : allowed), "",
             false};
@@ -65,29 +94,202 @@ Finding interrupts(int cpu, const std::string& root) {
     const int value = digit >= 'a' ? digit - 'a' + 10 : digit >= 'A' ? digit - 'A' + 10 : digit - '0';
     served = (value >> (cpu % 4) & 1) != 0;
   }
-  if (served) {
-    f.remedy = fmt::format("boot with irqaffinity= without CPU {}", cpu);
+  if (served && others.empty()) {
+    f.found += "; there is no other CPU";
+  } else if (served) {
+    f.remedy = fmt::format("boot with irqaffinity={}", others);
+    f.mend.boot = "irqaffinity=" + others;
   }
   return f;
 }
 
+Finding balancer(const std::string& root) {
+  Finding f{"no irqbalance", "it does not run"};
+  if (runs("irqbalance", root)) {
+    f.found = "it moves interrupts from CPU to CPU";
+    f.remedy = f.mend.command = "systemctl disable --now irqbalance";
+  }
+  return f;
+}
+
+// The interface of the default route.
+std::string network_in_use(const std::string& root) {
+  std::ifstream in(root + "/proc/net/route");
+  std::string line;
+  std::getline(in, line);  // the head
+  while (std::getline(in, line)) {
+    std::istringstream words(line);
+    std::string interface, destination;
+    if (words >> interface >> destination && destination == "00000000") {
+      return interface;
+    }
+  }
+  return "";
+}
+
+std::optional<Coalescing> ask_coalescing(const std::string& interface) {
+  const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  ethtool_coalesce wanted{};
+  wanted.cmd = ETHTOOL_GCOALESCE;
+  ifreq request{};
+  interface.copy(request.ifr_name, IFNAMSIZ - 1);
+  request.ifr_data = reinterpret_cast<char*>(&wanted);
+  const bool told = fd >= 0 && ioctl(fd, SIOCETHTOOL, &request) == 0;
+  if (fd >= 0) {
+    (void)close(fd);
+  }
+  return told ? std::optional(Coalescing{wanted.rx_coalesce_usecs, wanted.use_adaptive_rx_coalesce != 0})
+              : std::nullopt;
+}
+
+Finding coalescing(const Machine& machine) {
+  Finding f{"no NIC coalescing", "no network is in use"};
+  const std::string interface = network_in_use(machine.root);
+  if (interface.empty()) {
+    return f;
+  }
+  const auto told = machine.coalescing ? machine.coalescing(interface) : ask_coalescing(interface);
+  f.found =
+      !told ? fmt::format("{}: its driver has none that could be set", interface)
+            : fmt::format("{}: rx-usecs {}{}", interface, told->rx_us, told->adaptive ? ", adaptive" : "");
+  if (told && (told->rx_us > 0 || told->adaptive)) {
+    f.remedy = f.mend.command =
+        fmt::format("ethtool -C {} {}rx-usecs 0", interface, told->adaptive ? "adaptive-rx off " : "");
+  }
+  return f;
+}
+
+// Its number may be another one after a restart, so that what mends it goes by the name.
+Finding interrupt_of(const UsedDevice& device, const Interrupt& irq, int cpu, int priority,
+                     const std::string& others) {
+  Finding f{fmt::format("irq {} {}", irq.number, fmt::join(irq.names, " ")),
+            fmt::format("{}; served by CPU {}", device.title, irq.cpus.empty() ? "unknown" : irq.cpus)};
+  std::vector<std::string> now, always;
+  const std::vector<int> served = rt::parse_cpu_list(irq.cpus);
+  if (!others.empty() && std::find(served.begin(), served.end(), cpu) != served.end()) {
+    now.push_back(fmt::format("echo {} > /proc/irq/{}/smp_affinity_list", others, irq.number));
+    always.push_back(
+        fmt::format("for i in /proc/irq/*/'{}'; do echo {} > \"${{i%/*}}\"/smp_affinity_list; done",
+                    irq.names.front(), others));
+  }
+  if (irq.thread.empty()) {
+    f.found += "; no thread of its own";
+  } else {
+    f.found +=
+        fmt::format("; thread {}", irq.thread_priority > 0 ? fmt::format("SCHED_FIFO {}", irq.thread_priority)
+                                                           : std::string("of ordinary priority"));
+    if (irq.thread_priority <= priority) {
+      const int above = std::min(priority + 5, 98);
+      const auto set = [above](const std::string& pattern) {
+        return fmt::format(
+            "for t in $(grep -lE '{}' /proc/[0-9]*/comm | cut -d/ -f3); do chrt -f -p {} $t; done", pattern,
+            above);
+      };
+      now.push_back(set(fmt::format("^irq/{}-", irq.number)));
+      always.push_back(set("^irq/[0-9]+" + irq.thread.substr(irq.thread.find('-'))));
+    }
+  }
+  f.remedy = fmt::format("{}", fmt::join(now, "; "));
+  f.mend.command = fmt::format("{}", fmt::join(always, "\n"));
+  return f;
+}
+
+std::vector<Finding> devices(const tools::Scene& scene, int cpu, int priority, const std::string& others,
+                             const std::string& root) {
+  std::vector<Finding> out;
+  for (const UsedDevice& device : used_devices(scene, root)) {
+    if (!device.absent.empty()) {
+      out.push_back({device.title,
+                     device.absent,
+                     "punctum check " + (scene.source == "built-in" ? scene.name : scene.source),
+                     false,
+                     {}});
+    } else if (device.interrupts.empty() && device.idle) {
+      out.push_back({device.title,
+                     "nobody handles its interrupt yet",
+                     "audit again while it is in use (a CAN interface: systemctl start punctum-bus@can0)",
+                     false,
+                     {}});
+    } else if (device.interrupts.empty()) {
+      out.push_back({device.title, "no interrupt of its own", "", false, {}});
+    }
+    for (const Interrupt& irq : device.interrupts) {
+      // One controller may serve several devices.
+      Finding f = interrupt_of(device, irq, cpu, priority, others);
+      const auto same =
+          std::find_if(out.begin(), out.end(), [&](const Finding& o) { return o.name == f.name; });
+      if (same == out.end()) {
+        out.push_back(std::move(f));
+      } else {
+        same->found = device.title + "; " + same->found;
+      }
+    }
+  }
+  if (out.empty()) {
+    out.push_back(
+        {"devices", fmt::format("those of {} have no interrupts: none is real", scene.name), "", false, {}});
+  }
+  return out;
+}
+
 }  // namespace
 
-std::vector<Finding> audit(int cpu, int priority, const std::string& root) {
+Finding finding_of(const rt::RightFound& right, int cpu, const std::string& others) {
+  Finding f{right.name,
+            right.detail,
+            right.got              ? ""
+            : right.remedy.empty() ? "-"
+                                   : right.remedy,
+            right.required,
+            {}};
+  if (right.got) {
+    return f;
+  }
+  if (right.name == "SCHED_FIFO priority") {
+    f.mend.limits = "@punctum - rtprio 95";
+  } else if (right.name == "locked memory") {
+    f.mend.limits = "@punctum - memlock unlimited";
+  } else if (right.name == "isolated CPU" && cpu >= 0 && others.empty()) {
+    f.remedy = "a machine with a second CPU";
+  } else if (right.name == "isolated CPU" && cpu >= 0) {
+    f.mend.boot = fmt::format("isolcpus=managed_irq,domain,{0} nohz_full={0} rcu_nocbs={0} irqaffinity={1}",
+                              cpu, others);
+    f.remedy = "boot with " + f.mend.boot;
+  } else if (right.name == "CPU sleep held off") {
+    f.mend.udev = R"(KERNEL=="cpu_dma_latency", SUBSYSTEM=="misc", GROUP="punctum", MODE="0660")";
+  } else if (right.name == "performance governor") {
+    f.mend.boot = "cpufreq.default_governor=performance";
+  } else if (right.name == "no SMT siblings") {
+    f.mend.boot = "nosmt";
+  } else if (right.name == "no RT throttling" && cpu >= 0) {
+    // The remedy ends with its command.
+    f.mend.command = right.remedy.substr(right.remedy.rfind(": ") + 2);
+  }
+  return f;
+}
+
+std::vector<Finding> audit(int cpu, int priority, const tools::Scene* scene, const Machine& machine) {
+  const std::string& root = machine.root;
+  std::vector<int> other_cpus = rt::read_kernel_facts(root).online_cpus;
+  std::erase(other_cpus, cpu);
+  const std::string others = cpu >= 0 ? cpu_list(other_cpus) : "";
   rt::RightsWanted wanted;
   wanted.cpu = cpu;
   wanted.priority = priority;
   const auto rights = rt::RealTimeRights::examine(wanted);
   std::vector<Finding> out;
   for (const rt::RightFound& right : rights.table()) {
-    out.push_back({right.name, right.detail, right.got ? "" : right.remedy, right.required});
-    if (!right.got && right.remedy.empty()) {
-      out.back().remedy = "-";
-    }
+    out.push_back(finding_of(right, cpu, others));
   }
   out.push_back(clock_source(root));
   out.push_back(swap_areas(root));
-  out.push_back(interrupts(cpu, root));
+  out.push_back(interrupts(cpu, others, root));
+  out.push_back(balancer(root));
+  out.push_back(coalescing(machine));
+  if (scene != nullptr) {
+    const std::vector<Finding> of_devices = devices(*scene, cpu, priority, others, root);
+    out.insert(out.end(), of_devices.begin(), of_devices.end());
+  }
   return out;
 }
 
@@ -98,16 +300,123 @@ std::string audit_text(const std::vector<Finding>& findings) {
     const bool ready = f.remedy.empty();
     missing += !ready && f.required ? 1 : 0;
     advised += !ready && !f.required ? 1 : 0;
-    out += fmt::format("{:<8}{:<24}{}\n",
+    out += fmt::format("{:<8}{:<23} {}\n",
                        ready        ? "ready"
                        : f.required ? "MISSING"
                                     : "advice",
                        f.name, f.found);
     if (!ready) {
-      out += fmt::format("{:<8}{:<24}-> {}\n", "", "", f.remedy);
+      out += fmt::format("{:<8}{:<23} -> {}\n", "", "", f.remedy);
     }
   }
   return out + fmt::format("{} missing, {} advised\n", missing, advised);
+}
+
+std::map<std::string, std::string> plan(const std::vector<Finding>& findings) {
+  std::vector<std::string> boot, commands, udev, limits, by_hand;
+  const auto add = [](std::vector<std::string>& to, const std::string& what) {
+    if (!what.empty() && std::find(to.begin(), to.end(), what) == to.end()) {
+      to.push_back(what);
+    }
+  };
+  for (const Finding& f : findings) {
+    std::istringstream words(f.mend.boot);
+    for (std::string word; words >> word;) {
+      add(boot, word);
+    }
+    std::istringstream lines(f.mend.command);
+    for (std::string line; std::getline(lines, line);) {
+      add(commands, line);
+    }
+    add(udev, f.mend.udev);
+    add(limits, f.mend.limits);
+    if (!f.remedy.empty() && f.mend.boot.empty() && f.mend.command.empty() && f.mend.udev.empty() &&
+        f.mend.limits.empty()) {
+      by_hand.push_back(f.name + ": " + f.remedy);
+    }
+  }
+  std::map<std::string, std::string> files;
+  std::string readme = "What the audit of this machine found missing, as files. As root:\n\n";
+  const auto text = [](const std::vector<std::string>& lines) {
+    return fmt::format("{}\n", fmt::join(lines, "\n"));
+  };
+  constexpr const char* kMade = "# Written by punctum-jitter --audit --plan.\n";
+  if (!boot.empty()) {
+    const std::string line = fmt::format("{}", fmt::join(boot, " "));
+    files["boot-line"] = line + "\n";
+    files["etc/default/grub.d/punctum.cfg"] =
+        fmt::format("{}GRUB_CMDLINE_LINUX=\"$GRUB_CMDLINE_LINUX {}\"\n", kMade, line);
+  }
+  if (!udev.empty()) {
+    files["etc/udev/rules.d/61-punctum-machine.rules"] = kMade + text(udev);
+  }
+  if (!limits.empty()) {
+    files["etc/security/limits.d/punctum.conf"] = kMade + text(limits);
+  }
+  if (!commands.empty()) {
+    files["etc/punctum/machine"] = std::string("#!/bin/sh\n") + kMade + text(commands);
+    files["etc/systemd/system/punctum-machine.service"] = fmt::format(
+        "{}[Unit]\nDescription=This machine made ready for punctum\n\n[Service]\nType=oneshot\n"
+        "RemainAfterExit=yes\nExecStart=/bin/sh "
+        "/etc/punctum/machine\n\n[Install]\nWantedBy=multi-user.target\n",
+        kMade);
+    for (const char* unit : {"punctum@", "punctum-can@"}) {
+      files[fmt::format("etc/systemd/system/{}.service.d/machine.conf", unit)] =
+          fmt::format("{}[Unit]\nWants=punctum-machine.service\nAfter=punctum-machine.service\n", kMade);
+    }
+  }
+  readme += files.empty() ? "    (there is nothing to install)\n" : "    cp -r etc /\n";
+  if (!boot.empty()) {
+    readme += "    update-grub           # without GRUB: append boot-line to the kernel's boot line\n";
+  }
+  if (!udev.empty()) {
+    readme += "    udevadm control --reload && udevadm trigger\n";
+  }
+  if (!commands.empty()) {
+    readme += "    systemctl enable --now punctum-machine\n";
+  }
+  if (!limits.empty()) {
+    readme += "    adduser USER punctum  # and log in again\n";
+  }
+  if (!boot.empty()) {
+    readme += "    reboot\n";
+  }
+  const auto isolated = std::find_if(boot.begin(), boot.end(),
+                                     [](const std::string& word) { return word.starts_with("nohz_full="); });
+  if (isolated != boot.end()) {
+    readme += fmt::format("\nThe scene then names the loop's own CPU: [servo] cpu = {}\n",
+                          isolated->substr(isolated->find('=') + 1));
+  }
+  if (!by_hand.empty()) {
+    readme += "\nBy hand:\n\n";
+    for (const std::string& one : by_hand) {
+      readme += "- " + one + "\n";
+    }
+  }
+  files["README"] = readme;
+  return files;
+}
+
+tl::expected<void, std::string> write_plan(const std::map<std::string, std::string>& files,
+                                           const std::string& folder) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error || !fs::is_empty(folder, error) || error) {
+    return tl::unexpected(fmt::format("--plan: {}: {}, allowed: a folder that is new or empty", folder,
+                                      error ? error.message() : "it is not empty"));
+  }
+  for (const auto& [name, text] : files) {
+    const fs::path path = fs::path(folder) / name;
+    fs::create_directories(path.parent_path(), error);
+    if (error) {
+      return tl::unexpected(fmt::format("--plan: {}: {}", path.parent_path().string(), error.message()));
+    }
+    if (const auto written = tools::write_whole(path.string(), text); !written) {
+      return written;
+    }
+  }
+  return {};
 }
 
 }  // namespace punctum::jitter

@@ -126,7 +126,8 @@ tl::expected<Distribution, std::string> read_histogram(std::string_view text) {
   return out;
 }
 
-tl::expected<Comparison, std::string> compare_with_cyclictest(const Wanted& wanted) {
+tl::expected<Comparison, std::string> compare_with_cyclictest(const Wanted& wanted,
+                                                              const std::vector<std::string>& tick) {
   if (tools::find_program("cyclictest").empty()) {
     return tl::unexpected(std::string("--compare: there is no cyclictest: apt-get install rt-tests"));
   }
@@ -138,6 +139,7 @@ tl::expected<Comparison, std::string> compare_with_cyclictest(const Wanted& want
   std::vector<std::string> loop{
       "--rate",     fmt::format("{}", wanted.rate_Hz),  "--seconds", fmt::format("{}", slice_s),
       "--priority", fmt::format("{}", wanted.priority), "--json",    json};
+  loop.insert(loop.end(), tick.begin(), tick.end());
   std::vector<std::string> theirs{"-q",
                                   "-m",
                                   fmt::format("--priority={}", wanted.priority),
@@ -164,6 +166,7 @@ tl::expected<Comparison, std::string> compare_with_cyclictest(const Wanted& want
       return tl::unexpected(ours.error());
     }
     add(ours->wake, out.loop);
+    out.loop.missed += ours->missed;
     out.loop.machine = out.cyclictest.machine = ours->machine;
     if (const std::string failed = run("cyclictest", theirs, log); !failed.empty()) {
       return tl::unexpected(failed);

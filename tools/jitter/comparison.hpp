@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 #include <tl/expected.hpp>
+#include <vector>
 
 #include "tools/jitter/measurement.hpp"
 #include "tools/jitter/result.hpp"
@@ -14,8 +15,10 @@ struct Comparison {
   Result cyclictest, loop;
 };
 
-// Both get half of wanted.seconds, in as many slices each; every slice is a part of its result.
-[[nodiscard]] tl::expected<Comparison, std::string> compare_with_cyclictest(const Wanted& wanted);
+// Both get half of wanted.seconds, in as many slices each; every slice is a part of its result. `tick`: the
+// options that say what the loop does in each tick.
+[[nodiscard]] tl::expected<Comparison, std::string> compare_with_cyclictest(
+    const Wanted& wanted, const std::vector<std::string>& tick);
 
 // What cyclictest --histfile wrote.
 [[nodiscard]] tl::expected<Distribution, std::string> read_histogram(std::string_view text);

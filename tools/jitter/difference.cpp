@@ -15,6 +15,7 @@ namespace {
 constexpr std::array kQuantileParts = {0.5, 0.99, 0.999};
 constexpr std::size_t kLeastParts = 8, kLeastBlocks = 6;
 constexpr int kDraws = 2000;
+constexpr double kResolution_us = 0.1;                   // of a quantile between the edges of its bin of 1 us
 constexpr double kAlpha = 0.05 / kQuantileParts.size();  // three questions, one answer
 
 using Chosen = std::vector<const Distribution*>;
@@ -103,6 +104,67 @@ Blocks in_blocks(const Chosen& parts, std::size_t length) {
   return out;
 }
 
+// Half the mean square of the difference between neighbouring stretches of `scale` parts (Allan variance):
+// how much a mean over so many parts differs from the next one, whatever drifts more slowly.
+struct Neighbours {
+  double sum = 0;
+  std::size_t count = 0;
+};
+Neighbours neighbours(const std::vector<double>& x, std::size_t scale) {
+  Neighbours out;
+  for (std::size_t i = 0; i + 2 * scale <= x.size(); ++i) {
+    const auto at = [&](std::size_t k) { return x.begin() + static_cast<std::ptrdiff_t>(k); };
+    const double first = std::accumulate(at(i), at(i + scale), 0.0),
+                 second = std::accumulate(at(i + scale), at(i + 2 * scale), 0.0);
+    const double step = (second - first) / static_cast<double>(scale);
+    out.sum += step * step / 2;
+    ++out.count;
+  }
+  return out;
+}
+
+// The variance of a mean over all parts, as the variances of shorter stretches foretell it: a straight line
+// through their logarithms. Independent parts give 1/n; a machine that wanders gives more.
+double foretold_variance(const std::vector<double>& a, const std::vector<double>& b) {
+  const std::size_t n = std::min(a.size(), b.size());
+  double w = 0, wx = 0, wy = 0, wxx = 0, wxy = 0, first = 0;
+  for (std::size_t scale = 1; 3 * scale <= n; scale *= 2) {
+    const Neighbours in_a = neighbours(a, scale), in_b = neighbours(b, scale);
+    const double variance = (in_a.sum + in_b.sum) / static_cast<double>(in_a.count + in_b.count);
+    if (!(variance > 0)) {
+      return 0;
+    }
+    first = scale == 1 ? variance : first;
+    // Stretches that do not overlap are what counts.
+    const double weight = static_cast<double>(n) / static_cast<double>(scale) - 1,
+                 x = std::log(static_cast<double>(scale)), y = std::log(variance);
+    w += weight;
+    wx += weight * x;
+    wy += weight * y;
+    wxx += weight * x * x;
+    wxy += weight * x * y;
+  }
+  const double slope = std::clamp((w * wxy - wx * wy) / (w * wxx - wx * wx), -1.0, 1.0),
+               whole = std::log(static_cast<double>(n));
+  return std::max(std::exp(wy / w + slope * (whole - wx / w)), first / static_cast<double>(n));
+}
+
+// The variance of a mean over all parts where blocks of them are independent.
+double variance_of_blocks(const std::vector<double>& x, std::size_t length) {
+  const std::size_t n = std::max<std::size_t>(x.size() / length, 1);
+  std::vector<double> mean;
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto at = [&](std::size_t k) { return x.begin() + static_cast<std::ptrdiff_t>(k * x.size() / n); };
+    mean.push_back(std::accumulate(at(i), at(i + 1), 0.0) / static_cast<double>(at(i + 1) - at(i)));
+  }
+  const double all = std::accumulate(mean.begin(), mean.end(), 0.0) / static_cast<double>(n);
+  double sum = 0;
+  for (const double m : mean) {
+    sum += (m - all) * (m - all);
+  }
+  return sum / static_cast<double>(n * n);
+}
+
 std::size_t block_length(const Chosen& a, const Chosen& b) {
   double longest = 1;
   for (const Chosen* parts : {&a, &b}) {
@@ -149,6 +211,13 @@ tl::expected<std::vector<QuantileDifference>, std::string> difference(const Resu
   const Blocks blocks_a = in_blocks(parts_a, length), blocks_b = in_blocks(parts_b, length);
   Blocks mixed = blocks_a;
   mixed.insert(mixed.end(), blocks_b.begin(), blocks_b.end());
+  // How much wider than blocks tell that all is, since the machine wanders.
+  Quantiles wider{};
+  for (std::size_t q = 0; q < kQuantileParts.size(); ++q) {
+    const std::vector<double> a_later = later_than(in_a[q], parts_a), b_later = later_than(in_b[q], parts_b);
+    const double told = (variance_of_blocks(a_later, length) + variance_of_blocks(b_later, length)) / 2;
+    wider[q] = told > 0 ? std::max(1.0, std::sqrt(foretold_variance(a_later, b_later) / told)) : 1;
+  }
   for (int draw = 0; draw < kDraws; ++draw) {
     // How far the difference is certain: blocks drawn again from either measurement.
     const Quantiles now_a = quantiles(drawn_from(blocks_a, random)),
@@ -162,7 +231,7 @@ tl::expected<std::vector<QuantileDifference>, std::string> difference(const Resu
                     dealt_b = quantiles(parts_of(middle, mixed.end()));
     for (std::size_t q = 0; q < kQuantileParts.size(); ++q) {
       drawn[q].push_back(now_b[q] - now_a[q]);
-      as_large[q] += std::abs(dealt_b[q] - dealt_a[q]) >= std::abs(in_b[q] - in_a[q]) ? 1 : 0;
+      as_large[q] += wider[q] * std::abs(dealt_b[q] - dealt_a[q]) >= std::abs(in_b[q] - in_a[q]) ? 1 : 0;
     }
   }
   std::vector<QuantileDifference> out;
@@ -173,10 +242,11 @@ tl::expected<std::vector<QuantileDifference>, std::string> difference(const Resu
       return d[static_cast<std::size_t>(std::lround(p * static_cast<double>(d.size() - 1)))];
     };
     QuantileDifference one{.part = kQuantileParts[q], .a_us = in_a[q], .b_us = in_b[q]};
-    one.low_us = at(kAlpha / 2);
-    one.high_us = at(1 - kAlpha / 2);
+    const double found_us = in_b[q] - in_a[q];
+    one.low_us = found_us + wider[q] * (at(kAlpha / 2) - found_us);
+    one.high_us = found_us + wider[q] * (at(1 - kAlpha / 2) - found_us);
     const double chance = (as_large[q] + 1.0) / (kDraws + 1.0);
-    one.differs = chance < kAlpha && (one.low_us > 0 || one.high_us < 0);
+    one.differs = chance < kAlpha && (one.low_us > kResolution_us || one.high_us < -kResolution_us);
     out.push_back(one);
   }
   return out;
@@ -186,6 +256,9 @@ std::string difference_text(const std::vector<QuantileDifference>& found, const 
   std::string out;
   if (a.machine != b.machine) {
     out += "the machines differ:\n  A: " + a.machine + "\n  B: " + b.machine + "\n";
+  }
+  if (a.work.substr(0, a.work.find(',')) != b.work.substr(0, b.work.find(','))) {
+    out += "the ticks do not do the same\n";
   }
   if (a.load != b.load) {
     out += "the loads beside them differ\n";

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <sched.h>
 #include <signal.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -17,18 +18,26 @@
 #include <utility>
 #include <vector>
 
+#include "hal/ipc/rendezvous.hpp"
+#include "hal/ipc/segment.hpp"
 #include "rt/executive/executive.hpp"
 #include "rt/executive/monotonic_clock.hpp"
 #include "rt/platform/allocation_trap.hpp"
 #include "rt/platform/real_time_rights.hpp"
+#include "rt/station/station.hpp"
+#include "tools/jitter/ordinary_thread.hpp"
 #include "tools/shared/machine.hpp"
+#include "tools/shared/station_segments.hpp"
 #include "tools/shared/stop_signal.hpp"
+#include "tools/shared/witness.hpp"
 
 namespace punctum::jitter {
 namespace {
 
 constexpr std::size_t kMostSpikes = 64;
+constexpr std::chrono::milliseconds kLookAgain(10);
 constexpr int kParts = 60;
+constexpr std::int64_t kSetUp_ns = 200'000'000;  // from the start of the tick's work to the first release
 
 std::atomic<bool> end_loop{false};
 
@@ -37,46 +46,43 @@ void on_stop_signal(int /*count*/) NONBLOCKING { end_loop.store(true); }
 // The last slot of the tick: what there is to do in a tick that does nothing.
 class EmptyTick {
  public:
-  void set_up(rt::MonotonicClock& clock, std::int64_t period_ns, std::uint64_t ticks) {
+  void set_up(rt::MonotonicClock& clock, std::uint64_t ticks, double break_us) {
+    break_ns_ = break_us > 0 ? std::llround(break_us * 1e3) : INT64_MAX;
     clock_ = &clock;
-    period_ns_ = period_ns;
     ticks_ = ticks;
   }
   rt::After run(const rt::Tick& tick) NONBLOCKING {
     const std::int64_t now_ns = clock_->now_ns();
-    // Of the release that it slept for; there may be later ones that have passed, too.
-    const std::uint64_t slept_for = first_ ? tick.index : last_index_ + 1;
-    const std::int64_t late_ns =
-        tick.wake_ns - tick.release_ns + static_cast<std::int64_t>(tick.index - slept_for) * period_ns_;
     if (first_) {
       first_release_ns_ = tick.release_ns;
     } else {
       interval_.add(now_ns - last_ns_);
     }
-    if ((first_ || late_ns > latest_ns_) && spikes_ < spike_.size()) {
+    if ((first_ || tick.late_ns > latest_ns_) && spikes_ < spike_.size()) {
       spike_[spikes_++] = {1e-9 * static_cast<double>(tick.release_ns - first_release_ns_),
-                           1e-3 * static_cast<double>(late_ns)};
+                           1e-3 * static_cast<double>(tick.late_ns)};
     }
-    latest_ns_ = first_ ? late_ns : std::max(latest_ns_, late_ns);
+    latest_ns_ = first_ ? tick.late_ns : std::max(latest_ns_, tick.late_ns);
     last_ns_ = now_ns;
-    last_index_ = tick.index;
     first_ = false;
-    return tick.index + 1 >= ticks_ ? rt::After::end : rt::After::go_on;
+    broke_ = broke_ || tick.late_ns > break_ns_;
+    return broke_ || tick.index + 1 >= ticks_ ? rt::After::end : rt::After::go_on;
   }
   [[nodiscard]] const rt::TimeHistogram& interval() const { return interval_; }
+  [[nodiscard]] bool broke() const { return broke_; }
   [[nodiscard]] std::vector<Spike> spikes() const {
     return {spike_.begin(), spike_.begin() + static_cast<std::ptrdiff_t>(spikes_)};
   }
 
  private:
   rt::MonotonicClock* clock_ = nullptr;
-  std::int64_t period_ns_ = 0;
-  std::uint64_t ticks_ = 0, last_index_ = 0;
+  std::uint64_t ticks_ = 0;
   rt::TimeHistogram interval_;
   std::array<Spike, kMostSpikes> spike_{};
   std::size_t spikes_ = 0;
   std::int64_t first_release_ns_ = 0, last_ns_ = 0, latest_ns_ = 0;
-  bool first_ = true;
+  std::int64_t break_ns_ = 0;
+  bool first_ = true, broke_ = false;
 };
 
 // What the loop writes; touched before it begins.
@@ -106,18 +112,21 @@ Distribution since(const Distribution& before, const Distribution& after) {
     out.count[k] -= before.count[k];
   }
   out.longer -= before.longer;
+  while (!out.count.empty() && out.count.back() == 0) {
+    out.count.pop_back();
+  }
+  if (out.longer == 0) {  // the largest of all may have come before
+    out.max_us = std::min(out.max_us, static_cast<double>(out.count.size()));
+  }
   return out;
 }
 
 // Copies the histogram of wake-ups at equal intervals, from an ordinary thread: it may be read live.
 class Parts {
  public:
-  Parts(const rt::CoreStatus& status, double seconds) : status_(status), every_(seconds / kParts) {
-    sigset_t all, before;
-    sigfillset(&all);
-    pthread_sigmask(SIG_BLOCK, &all, &before);
-    thread_ = std::thread([this] { watch(); });
-    pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  Parts(const rt::CoreStatus& status, double seconds)
+      : status_(status), every_(seconds / kParts), before_(distribution_of(status.wake)) {
+    thread_ = ordinary_thread([this] { watch(); });
   }
   // The parts; of the last one nothing is told unless it was whole.
   std::vector<Distribution> end() {
@@ -129,11 +138,9 @@ class Parts {
  private:
   void watch() {
     using Clock = std::chrono::steady_clock;
-    constexpr std::chrono::milliseconds kLook(10);
     auto due = Clock::time_point{};
-    Distribution before;
     while (!over_.load()) {
-      std::this_thread::sleep_for(kLook);
+      std::this_thread::sleep_for(kLookAgain);
       const auto now = Clock::now();
       if (status_.started.load() == 0) {
         continue;
@@ -143,17 +150,18 @@ class Parts {
       } else if (now >= due) {
         due += std::chrono::duration_cast<Clock::duration>(every_);
         Distribution all = distribution_of(status_.wake);
-        parts_.push_back(since(before, all));
-        before = std::move(all);
+        parts_.push_back(since(before_, all));
+        before_ = std::move(all);
       }
     }
   }
 
   const rt::CoreStatus& status_;
   std::chrono::duration<double> every_;
+  Distribution before_;
   std::atomic<bool> over_{false};
   std::vector<Distribution> parts_;
-  std::thread thread_;
+  std::jthread thread_;
 };
 
 std::string first_line(const char* path) {
@@ -183,7 +191,7 @@ std::string machine() {
 
 }  // namespace
 
-tl::expected<Result, std::string> measure(const Wanted& wanted) {
+tl::expected<Result, std::string> measure(const Wanted& wanted, const Work& work) {
   Result result;
   result.rate_Hz = wanted.rate_Hz;
   result.cpu = wanted.cpu;
@@ -192,10 +200,9 @@ tl::expected<Result, std::string> measure(const Wanted& wanted) {
   rt::MonotonicClock monotonic;
   const auto written = std::make_unique<Written>();
   auto& [status, empty_tick] = *written;
-  empty_tick.set_up(monotonic, period_ns,
-                    static_cast<std::uint64_t>(std::llround(wanted.seconds * wanted.rate_Hz)));
+  empty_tick.set_up(monotonic, static_cast<std::uint64_t>(std::llround(wanted.seconds * wanted.rate_Hz)),
+                    wanted.break_us);
   tools::stop_signal::watch({SIGINT, SIGTERM}, on_stop_signal);
-  Parts parts(status, wanted.seconds);
 
   rt::RightsWanted rights_wanted;
   rights_wanted.priority = wanted.priority;
@@ -208,11 +215,31 @@ tl::expected<Result, std::string> measure(const Wanted& wanted) {
     }
   }
   rt::prefault_writable(written.get(), sizeof(Written));
-  const std::array slots{rt::slot<&EmptyTick::run>("empty", empty_tick)};
+  std::vector<rt::Slot> slots = work.slots;
+  slots.push_back(rt::slot<&EmptyTick::run>("empty", empty_tick));
   rt::ExecutiveConfig config;
   config.period_ns = period_ns;
+  if (work.start) {
+    config.start_ns = monotonic.now_ns() + kSetUp_ns;
+    if (const auto started = work.start(*config.start_ns, result.degraded); !started) {
+      rt::leave_real_time();
+      return tl::unexpected(started.error());
+    }
+  }
+  const double limit_us = wanted.break_us > 0 ? wanted.break_us : wanted.explain_us;
+  if (limit_us > 0) {
+    config.late_after_ns = std::llround(limit_us * 1e3);
+  }
   rt::Executive executive(monotonic, monotonic, config, slots, status);
 
+  Parts parts(status, wanted.seconds);
+  tools::late::Witness witness(status, getpid(), gettid(), limit_us > 0);
+  std::jthread watching = ordinary_thread([&witness](const std::stop_token& over) {
+    while (!over.stop_requested()) {
+      std::this_thread::sleep_for(kLookAgain);
+      witness.look();
+    }
+  });
   const std::uint64_t moved_before = migrations();
   const rt::ThreadCounters before = rt::read_thread_counters();
   rt::allocation_trap::arm(rt::allocation_trap::On::allocation_count);
@@ -221,6 +248,14 @@ tl::expected<Result, std::string> measure(const Wanted& wanted) {
   result.allocations = rt::allocation_trap::disarm();
   const rt::ThreadCounters after = rt::read_thread_counters();
   rt::leave_real_time();
+  watching.request_stop();
+  watching.join();
+  tools::late::Explanations explained = witness.end();
+  result.explained = std::move(explained.ticks);
+  result.unexplained = explained.more;
+  result.trace = std::move(explained.trace);
+  result.untraced = witness.untraced();
+  result.broke = empty_tick.broke();
   result.migrations = migrations() - moved_before;
   result.parts = parts.end();
   if (ended == rt::Executive::Ended::invalid) {
@@ -234,10 +269,79 @@ tl::expected<Result, std::string> measure(const Wanted& wanted) {
   result.tick = distribution_of(status.tick);
   result.interval = distribution_of(empty_tick.interval());
   result.spikes = empty_tick.spikes();
+  const std::size_t named = std::min<std::size_t>(status.slot_count.load(), rt::kMaxSlots);
+  for (std::size_t i = 0; i < named && !work.slots.empty(); ++i) {
+    result.slots.emplace_back(status.slots[i].name.text, distribution_of(status.slots[i].execution));
+  }
+  result.first_release_ns = static_cast<std::int64_t>(status.start_ns.load());
   result.minor_faults = after.minor_faults - before.minor_faults;
   result.major_faults = after.major_faults - before.major_faults;
   result.voluntary_switches = after.voluntary_switches - before.voluntary_switches;
   result.involuntary_switches = after.involuntary_switches - before.involuntary_switches;
+  return result;
+}
+
+tl::expected<Result, std::string> attach(const std::string& station, const Wanted& wanted) {
+  const auto joined = hal::Joined::join(station);
+  if (!joined) {
+    return tl::unexpected("--attach: " + joined.error());
+  }
+  const auto segment = hal::Shared<const rt::CoreSegment>::attach(tools::kCoreSegment,
+                                                                  joined->descriptor(tools::kCoreSegment));
+  if (!segment) {
+    return tl::unexpected("--attach: " + segment.error());
+  }
+  const rt::CoreStatus& status = (*segment)->status;
+  const auto pid = static_cast<int>(status.pid.load());
+  const auto period_ns = static_cast<double>(status.period_ns.load());
+  if (status.started.load() == 0 || pid == 0 || !(period_ns > 0)) {
+    return tl::unexpected(fmt::format("--attach: {}: its core does not tick yet", station));
+  }
+  tools::stop_signal::watch({SIGINT, SIGTERM}, on_stop_signal);
+  Result result;
+  result.rate_Hz = 1e9 / period_ns;
+  result.machine = machine();
+  result.degraded = status.degraded.load() != 0;
+  result.first_release_ns = static_cast<std::int64_t>(status.start_ns.load());
+  const std::uint64_t ticks = status.ticks.load(), missed = status.missed.load();
+  const Distribution wake = distribution_of(status.wake), tick = distribution_of(status.tick);
+  std::vector<Distribution> slots;
+  const std::size_t count = std::min<std::size_t>(status.slot_count.load(), rt::kMaxSlots);
+  for (std::size_t i = 0; i < count; ++i) {
+    slots.push_back(distribution_of(status.slots[i].execution));
+  }
+  Parts parts(status, wanted.seconds);
+  tools::late::Witness witness(status, pid, pid, wanted.explain_us > 0);
+  const auto begun = std::chrono::steady_clock::now();
+  const std::chrono::duration<double> whole(wanted.seconds);
+  std::uint64_t last = ticks;
+  auto moved = begun;
+  bool stands = false;
+  while (!stands && !end_loop.load() && std::chrono::steady_clock::now() - begun < whole) {
+    std::this_thread::sleep_for(kLookAgain);
+    witness.look();
+    const auto now = std::chrono::steady_clock::now();
+    if (status.ticks.load() != last) {
+      last = status.ticks.load();
+      moved = now;
+    }
+    stands = now - moved > std::chrono::seconds(1);
+  }
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+  tools::late::Explanations explained = witness.end();
+  result.parts = parts.end();
+  result.explained = std::move(explained.ticks);
+  result.unexplained = explained.more;
+  result.trace = std::move(explained.trace);
+  result.untraced = witness.untraced();
+  result.ticks = status.ticks.load() - ticks;
+  result.missed = status.missed.load() - missed;
+  result.wake = since(wake, distribution_of(status.wake));
+  result.tick = since(tick, distribution_of(status.tick));
+  for (std::size_t i = 0; i < count; ++i) {
+    result.slots.emplace_back(status.slots[i].name.text,
+                              since(slots[i], distribution_of(status.slots[i].execution)));
+  }
   return result;
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <stdexcept>
@@ -13,6 +14,7 @@ namespace punctum::jitter {
 namespace {
 
 using Json = nlohmann::json;
+using tools::late::Cause, tools::late::Explained, tools::late::Proof;
 
 constexpr std::size_t kMostBins = 10'000, kMostParts = 1000;
 constexpr std::pair<const char*, double> kQuantiles[] = {
@@ -35,6 +37,19 @@ Json with_quantiles(const Distribution& d) {
     out[name] = d.quantile_us(part);
   }
   return out;
+}
+
+Json json_of(const Explained& e, std::int64_t first_release_ns) {
+  return {{"t_s", 1e-9 * static_cast<double>(e.tick.release_ns - first_release_ns)},
+          {"wake_us", 1e-3 * static_cast<double>(e.tick.wake_ns - e.tick.release_ns)},
+          {"end_us", 1e-3 * static_cast<double>(e.tick.end_ns - e.tick.release_ns)},
+          {"missed", e.tick.missed},
+          {"slot", e.slot},
+          {"slot_us", 1e-3 * static_cast<double>(e.tick.longest_slot_ns)},
+          {"cause", name_of(e.verdict.cause)},
+          {"what", e.verdict.what},
+          {"cause_us", e.verdict.us},
+          {"proof", name_of(e.verdict.proof)}};
 }
 
 template <class T>
@@ -111,13 +126,30 @@ std::string json_of(const Result& r) {
            {"page_faults", {{"minor", r.minor_faults}, {"major", r.major_faults}}},
            {"switches", {{"voluntary", r.voluntary_switches}, {"involuntary", r.involuntary_switches}}},
            {"migrations", r.migrations},
+           {"work", r.work},
            {"load", r.load},
            {"machine", r.machine}};
   out["allocations"] = r.allocations_watched ? Json(r.allocations) : Json(nullptr);
+  if (!r.answered.empty()) {
+    out["answer_us"] = with_quantiles(r.answer);
+    out["answer_us"]["what"] = r.answered;
+    out["answer_us"]["min_us"] = r.answer_min_us;
+    out["answer_us"]["unanswered"] = r.unanswered;
+  }
   out["spikes"] = Json::array();
   for (const Spike& s : r.spikes) {
     out["spikes"].push_back({{"t_s", s.t_s}, {"wake_us", s.wake_us}});
   }
+  out["slots_us"] = Json::object();
+  for (const auto& [name, times] : r.slots) {
+    out["slots_us"][name] = with_quantiles(times);
+  }
+  out["late"] = Json::array();
+  for (const Explained& e : r.explained) {
+    out["late"].push_back(json_of(e, r.first_release_ns));
+  }
+  out["late_unexplained"] = r.unexplained;
+  out["untraced"] = r.untraced;
   out["parts"] = Json::array();
   for (const Distribution& part : r.parts) {
     out["parts"].push_back(json_of(part));
@@ -141,6 +173,7 @@ tl::expected<Result, std::string> result_of_json(std::string_view text) {
     r.wake = distribution(in.at("wake_us"));
     r.tick = distribution(in.at("tick_us"));
     r.interval = distribution(in.at("interval_us"));
+    r.work = in.value("work", "");
     r.load = in.at("load").get<std::string>();
     r.machine = in.at("machine").get<std::string>();
     const Json& parts = in.at("parts");
@@ -229,11 +262,55 @@ std::string bars(const Distribution& d, int columns) {
 
 }  // namespace
 
+std::string late_text(const Result& r) {
+  std::string out;
+  if (!r.untraced.empty()) {
+    out += "not traced: " + r.untraced + "\n";
+  }
+  if (r.explained.empty()) {
+    return out;
+  }
+  // Each cause once, the most frequent first, with its latest tick.
+  struct Kind {
+    std::size_t count = 0;
+    const Explained* latest = nullptr;
+  };
+  const auto lateness = [](const Explained& e) { return e.tick.end_ns - e.tick.release_ns; };
+  std::map<Cause, Kind> kinds;
+  for (const Explained& e : r.explained) {
+    Kind& kind = kinds[e.verdict.cause];
+    ++kind.count;
+    if (kind.latest == nullptr || lateness(e) > lateness(*kind.latest)) {
+      kind.latest = &e;
+    }
+  }
+  std::vector<std::pair<Cause, Kind>> list(kinds.begin(), kinds.end());
+  std::sort(list.begin(), list.end(), [](const auto& a, const auto& b) {
+    return a.second.count != b.second.count ? a.second.count > b.second.count : a.first < b.first;
+  });
+  out += fmt::format("{} late ticks explained{}; the latest of each cause:\n", r.explained.size(),
+                     r.unexplained > 0 ? fmt::format(", {} more not", r.unexplained) : "");
+  for (const auto& [cause, kind] : list) {
+    const Explained& e = *kind.latest;
+    out += fmt::format("{:>6} x {:<15}{:>9.1f} us late at {:.4f} s: {}{}{}\n", kind.count, name_of(cause),
+                       1e-3 * static_cast<double>(lateness(e)),
+                       1e-9 * static_cast<double>(e.tick.release_ns - r.first_release_ns), e.verdict.what,
+                       e.verdict.proof == Proof::none
+                           ? ""
+                           : fmt::format(" ({}, {:.0f} us)", name_of(e.verdict.proof), e.verdict.us),
+                       r.slots.empty() ? ""
+                                       : fmt::format("; slot {} took {:.1f} us", e.slot,
+                                                     1e-3 * static_cast<double>(e.tick.longest_slot_ns)));
+  }
+  return out;
+}
+
 std::string summary(const Result& r, int columns) {
   std::string out = fmt::format("{:.0f} Hz for {:.1f} s: {} ticks, {} releases missed", r.rate_Hz, r.seconds,
                                 r.ticks, r.missed);
-  out += r.load.empty() ? "" : "\nbeside it: " + r.load;
   out += r.degraded ? "; WITHOUT real-time rights\n" : "\n";
+  out += r.work.empty() ? "" : "each tick: " + r.work + "\n";
+  out += r.load.empty() ? "" : "beside it: " + r.load + "\n";
   for (const std::string& one : r.missing) {
     out += "  missing: " + one + "\n";
   }
@@ -243,6 +320,14 @@ std::string summary(const Result& r, int columns) {
   }
   out += "\n" + quantile_line("wake-up", r.wake) + quantile_line("tick", r.tick) +
          quantile_line("interval", r.interval);
+  for (const auto& [name, times] : r.slots) {
+    out += quantile_line(name.c_str(), times);
+  }
+  if (!r.answered.empty()) {
+    out += quantile_line("answer", r.answer) +
+           fmt::format("answer: {}; {} of them, least {:.1f} us, {} without one\n", r.answered,
+                       r.answer.entries(), r.answer_min_us, r.unanswered);
+  }
   out +=
       fmt::format("page faults {} minor, {} major; switches {} voluntary, {} involuntary; migrations {}\n",
                   r.minor_faults, r.major_faults, r.voluntary_switches, r.involuntary_switches, r.migrations);
@@ -250,7 +335,11 @@ std::string summary(const Result& r, int columns) {
     out += fmt::format("worst wake-up {:.1f} us, {:.3f} s after the first tick\n", r.spikes.back().wake_us,
                        r.spikes.back().t_s);
   }
+  out += late_text(r);
   out += "wake-up, us        count (bars: logarithm)\n" + bars(r.wake, columns);
+  if (r.answer.entries() > 0) {
+    out += "answer, us         count\n" + bars(r.answer, columns);
+  }
   return out;
 }
 

@@ -7,7 +7,10 @@
 #include <string>
 #include <string_view>
 #include <tl/expected.hpp>
+#include <utility>
 #include <vector>
+
+#include "tools/shared/witness.hpp"
 
 namespace punctum::jitter {
 
@@ -38,14 +41,28 @@ struct Result {
   Distribution wake;      // release -> wake-up
   Distribution tick;      // wake-up -> end of the tick
   Distribution interval;  // end of a tick -> end of the next one
+  // From a change outside to the loop's answer outside, where that was measured; of so many no answer came.
+  std::string answered;  // what to what
+  Distribution answer;
+  double answer_min_us = 0;
+  std::uint64_t unanswered = 0;
   std::vector<Spike> spikes;
   std::uint64_t minor_faults = 0, major_faults = 0, voluntary_switches = 0, involuntary_switches = 0;
   std::uint64_t migrations = 0, allocations = 0;
   bool allocations_watched = false;
   // Wake-ups of equal parts of the measurement: what differs between them is not the machine's.
   std::vector<Distribution> parts;
-  std::string load;     // that ran beside it; empty: none of ours
-  std::string machine;  // kernel, processor, boot line: two results with the same text are comparable
+  std::vector<std::pair<std::string, Distribution>> slots;  // of a tick that does something: execution times
+  // Ticks that ended too late, each with its cause; of so many more there was no room or no time to tell.
+  std::vector<tools::late::Explained> explained;
+  std::uint64_t unexplained = 0;
+  std::int64_t first_release_ns = 0;
+  std::string untraced;  // why the kernel's trace could not be asked
+  std::string trace;     // of the last explained tick
+  bool broke = false;    // a wake-up was too late and ended it
+  std::string work;      // that each tick did; empty: nothing
+  std::string load;      // that ran beside it; empty: none of ours
+  std::string machine;   // kernel, processor, boot line: two results with the same text are comparable
 };
 
 [[nodiscard]] std::string json_of(const Result& result);

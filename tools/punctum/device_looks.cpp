@@ -201,6 +201,10 @@ hal::Finding look_at_watchdog(const WatchdogParams& params, const Machine& machi
              : hal::Finding{Is::missing, params.path + ": " + may.error()};
 }
 
+hal::Findings look_at_browser(const Scene&, const Machine&, std::string_view) {
+  return {{Is::found, "whoever takes the hand on the page of punctum-console"}};
+}
+
 }  // namespace
 
 const std::vector<DeviceLook>& device_looks() {
@@ -208,7 +212,7 @@ const std::vector<DeviceLook>& device_looks() {
       {kSimulated, look_at_simulated}, {kRecorded, look_at_recorded}, {kGpiod, look_at_gpiod},
       {kCia402, look_at_cia402},       {kV4l2, look_at_v4l2},         {kAravis, look_at_aravis},
       {kFalcon, look_at_falcon},       {kEvdev, look_at_evdev},       {kZaber, look_at_zaber},
-      {kHandle, look_at_handle}};
+      {kBrowser, look_at_browser},     {kHandle, look_at_handle}};
   return looks;
 }
 

@@ -11,6 +11,7 @@ namespace punctum::tools {
 namespace {
 
 // Measured on scene icsi: a row of samples.csv, a row of obs.csv, an annotated frame.
+constexpr double kRecordedTick_bytes = 1000;
 constexpr double kRow_bytes = 620, kObservation_bytes = 420, kFrame_bytes = 330e3;
 constexpr double kFramesPerAnnotated = 12;
 constexpr double kRest_bytes = 4e6;  // the report, the figure and its script, the logs
@@ -23,12 +24,24 @@ double frame_rate(const Scene& scene) {
                                     : 0;
 }
 
+double picture_bytes(const Scene& scene) {
+  constexpr double kUsual = 640 * 480;  // of recorded ones nobody has looked
+  if (scene.camera) {
+    return static_cast<double>(scene.camera->width) * scene.camera->height;
+  }
+  return scene.simulated_camera()
+             ? static_cast<double>(scene.sim->microscope->width) * scene.sim->microscope->height
+             : kUsual;
+}
+
 }  // namespace
 
 double bytes_written(const Scene& scene, const ExpectedRecording& recording) {
   const double rows = recording.seconds * scene.servo.rate_Hz / static_cast<double>(recording.rows_every);
   const double frames = scene.vision ? recording.seconds * frame_rate(scene) : 0;
   return kRest_bytes + rows * kRow_bytes + frames * kObservation_bytes +
+         (recording.every_tick ? recording.seconds * scene.servo.rate_Hz * kRecordedTick_bytes : 0) +
+         (recording.pictures ? frames * picture_bytes(scene) : 0) +
          (recording.frames ? frames / kFramesPerAnnotated * kFrame_bytes : 0);
 }
 

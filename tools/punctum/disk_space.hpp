@@ -13,7 +13,9 @@ namespace punctum::tools {
 struct ExpectedRecording {
   double seconds = 0;
   std::uint64_t rows_every = 1;
-  bool frames = false;  // annotated ones
+  bool frames = false;      // annotated ones
+  bool every_tick = false;  // recording.mcap
+  bool pictures = false;    // in it
 };
 
 // Bytes that a run writes into its folder, at most or nearly so.

@@ -85,6 +85,7 @@ constexpr Saving kSavings[] = {
     {"sim.dish", "the simulated dish has no floor"},
     {"cia402", "no CAN bus"},
     {"watchdog", "a machine that hangs stays as it is, with the drives off by the relay"},
+    {"stream", "no other machine is told positions and forces"},
     {"v4l2", "no camera of the kernel's is opened"},
     {"aravis", "no GenICam camera is looked for, and its library is not loaded"},
     {"falcon", "no firmware is loaded into a USB handle"},

@@ -1,11 +1,13 @@
 // punctum: runs, explains and checks scenes. The only program that starts others.
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdlib>
 #include <exception>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -16,6 +18,7 @@
 #include "tools/punctum/supervisor.hpp"
 #include "tools/punctum/terminal.hpp"
 #include "tools/scene/scene.hpp"
+#include "tools/shared/child.hpp"
 #include "tools/shared/command_line.hpp"
 #include "tools/shared/exit_codes.hpp"
 #include "tools/shared/program_start.hpp"
@@ -50,7 +53,10 @@ int main_or_throw(int argc, char** argv) {
        {"punctum run my.toml --set servo.rate_hz=2000", "a scene of your own, one number changed"},
        {"punctum explain zebrafish", "what would run, and what is left out"},
        {"punctum devices", "what is plugged in, and how a scene names it"},
-       {"punctum report reports/a reports/b", "their reports once more, and the two compared"}},
+       {"punctum report reports/a reports/b", "their reports once more, and the two compared"},
+       {"punctum export recording.mcap --csv tables", "a recorded run as tables; the program punctum-export"},
+       {"punctum replay recording.mcap",
+        "its inputs through this build's servo again: the same bits?; the program punctum-replay"}},
       exit_codes_of_run()));
   std::string scene_name;
   std::vector<std::string> overrides;
@@ -88,6 +94,12 @@ int main_or_throw(int argc, char** argv) {
       ->type_name("TICKS");
   run->add_flag("--no-frames", no_frames, "write no annotated frames");
   run->add_flag("--no-figure", no_figure, "draw no figure");
+  run->add_flag("--record", settings.record,
+                "record all that the station tells into recording.mcap of the report");
+  run->add_flag("--pictures", settings.pictures,
+                "and the pictures that vision looks at, with --record: 8 MB/s of 640 x 480 at 25 per second");
+  run->add_flag("--console", settings.console,
+                "show it in a browser on this machine; the address is printed");
   run->add_flag("--quiet", settings.quiet, "no progress, only the summary");
   CLI::App* explaining =
       app.add_subcommand("explain", "print what a scene would start, and what it leaves out");
@@ -205,13 +217,27 @@ int main_or_throw(int argc, char** argv) {
   }
   settings.frames = !no_frames;
   settings.figure = !no_figure;
+  // Its hand is on the page.
+  settings.console = settings.console || scene->devices.haptic == kBrowser;
   return run_scene(*scene, settings);
+}
+
+// Programs of their own, which need libraries that a station does not.
+void become_another(int argc, char** argv) {
+  for (const char* command : {"export", "replay"}) {
+    if (argc > 1 && std::string_view(argv[1]) == command) {
+      if (const std::string program = find_program(std::string("punctum-") + command); !program.empty()) {
+        execv(program.c_str(), argv + 1);
+      }
+    }
+  }
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   start_program();
+  become_another(argc, argv);
   try {
     return main_or_throw(argc, argv);
   } catch (const std::exception& e) {

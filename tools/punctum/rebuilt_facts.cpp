@@ -15,11 +15,11 @@
 #include "rt/station/telemetry.hpp"
 #include "tools/punctum/event_log.hpp"
 #include "tools/punctum/facts.hpp"
-#include "tools/punctum/fault_advice.hpp"
 #include "tools/punctum/measures.hpp"
 #include "tools/punctum/run_report.hpp"
 #include "tools/scene/scene.hpp"
 #include "tools/shared/csv.hpp"
+#include "tools/shared/fault_advice.hpp"
 
 namespace punctum::tools {
 namespace {
@@ -209,12 +209,30 @@ Json rebuilt_facts(const std::string& folder) {
     }
   }
   // Nobody is left to ask.
-  for (const char* unknown :
-       {"wall_s",           "missed",           "ticks",          "worst_lateness_us", "wake_us",
-        "tick_us",          "slots_us",         "page_faults",    "switches",          "allocations",
-        "degraded",         "rights",           "cells",          "observations",      "stale_s",
-        "without_vision_s", "commands_refused", "wake_histogram", "tick_histogram",    "tremor_ratio",
-        "tremor_hand_um",   "tremor_tip_um"}) {
+  for (const char* unknown : {"wall_s",
+                              "missed",
+                              "ticks",
+                              "worst_lateness_us",
+                              "wake_us",
+                              "tick_us",
+                              "slots_us",
+                              "page_faults",
+                              "switches",
+                              "allocations",
+                              "degraded",
+                              "rights",
+                              "cells",
+                              "observations",
+                              "stale_s",
+                              "without_vision_s",
+                              "commands_refused",
+                              "wake_histogram",
+                              "tick_histogram",
+                              "tremor_ratio",
+                              "tremor_hand_um",
+                              "tremor_tip_um",
+                              "late_ticks",
+                              "late_ticks_not_listed"}) {
     j[unknown] = nullptr;
   }
   j["cell_list"] = Json::array();

@@ -1,54 +1,23 @@
 #include "tools/punctum/recorder.hpp"
 
-#include <fmt/compile.h>
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
-#include <iterator>
+#include <optional>
 #include <string>
 #include <utility>
 
-#include "rt/forces/list.hpp"
-#include "tools/punctum/event_log.hpp"
+#include "tools/shared/event_words.hpp"
+#include "tools/shared/sample_row.hpp"
 #include "tools/shared/station_values.hpp"
 
 namespace punctum::tools {
 namespace {
 
-// The first effects stand before guard_N, all others at the end: columns keep their places.
-constexpr std::size_t kFirstEffects = 4;
-
-std::string effect_columns(std::size_t from, std::size_t to) {
-  std::string columns;
-  for (std::size_t i = from; i < to; ++i) {
-    columns += std::string(rt::effect_name(i)) + "_N,";
-  }
-  return columns;
-}
-
-std::string columns() {
-  std::string all =
-      "t_s,phase,x_m,y_m,z_m,vx_m_s,vy_m_s,vz_m_s,tip_x_m,tip_y_m,tip_z_m,cmd_x_m,cmd_y_m,cmd_z_m,fx_N,fy_N,"
-      "fz_N," +
-      effect_columns(0, kFirstEffects) +
-      "guard_N,wd_m,a_m,R_m,obs_age_s,estop,fault,cell,alarms,buttons,stop,tip_force_N,sigma_d_Pa,pressure_"
-      "Pa,"
-      "obs_gap_m,stored_energy_J,injected_energy_J,injector_open,sensor_N,vacuum_Pa,true_tip_x_m,true_tip_y_"
-      "m,"
-      "true_tip_z_m,true_force_N,true_gap_m,true_wd_m,true_a_m,true_contact,true_punctured,true_lost," +
-      effect_columns(kFirstEffects, rt::effect_count) +
-      "wd_sd_m,R_sd_m,tip_force_sd_N,obs_a_m,obs_a_sd_m,E_fit_Pa,E_fit_sd_Pa,";
-  all.back() = '\n';
-  return all;
-}
-
 // In virtual time the core may be as fast as the recorder: the caller has other work between two rounds.
 constexpr std::uint64_t kMostTicksPerRound = 4096;
 
-constexpr double kLatestFirstTick_s = 1e6;          // later than that is no start
 constexpr std::chrono::milliseconds kFlushed{500};  // so long at most a row waits for its file
 constexpr double kBeforeFault_s = 2;
 constexpr double kAfterFault_s = 0.5;
@@ -76,10 +45,10 @@ Recorder::Recorder(RowFile file, const std::string& folder, const Scene& scene, 
       telemetry_(core.telemetry),
       event_ring_(core.events),
       every_(every > 0 ? every : 1),
-      period_ns_(std::llround(1e9 / scene.servo.rate_Hz)),
+      world_of_tick_(std::llround(1e9 / scene.servo.rate_Hz)),
       ticks_after_fault_(static_cast<std::uint64_t>(kAfterFault_s * scene.servo.rate_Hz)) {
   samples_.file = std::move(file);
-  samples_.file.append(columns());
+  samples_.file.append(sample_columns());
   // Without it the run loses nothing but what a crash would leave.
   if (auto opened = RowFile::open(folder + "/events.csv", RowFile::Begin::empty)) {
     events_table_.file = std::move(*opened);
@@ -111,7 +80,8 @@ std::uint64_t Recorder::drain(bool to_the_end) {
   events_.lost = event_ring_.lost();
   flush_now_and_then();
   if (taker_ && to_the_end) {
-    for (std::uint64_t i = 0; i < sim::kSnapshots && taker_->next(world_); ++i) {
+    sim::Snapshot rest;
+    for (std::uint64_t i = 0; i < sim::kSnapshots && taker_->next(rest); ++i) {
     }
   }
   return taken;
@@ -122,31 +92,8 @@ std::uint64_t Recorder::lost() const noexcept {
   return std::min(telemetry_.lost(), core_.status.ticks.load(std::memory_order_relaxed));
 }
 
-// The plant publishes before the core does: the snapshot of a tick is there, or it was overwritten. It is of
-// the time at which the tick began, late by less than a period. Times of the run count from its first tick;
-// where the first releases were missed, the plant began earlier.
 const sim::Snapshot* Recorder::world_of(const rt::TelemetrySample& s) {
-  if (!taker_) {
-    return nullptr;
-  }
-  for (;;) {
-    if (!world_pending_) {
-      if (!taker_->next(world_)) {
-        return nullptr;
-      }
-      world_tick_ = static_cast<std::uint64_t>((world_.t_ns - world_.start_ns) / period_ns_);
-      const double first_tick_s =
-          static_cast<double>(s.tick) * 1e-9 * static_cast<double>(period_ns_) - s.t_s;
-      world_.start_ns += std::llround(1e9 * std::clamp(first_tick_s, 0.0, kLatestFirstTick_s));
-    }
-    world_pending_ = world_tick_ > s.tick;  // of a later tick: kept for that
-    if (world_pending_) {
-      return nullptr;
-    }
-    if (world_tick_ == s.tick) {
-      return &world_;
-    }
-  }
+  return taker_ ? world_of_tick_(s, [this](sim::Snapshot& out) { return taker_->next(out); }) : nullptr;
 }
 
 void Recorder::flush_now_and_then() {
@@ -197,7 +144,7 @@ void Recorder::keep_last_seconds() {
   if (!fault_.file.is_open() && !fault_.failed) {
     if (auto opened = RowFile::open(folder_ + "/" + fault_.name, RowFile::Begin::empty)) {
       fault_.file = std::move(*opened);
-      fault_.file.append(columns());
+      fault_.file.append(sample_columns());
     } else {
       note_failure(fault_, opened.error(), before_.t_s);
     }
@@ -226,66 +173,12 @@ void Recorder::note_failure(Table& table, const std::string& why, double t_s) {
 }
 
 void Recorder::row(Table& table, const rt::TelemetrySample& s, const sim::Snapshot* world) {
-  fmt::basic_memory_buffer<char, 1024> out;
-  const auto put = [&out](double v) { fmt::format_to(std::back_inserter(out), FMT_COMPILE("{:.9g},"), v); };
-  const auto count = [&out](std::uint64_t v) {
-    fmt::format_to(std::back_inserter(out), FMT_COMPILE("{},"), v);
-  };
-  const auto three = [&put](const double (&v)[3]) {
-    for (const double x : v) {
-      put(x);
-    }
-  };
-  fmt::format_to(std::back_inserter(out), FMT_COMPILE("{:.6f},{},"), s.t_s, rt::name(s.phase));
-  three(s.x_m);
-  three(s.v_m_s);
-  three(s.tip_m);
-  three(s.cmd_m);
-  three(s.force_N);
-  for (std::size_t i = 0; i < kFirstEffects; ++i) {
-    put(s.effect_N[i]);
+  std::optional<RowTruth> truth;
+  if (world != nullptr) {
+    truth = row_truth(sim_, *world);
   }
-  for (const double v : {s.guard_N, s.wd_m, s.a_m, s.R_m, s.obs_age_s}) {
-    put(v);
-  }
-  fmt::format_to(std::back_inserter(out), FMT_COMPILE("{},{},"), s.estop, rt::name(s.fault));
-  count(s.cell);
-  count(s.alarms);
-  count(s.buttons);
-  count(static_cast<std::uint64_t>(s.stop));
-  for (const double v :
-       {s.tip_force_N, s.sigma_d_Pa, s.pressure_Pa, s.obs_gap_m, s.stored_energy_J, s.injected_energy_J}) {
-    put(v);
-  }
-  count(s.injector_open);
-  put(s.sensor_N);
-  put(s.vacuum_Pa);
-  if (world == nullptr) {
-    fmt::format_to(std::back_inserter(out), ",,,,,,,,,,");
-  } else {
-    const hal::Vec3 tip = world->stage.tip_m;
-    put(tip.x());
-    put(tip.y());
-    put(tip.z());
-    if (world->has_cell != 0) {
-      const sim::Truth t = sim::truth_of(sim_, *world);
-      for (const double v : {t.axial_force_N, t.gap_m, t.wd_m, t.a_m}) {
-        put(v);
-      }
-      fmt::format_to(std::back_inserter(out), FMT_COMPILE("{:d},{:d},{:d},"), t.contact, t.punctured, t.lost);
-    } else {
-      fmt::format_to(std::back_inserter(out), ",,,,,,,");
-    }
-  }
-  for (std::size_t i = kFirstEffects; i < rt::effect_count; ++i) {
-    put(s.effect_N[i]);
-  }
-  for (const double v :
-       {s.wd_sd_m, s.R_sd_m, s.tip_force_sd_N, s.obs_a_m, s.obs_a_sd_m, s.E_fit_Pa, s.E_fit_sd_Pa}) {
-    put(v);
-  }
-  out.data()[out.size() - 1] = '\n';  // in place of the last comma
-  table.file.append({out.data(), out.size()});
+  write_sample_row(s, truth ? &*truth : nullptr, row_);
+  table.file.append(row_);
   if (!table.file.failure().empty()) {
     note_failure(table, table.file.failure(), s.t_s);
   }

@@ -19,6 +19,7 @@
 #include "tools/punctum/measures.hpp"
 #include "tools/punctum/not_kept.hpp"
 #include "tools/shared/row_file.hpp"
+#include "tools/shared/world_of_tick.hpp"
 
 namespace punctum::tools {
 
@@ -88,12 +89,10 @@ class Recorder {
   std::unique_ptr<sim::SnapshotTaker> taker_;
   std::uint64_t every_;
   std::uint64_t rows_ = 0, unusable_ = 0;
-  std::int64_t period_ns_;
+  WorldOfTick world_of_tick_;
   std::uint64_t ticks_after_fault_;
-  bool world_pending_ = false;  // world_ is of a tick whose sample has not come yet
-  std::uint64_t world_tick_ = 0;
   rt::TelemetrySample sample_, before_;
-  sim::Snapshot world_;
+  std::string row_;
 };
 
 }  // namespace punctum::tools

@@ -13,9 +13,9 @@
 
 #include "rt/station/run_end.hpp"
 #include "tools/punctum/facts.hpp"
-#include "tools/punctum/fault_advice.hpp"
 #include "tools/punctum/run_sentence.hpp"
 #include "tools/shared/csv.hpp"
+#include "tools/shared/fault_advice.hpp"
 #include "tools/shared/html.hpp"
 
 namespace punctum::tools {
@@ -376,6 +376,15 @@ std::string timing_html(const Json& facts) {
     f.row("wake-up after its release", percentiles("wake_us"));
   }
   f.row("one tick of work", percentiles("tick_us"));
+  std::map<std::string, int> causes;
+  for (const Json& late : fact(facts, "late_ticks")) {
+    ++causes[text_in(late, "cause")];
+  }
+  std::string by_cause;
+  for (const auto& [cause, count] : causes) {
+    by_cause += fmt::format("{}{} by {}", by_cause.empty() ? "" : ", ", count, cause);
+  }
+  f.row("late ticks", by_cause);
   const Json& faults = fact(facts, "page_faults");
   if (number_in(faults, "minor")) {
     f.row("page faults", fmt::format("{} minor, {} major", whole(number_in(faults, "minor")),

@@ -10,12 +10,12 @@
 #include <utility>
 
 #include "tools/punctum/event_log.hpp"
-#include "tools/punctum/fault_advice.hpp"
 #include "tools/punctum/run_sentence.hpp"
 #include "tools/punctum/terminal.hpp"
 #include "tools/scene/messages.hpp"
 #include "tools/shared/csv.hpp"
 #include "tools/shared/exit_codes.hpp"
+#include "tools/shared/fault_advice.hpp"
 #include "tools/shared/station_values.hpp"
 
 namespace punctum::tools {
@@ -185,6 +185,19 @@ nlohmann::ordered_json report_facts(const Scene& scene, const RunResult& result,
   j["ticks"] = core.ticks.load();
   j["missed"] = core.missed.load();
   j["worst_lateness_us"] = static_cast<double>(core.worst_lateness_ns.load()) * 1e-3;
+  j["late_ticks"] = Json::array();
+  for (const late::Explained& e : result.late.ticks) {
+    j["late_ticks"].push_back(
+        {{"t_s",
+          1e-9 * static_cast<double>(e.tick.release_ns - static_cast<std::int64_t>(core.start_ns.load()))},
+         {"wake_us", 1e-3 * static_cast<double>(e.tick.wake_ns - e.tick.release_ns)},
+         {"end_us", 1e-3 * static_cast<double>(e.tick.end_ns - e.tick.release_ns)},
+         {"missed", e.tick.missed},
+         {"cause", late::name_of(e.verdict.cause)},
+         {"what", e.verdict.what},
+         {"proof", late::name_of(e.verdict.proof)}});
+  }
+  j["late_ticks_not_listed"] = result.late.more;
   j["wake_us"] = times(core.wake);
   j["tick_us"] = times(core.tick);  // everything of one tick, the simulated plant included
   j["slots_us"] = Json::object();

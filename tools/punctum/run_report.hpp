@@ -15,6 +15,7 @@
 #include "tools/punctum/not_kept.hpp"
 #include "tools/punctum/vision_process.hpp"
 #include "tools/scene/scene.hpp"
+#include "tools/shared/witness.hpp"
 
 namespace punctum::tools {
 
@@ -32,6 +33,7 @@ struct RunResult {
   Whereabouts needle;  // at the end, after the devices have come to rest
   double wall_s = 0;
   std::vector<NotKept> not_kept;  // in the order of time
+  late::Explanations late;        // ticks that missed a release, each with its cause
   std::uint64_t rows = 0, rows_every = 1, samples_lost = 0;
   std::uint64_t samples_unusable = 0;   // they named what does not exist
   std::optional<double> silent_from_s;  // the core ticked, but none of its samples could be read any more

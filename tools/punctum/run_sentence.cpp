@@ -7,7 +7,7 @@
 
 #include "rt/station/run_end.hpp"
 #include "tools/punctum/facts.hpp"
-#include "tools/punctum/fault_advice.hpp"
+#include "tools/shared/fault_advice.hpp"
 
 namespace punctum::tools {
 namespace {

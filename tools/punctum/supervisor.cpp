@@ -14,22 +14,27 @@
 #include <utility>
 #include <vector>
 
+#include "hal/browser/fingers.hpp"
 #include "hal/ipc/rendezvous.hpp"
 #include "hal/ipc/sealed_text.hpp"
 #include "hal/ipc/segment.hpp"
 #include "hal/sim/bench.hpp"
 #include "hal/sim/valid.hpp"
 #include "hal/sim/world.hpp"
+#include "rt/station/picture.hpp"
 #include "rt/station/station.hpp"
+#include "tools/punctum/console_process.hpp"
 #include "tools/punctum/core_process.hpp"
 #include "tools/punctum/disk_space.hpp"
 #include "tools/punctum/judge.hpp"
 #include "tools/punctum/kernel_watchdog.hpp"
 #include "tools/punctum/lab_report.hpp"
 #include "tools/punctum/provenance.hpp"
+#include "tools/punctum/record_process.hpp"
 #include "tools/punctum/recorder.hpp"
 #include "tools/punctum/report_folder.hpp"
 #include "tools/punctum/run_report.hpp"
+#include "tools/punctum/service_manager.hpp"
 #include "tools/punctum/terminal.hpp"
 #include "tools/punctum/vision_process.hpp"
 #include "tools/scene/messages.hpp"
@@ -38,6 +43,7 @@
 #include "tools/shared/station_values.hpp"
 #include "tools/shared/stop_signal.hpp"
 #include "tools/shared/whole_file.hpp"
+#include "tools/shared/witness.hpp"
 
 namespace punctum::tools {
 namespace {
@@ -68,6 +74,10 @@ std::uint64_t rows_every(const Scene& scene, const RunSettings& settings) {
                                         static_cast<std::uint64_t>(kRowsOfLongRun));
 }
 
+bool has_pictures(const Scene& scene) {
+  return scene.vision && scene.vision->method != vision::Method::truth;
+}
+
 static_assert(rt::kCommandWriters[0] == &rt::kParent);
 
 // The segments of one run. The parent makes them all, and writes its own commands alone.
@@ -79,7 +89,13 @@ struct Segments {
   std::optional<hal::Shared<const rt::ObservationSegment>> observation = {};  // none: the scene has no vision
   std::optional<hal::Shared<sim::Bench>> bench = {};                          // none: nothing is simulated
   std::optional<hal::Shared<sim::CameraAnswers>> camera = {};                 // likewise
-  std::optional<hal::Descriptor> core_for_vision = {}, bench_for_vision = {};  // for reading
+  std::optional<hal::Shared<const rt::InputSegment>> inputs = {};             // none: the run is not recorded
+  std::optional<hal::Shared<const rt::PictureSegment>> pictures = {};         // none: likewise the pictures
+  std::optional<hal::Shared<const browser::FingersSegment>> fingers = {};     // none: no page moves the hand
+  std::optional<hal::Shared<const rt::ViewSegment>> view = {};      // none: vision looks at no picture
+  std::optional<hal::Shared<const rt::ViewerSegment>> viewer = {};  // likewise
+  std::optional<hal::Descriptor> core_for_vision = {}, bench_for_vision = {}, viewer_for_vision = {},
+                                 fingers_for_core = {};  // for reading
 };
 
 tl::expected<void, std::string> offer_to_readers(Segments& segments) {
@@ -92,12 +108,13 @@ tl::expected<void, std::string> offer_to_readers(Segments& segments) {
     segments.rendezvous.offer(name, std::move(*descriptor));
     return {};
   };
+  const auto offer_for_writing = [&segments](const std::string& name, const hal::Segment& segment) {
+    segments.rendezvous.offer(name, hal::Descriptor(fcntl(segment.descriptor(), F_DUPFD_CLOEXEC, 0)));
+  };
   // A queue of commands for whoever claims it first; the parent's own stays with the parent.
   for (std::size_t i = 0; i < rt::kCommandWriterCount; ++i) {
     if (rt::kCommandWriters[i] != &rt::kParent) {
-      const int queue = segments.commands[i].segment().descriptor();
-      segments.rendezvous.offer(command_segment(*rt::kCommandWriters[i]),
-                                hal::Descriptor(fcntl(queue, F_DUPFD_CLOEXEC, 0)));
+      offer_for_writing(command_segment(*rt::kCommandWriters[i]), segments.commands[i].segment());
     }
   }
   auto offered = offer(kCoreSegment, segments.core.segment());
@@ -110,10 +127,23 @@ tl::expected<void, std::string> offer_to_readers(Segments& segments) {
   if (offered && segments.camera) {
     offered = offer(kCameraSegment, segments.camera->segment());
   }
+  if (offered && segments.inputs) {
+    offered = offer(kInputSegment, segments.inputs->segment());
+  }
+  if (offered && segments.pictures) {
+    offered = offer(kPictureSegment, segments.pictures->segment());
+  }
+  if (offered && segments.view) {
+    offered = offer(kViewSegment, segments.view->segment());
+    offer_for_writing(kViewerSegment, segments.viewer->segment());
+  }
+  if (segments.fingers) {
+    offer_for_writing(kFingersSegment, segments.fingers->segment());
+  }
   return offered;
 }
 
-tl::expected<Segments, std::string> create_segments(const Scene& scene) {
+tl::expected<Segments, std::string> create_segments(const Scene& scene, const RunSettings& settings) {
   const std::string station = station_name(scene);
   const auto full_name = [&station](const std::string& segment) { return station + "." + segment; };
   auto rendezvous = hal::Rendezvous::open(station);
@@ -162,6 +192,46 @@ tl::expected<Segments, std::string> create_segments(const Scene& scene) {
     all.bench_for_vision = std::move(*for_reading);
     (*all.bench)->virtual_time.store(scene.clock == ClockKind::virtual_time ? 1 : 0);
   }
+  if (settings.record) {
+    auto inputs = hal::Shared<const rt::InputSegment>::create(full_name(kInputSegment));
+    if (!inputs) {
+      return tl::unexpected(inputs.error());
+    }
+    all.inputs = std::move(*inputs);
+  }
+  if (settings.pictures) {
+    auto pictures = hal::Shared<const rt::PictureSegment>::create(full_name(kPictureSegment));
+    if (!pictures) {
+      return tl::unexpected(pictures.error());
+    }
+    all.pictures = std::move(*pictures);
+  }
+  if (scene.devices.haptic == kBrowser) {
+    auto fingers = hal::Shared<const browser::FingersSegment>::create(full_name(kFingersSegment));
+    if (!fingers) {
+      return tl::unexpected(fingers.error());
+    }
+    auto for_reading = fingers->segment().read_only_descriptor();
+    if (!for_reading) {
+      return tl::unexpected(for_reading.error());
+    }
+    all.fingers = std::move(*fingers);
+    all.fingers_for_core = std::move(*for_reading);
+  }
+  if (has_pictures(scene)) {
+    auto view = hal::Shared<const rt::ViewSegment>::create(full_name(kViewSegment));
+    auto viewer = hal::Shared<const rt::ViewerSegment>::create(full_name(kViewerSegment));
+    if (!view || !viewer) {
+      return tl::unexpected(view ? viewer.error() : view.error());
+    }
+    auto for_reading = viewer->segment().read_only_descriptor();
+    if (!for_reading) {
+      return tl::unexpected(for_reading.error());
+    }
+    all.view = std::move(*view);
+    all.viewer = std::move(*viewer);
+    all.viewer_for_vision = std::move(*for_reading);
+  }
   if (auto offered = offer_to_readers(all); !offered) {
     return tl::unexpected(offered.error());
   }
@@ -182,6 +252,12 @@ HandedSegments for_core(const Segments& segments) {
     handed.add(kBenchSegment, segments.bench->segment().descriptor());
     handed.add(kCameraSegment, segments.camera->segment().descriptor());
   }
+  if (segments.inputs) {
+    handed.add(kInputSegment, segments.inputs->segment().descriptor());
+  }
+  if (segments.fingers) {
+    handed.add(kFingersSegment, segments.fingers_for_core->number());
+  }
   return handed;
 }
 
@@ -194,6 +270,13 @@ HandedSegments for_vision(const Segments& segments) {
   if (segments.bench) {
     handed.add(kBenchSegment, segments.bench_for_vision->number());
     handed.add(kCameraSegment, segments.camera->segment().descriptor());
+  }
+  if (segments.pictures) {
+    handed.add(kPictureSegment, segments.pictures->segment().descriptor());
+  }
+  if (segments.view) {
+    handed.add(kViewSegment, segments.view->segment().descriptor());
+    handed.add(kViewerSegment, segments.viewer_for_vision->number());
   }
   return handed;
 }
@@ -244,7 +327,8 @@ class Run {
         vision_(vision_arguments(scene, resolved, folder_, for_vision(segments), settings.frames),
                 inherited(for_vision(segments), resolved), folder_ + "/vision.log",
                 segments.observation ? &(*segments.observation)->rounds : nullptr,
-                scene.clock == ClockKind::real, terminal) {}
+                scene.clock == ClockKind::real, terminal),
+        console_(segments.station, folder_ + "/console.log", terminal) {}
 
   int run();
 
@@ -254,6 +338,8 @@ class Run {
   }
   [[nodiscard]] const rt::CoreStatus& status() const { return segments_.core->status; }
   void watch_vision();
+  [[nodiscard]] tl::expected<void, std::string> start_recording();
+  void note_recording(const std::string& why);
   void tell_faults();
   void watch_recording();
   void tell_progress();
@@ -275,7 +361,11 @@ class Run {
   Terminal& terminal_;
   CoreProcess core_;
   VisionProcess vision_;
+  RecordProcess record_;
+  ConsoleProcess console_;
   KernelWatchdog watchdog_;
+  ServiceManager service_manager_;
+  std::optional<late::Witness> witness_;  // of a core in real time
   std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
   bool vision_was_refused_ = false;
   bool frames_are_over_ = false, stop_for_good_ = false;
@@ -301,11 +391,19 @@ int Run::run() {
   if (!report_folder_.note.empty()) {
     terminal_.say("{}", report_folder_.note);
   }
+  if (scene_.clock == ClockKind::real) {
+    terminal_.say("station: {}", segments_.station);
+  }
   (void)write_begun(folder_, begun_facts_);
 
   if (scene_.watchdog) {
     if (auto armed = watchdog_.arm(*scene_.watchdog); !armed) {
       return refuse(armed.error());
+    }
+  }
+  if (settings_.record) {
+    if (auto started = start_recording(); !started) {
+      return refuse(started.error());
     }
   }
   // Recorded frames play from the core's first tick on; a camera is there before it.
@@ -321,9 +419,18 @@ int Run::run() {
       !started) {
     return refuse(started.error());
   }
+  if (settings_.console) {
+    if (auto started = console_.start(); !started) {
+      terminal_.complain(started.error());
+    }
+  }
   begun_ = std::chrono::steady_clock::now();
   const Ended core = watch_until_the_core_ends();
   watchdog_.disarm();
+  service_manager_.stopping();
+  if (witness_) {
+    result_.late = witness_->end();
+  }
   recorder_.finish();
   tell_faults();
   terminal_.clear_progress();
@@ -335,6 +442,8 @@ int Run::run() {
     (*segments_.bench)->finished.store(1);  // a camera that still waits for the plant ends
   }
   vision_.end();
+  note_recording(record_.end());
+  console_.end();
   tell_what_is_not_kept();
   return report();
 }
@@ -343,6 +452,7 @@ int Run::run() {
 int Run::refuse(const std::string& why) {
   terminal_.complain(why);
   vision_.end(true);
+  record_.abandon();
   reserve_.give_back();
   discard(report_folder_);
   return exit_bad_input;
@@ -354,9 +464,19 @@ Ended Run::watch_until_the_core_ends() {
     if (core_.ended(ended)) {
       return ended;
     }
+    if (const auto pid = static_cast<int>(status().pid.load());
+        pid != 0 && !witness_ && scene_.clock == ClockKind::real) {
+      witness_.emplace(status(), pid, pid, false);
+    }
+    if (witness_) {
+      witness_->look();
+    }
     segments_.rendezvous.serve();
     watchdog_.feed(status().ticks.load(), now_s());
+    service_manager_.ticks(status().ticks.load(), now_s());
     watch_vision();
+    console_.watch();
+    note_recording(record_.watch());
     watch_recording();
     core_.watch(now_s(), stop_signal::count());
     tell_what_is_not_kept();
@@ -364,6 +484,30 @@ Ended Run::watch_until_the_core_ends() {
     if (taken < kBusyRound) {
       std::this_thread::sleep_for(std::chrono::microseconds(scene_.clock == ClockKind::real ? 2000 : 100));
     }
+  }
+}
+
+tl::expected<void, std::string> Run::start_recording() {
+  auto added = record_.add(kCoreSegment, segments_.core.segment());
+  if (added && segments_.observation) {
+    added = record_.add(kObservationSegment, segments_.observation->segment());
+  }
+  if (added && segments_.bench) {
+    added = record_.add(kBenchSegment, segments_.bench->segment());
+  }
+  if (added) {
+    added = record_.add(kInputSegment, segments_.inputs->segment());
+  }
+  if (added && segments_.pictures) {
+    added = record_.add(kPictureSegment, segments_.pictures->segment());
+  }
+  return added ? record_.start(segments_.station, resolved_, folder_) : added;
+}
+
+void Run::note_recording(const std::string& why) {
+  if (!why.empty()) {
+    terminal_.complain(fmt::format("{} is not whole: {}", RecordProcess::kFile, why));
+    result_.not_kept.push_back({RecordProcess::kFile, recorder_.measures().last_s, why});
   }
 }
 
@@ -588,6 +732,14 @@ int run_scene(const Scene& scene, const RunSettings& settings) {
     terminal.complain(why);
     return exit_bad_input;
   };
+  if (settings.console && find_program(kConsoleProgram).empty()) {
+    return refuse(
+        fmt::format("--console: {} is not there, neither beside this program nor in PATH", kConsoleProgram));
+  }
+  if (settings.pictures && (!settings.record || !has_pictures(scene))) {
+    return refuse(settings.record ? "--pictures: vision looks at none in this scene"
+                                  : "--pictures: goes into the recording, which --record asks for");
+  }
   const auto report = prepare_report_folder(scene, settings.report, settings.overwrite);
   if (!report) {
     return refuse(report.error());
@@ -601,7 +753,9 @@ int run_scene(const Scene& scene, const RunSettings& settings) {
   const auto space = look_for_space(
       folder, bytes_written(scene, {.seconds = scene.seconds > 0 ? scene.seconds : kOpenEnded_s,
                                     .rows_every = every,
-                                    .frames = settings.frames && !is_long(scene)}));
+                                    .frames = settings.frames && !is_long(scene),
+                                    .every_tick = settings.record,
+                                    .pictures = settings.pictures}));
   if (!space) {
     return refuse_and_leave_nothing(space.error());
   }
@@ -620,10 +774,11 @@ int run_scene(const Scene& scene, const RunSettings& settings) {
   if (!resolved) {
     return refuse_and_leave_nothing(resolved.error());
   }
-  auto segments = create_segments(scene);
+  auto segments = create_segments(scene, settings);
   if (!segments) {
     return refuse_and_leave_nothing(segments.error());
   }
+  segments->rendezvous.offer(kSceneText, hal::Descriptor(fcntl(resolved->number(), F_DUPFD_CLOEXEC, 0)));
   auto recorder = Recorder::create(folder, scene, *segments->core,
                                    segments->bench ? segments->bench->get() : nullptr, every);
   if (!recorder) {

@@ -16,6 +16,9 @@ struct RunSettings {
   bool figure = true;
   bool overwrite = false;  // an earlier report in the folder
   bool quiet = false;      // the summary only
+  bool pictures = false;   // likewise, the pictures that vision looks at
+  bool record = false;     // recording.mcap beside the report
+  bool console = false;    // with punctum-console beside it
 };
 
 // Returns an ExitCode.

@@ -50,6 +50,12 @@ constexpr auto keys_of(const WatchdogParams*) {
                    hal::whole("timeout_s", &WatchdogParams::timeout_s, 2, 600));
 }
 
+// Positions and forces for a program on another machine, as UDP datagrams of punctum-console.
+struct StreamParams {
+  std::string to;  // ADDRESS:PORT
+};
+constexpr auto keys_of(const StreamParams*) { return hal::keys(hal::text("to", &StreamParams::to)); }
+
 inline constexpr std::string_view kSimulated = "simulated";
 
 // Which backend stands behind each device: its name; empty where the scene has no such device. Of the
@@ -65,6 +71,7 @@ inline constexpr std::string_view kV4l2 = "v4l2";
 inline constexpr std::string_view kAravis = "aravis";
 inline constexpr std::string_view kFalcon = "falcon";
 inline constexpr std::string_view kEvdev = "evdev";
+inline constexpr std::string_view kBrowser = "browser";
 inline constexpr std::string_view kZaber = "zaber";
 
 struct Scene {
@@ -88,6 +95,7 @@ struct Scene {
   std::optional<cia402::CanStageParams> cia402;  // stage = drives on a CAN bus
   std::optional<gpiod::GpiodParams> gpiod;       // lines of the devices that name it
   std::optional<WatchdogParams> watchdog;        // of the machine
+  std::optional<StreamParams> stream;            // absent: nobody is told over UDP
   std::optional<hal::CameraSettings> camera;     // camera = one that is plugged in
   std::optional<v4l2::V4l2Params> v4l2;
   std::optional<aravis::AravisParams> aravis;

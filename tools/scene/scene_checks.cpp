@@ -10,7 +10,9 @@
 #include "hal/cia402/calibration.hpp"
 #include "hal/sim/failures.hpp"
 #include "rt/control/renderable.hpp"
+#include "tools/scene/messages.hpp"
 #include "tools/scene/scene_keys.hpp"
+#include "tools/shared/udp_address.hpp"
 
 namespace punctum::tools {
 namespace {
@@ -236,6 +238,36 @@ Found check_evdev(const Scene& s) {
   if (hand && !s.evdev->path.empty() && !s.evdev->path.starts_with('/')) {
     return Problem{"evdev.path",
                    "is no path, allowed: an input device, such as \"/dev/input/event5\", or empty"};
+  }
+  return std::nullopt;
+}
+
+// A hand on the operator's page. A network lies between it and the station: it moves simulated devices alone.
+Found check_browser(const Scene& s) {
+  if (s.devices.haptic != kBrowser) {
+    return std::nullopt;
+  }
+  if (s.hand_feels()) {
+    return Problem{
+        "haptic.force_max_N",
+        fmt::format("{:g}, but a page renders no force, allowed: 0 with haptic.device = \"browser\"",
+                    s.servo.device.force_max_N)};
+  }
+  if (!s.servo.enabling) {
+    return Problem{"haptic.device",
+                   "\"browser\" needs [enabling] (letting go of the button stops), allowed: add [enabling]"};
+  }
+  for (const auto& [table, backend] :
+       {std::pair{"stage", &s.devices.stage}, std::pair{"injector", &s.devices.injector},
+        std::pair{"vacuum", &s.devices.vacuum}, std::pair{"positioner", &s.devices.positioner}}) {
+    if (!backend->empty() && *backend != kSimulated) {
+      return Problem{
+          fmt::format("{}.device", table),
+          fmt::format(
+              "\"{}\", but the hand on a page moves simulated devices alone, allowed: \"simulated\" with "
+              "haptic.device = \"browser\"",
+              *backend)};
+    }
   }
   return std::nullopt;
 }
@@ -1001,12 +1033,22 @@ Found check_failures(const Scene& s) {
   return std::nullopt;
 }
 
+Found check_stream(const Scene& s) {
+  if (s.stream && !udp_address(s.stream->to)) {
+    return Problem{
+        "stream.to",
+        fmt::format("\"{}\": no address with a port, allowed: \"192.168.1.7:9000\" or \"[fd00::7]:9000\"",
+                    printable(s.stream->to, 60))};
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 std::optional<Problem> check_together(const Scene& scene) {
-  for (const auto check :
-       {check_needs, check_live_camera, check_gpiod, check_backends, check_can_stage, check_falcon,
-        check_evdev, check_zaber, check_plant, check_core, check_camera, check_vision, check_failures}) {
+  for (const auto check : {check_needs, check_live_camera, check_gpiod, check_backends, check_can_stage,
+                           check_falcon, check_evdev, check_browser, check_zaber, check_plant, check_core,
+                           check_camera, check_vision, check_failures, check_stream}) {
     if (auto p = check(scene)) {
       return p;
     }

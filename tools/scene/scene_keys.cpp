@@ -252,6 +252,7 @@ void add_backends(std::vector<Table>& t) {
 
 void add_machine(std::vector<Table>& t) {
   t.push_back(thing("watchdog", [](Scene& s) -> auto& { return s.watchdog; }));
+  t.push_back(thing("stream", [](Scene& s) -> auto& { return s.stream; }));
 }
 
 void add_vision(std::vector<Table>& t) {
@@ -432,6 +433,7 @@ const Backends& known_backends() {
     b["force_sensor"].emplace_back(kCia402);
     b["haptic"].emplace_back(kFalcon);
     b["haptic"].emplace_back(kEvdev);
+    b["haptic"].emplace_back(kBrowser);
     b["positioner"].emplace_back(kZaber);
     return b;
   }();

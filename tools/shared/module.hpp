@@ -6,7 +6,7 @@
 
 namespace punctum::tools {
 
-// The function of a module (a file in lib/punctum), or why there is none. The module stays loaded.
+// The function of a module (a file in lib/punctum/modules), or why there is none. The module stays loaded.
 [[nodiscard]] tl::expected<void*, std::string> function_of_module(const char* module, const char* function);
 
 }  // namespace punctum::tools

@@ -6,25 +6,25 @@
 namespace punctum::tools {
 namespace {
 
-void write(std::FILE* to, std::string_view text) noexcept {
+void write_text(std::FILE* to, std::string_view text) noexcept {
   (void)std::fwrite(text.data(), 1, text.size(), to);
 }
 
 }  // namespace
 
 void say(std::string_view text) noexcept {
-  write(stdout, text);
+  write_text(stdout, text);
   (void)std::fflush(stdout);
 }
 
 void say_aside(std::string_view text) noexcept {
-  write(stderr, text);
+  write_text(stderr, text);
   (void)std::fflush(stderr);
 }
 
 void complain(std::string_view text) noexcept {
-  write(stderr, text);
-  write(stderr, "\n");
+  write_text(stderr, text);
+  write_text(stderr, "\n");
   (void)std::fflush(stderr);
 }
 
@@ -34,10 +34,10 @@ bool all_was_said() noexcept {
     return true;
   }
   const int why = errno;
-  write(stderr, "the standard output cannot be written");
+  write_text(stderr, "the standard output cannot be written");
   if (why != 0) {
-    write(stderr, ": ");
-    write(stderr, std::strerror(why));
+    write_text(stderr, ": ");
+    write_text(stderr, std::strerror(why));
   }
   complain("");
   return false;

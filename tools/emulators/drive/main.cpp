@@ -66,7 +66,7 @@ int run(int argc, char** argv) {
   std::vector<std::string> commands;
   double start_counts = 0;
   bool data_sheet = false;
-  app.set_version_flag("--version", tools::version_line("punctum-drive"));
+  app.set_version_flag("--version", tools::version_line("punctum-drive"), "version and commit");
   app.add_option("interface", interface, "a CAN interface that is up")->type_name("NAME");
   app.add_option("--node", nodes, "node numbers, a drive for each")
       ->type_name("N")

@@ -140,7 +140,7 @@ int run(int argc, char** argv) {
   unsigned buttons = 0;
   emulator::FalconParams params;
   std::vector<std::string> commands;
-  app.set_version_flag("--version", tools::version_line("punctum-falcon"));
+  app.set_version_flag("--version", tools::version_line("punctum-falcon"), "version and commit");
   app.add_option("--circle", radius_mm, "the hand goes round in a circle of this radius")
       ->type_name("MM")
       ->check(CLI::Range(0.0, 45.0));

@@ -101,7 +101,7 @@ int run(int argc, char** argv) {
   emulator::PositionerParams params;
   std::vector<std::string> commands;
   bool not_homed = false;
-  app.set_version_flag("--version", tools::version_line("punctum-positioner"));
+  app.set_version_flag("--version", tools::version_line("punctum-positioner"), "version and commit");
   app.add_option("--devices", params.devices, "of the chain")->type_name("N")->check(CLI::Range(1, 9));
   app.add_option("--axes", params.axes, "of each device")->type_name("N")->check(CLI::Range(1, 9));
   app.add_option("--start", params.start, "where the axes stand at first")

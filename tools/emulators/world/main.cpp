@@ -333,7 +333,7 @@ int run(int argc, char** argv) {
       "punctum-world");
   tools::set_help_style(app);
   Options options;
-  app.set_version_flag("--version", tools::version_line("punctum-world"));
+  app.set_version_flag("--version", tools::version_line("punctum-world"), "version and commit");
   app.add_option("scene", options.scene, "whose [sim] tables are the world, with its operator")
       ->type_name("SCENE");
   app.add_option("--set", options.overrides, "a key of the scene")->type_name("TABLE.KEY=VALUE");

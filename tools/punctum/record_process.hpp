@@ -1,0 +1,38 @@
+// The recording of a run as the parent sees it: punctum-record, started before the core and ended after it. A
+// run goes on without it.
+#pragma once
+
+#include <string>
+#include <tl/expected.hpp>
+#include <vector>
+
+#include "hal/ipc/segment.hpp"
+#include "tools/shared/child.hpp"
+#include "tools/shared/station_segments.hpp"
+
+namespace punctum::tools {
+
+class RecordProcess {
+ public:
+  static constexpr const char* kFile = "recording.mcap";
+
+  // What it maps, for reading only; before start().
+  [[nodiscard]] tl::expected<void, std::string> add(const char* name, const hal::Segment& segment);
+  [[nodiscard]] tl::expected<void, std::string> start(const std::string& station,
+                                                      const hal::Descriptor& scene,
+                                                      const std::string& folder);
+  // Both say why the recording is not whole, once; empty if it is, or if there is none.
+  [[nodiscard]] std::string watch();  // once per round of the parent
+  [[nodiscard]] std::string end();  // the core has ended: it takes the rest, ends its file, and is waited for
+  // Nothing has begun.
+  void abandon();
+
+ private:
+  [[nodiscard]] std::string why(const Ended& how) const;
+
+  HandedSegments handed_;
+  std::vector<hal::Descriptor> descriptors_;
+  Child child_;
+};
+
+}  // namespace punctum::tools

@@ -2,12 +2,16 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <cstring>
 #include <exception>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <tuple>
+#include <utility>
 
 #include "hal/recorded/picture.hpp"
 #include "tools/report/watched_programs.hpp"
@@ -43,10 +47,26 @@ FrameTruth truth_of(const nlohmann::json& told, double pixel_m) {
   t.centre = vision::centroid(t.outer);
   t.wd_m = told.at("wd_px").get<double>() * pixel_m;
   t.a_m = t.R_m = std::nan("");
+  t.holder = {told.at("holder").at(0).get<double>(), told.at("holder").at(1).get<double>()};
   return t;
 }
 
 }  // namespace
+
+DrawnInjection read_foreign(const fs::path& drawn) {
+  DrawnInjection out;
+  for (const auto& told : nlohmann::json::parse(read_text(drawn / "truth.json"))) {
+    auto picture = recorded::read_picture(drawn / fmt::format("frame_{:04}.png", out.pixels.size()));
+    if (!picture) {
+      throw std::runtime_error(picture.error());
+    }
+    out.lens.width = picture->width;
+    out.lens.height = picture->height;
+    out.pixels.push_back(std::move(picture->pixels));
+    out.truth.push_back(truth_of(told, out.lens.pixel_m));
+  }
+  return out;
+}
 
 tl::expected<DrawnInjection, std::string> foreign_injection(const ForeignPlan& plan) {
   const char* data = std::getenv("PUNCTUM_DATA");
@@ -62,22 +82,38 @@ tl::expected<DrawnInjection, std::string> foreign_injection(const ForeignPlan& p
                        fmt::format("{}", plan.noise), fmt::format("{}", plan.frames)},
               .log = folder / "log"}},
             1);
-    DrawnInjection out;
+    DrawnInjection out = read_foreign(drawn);
     out.lens.noise = plan.noise;
-    for (const auto& told : nlohmann::json::parse(read_text(drawn / "truth.json"))) {
-      auto picture = recorded::read_picture(drawn / fmt::format("frame_{:04}.png", out.pixels.size()));
-      if (!picture) {
-        return tl::unexpected(picture.error());
-      }
-      out.lens.width = picture->width;
-      out.lens.height = picture->height;
-      out.pixels.push_back(std::move(picture->pixels));
-      out.truth.push_back(truth_of(told, out.lens.pixel_m));
-    }
     return out;
   } catch (const std::exception& e) {
     return tl::unexpected(std::string(e.what()));
   }
+}
+
+std::vector<ForeignFolder> foreign_folders(const fs::path& frames) {
+  std::vector<ForeignFolder> found;
+  for (const auto& kind : fs::directory_iterator(frames)) {
+    const std::string name = kind.path().filename().string();
+    if (!kind.is_directory() || !name.starts_with("noise-")) {
+      continue;
+    }
+    PictureKind pictures{.renderer = "another",
+                         .name = name,
+                         .noise = std::strtod(name.c_str() + std::strlen("noise-"), nullptr),
+                         .blur_px = sim::MicroscopeParams{}.psf_px};
+    if (const auto blur = name.find(",blur="); blur != std::string::npos) {
+      pictures.blur_px = std::strtod(name.c_str() + blur + std::strlen(",blur="), nullptr);
+    }
+    for (const auto& sequence : fs::directory_iterator(kind)) {
+      if (fs::exists(sequence.path() / "truth.json")) {
+        found.push_back({pictures, sequence.path()});
+      }
+    }
+  }
+  std::sort(found.begin(), found.end(), [](const ForeignFolder& a, const ForeignFolder& b) {
+    return std::tie(a.kind, a.folder) < std::tie(b.kind, b.folder);
+  });
+  return found;
 }
 
 }  // namespace punctum::report

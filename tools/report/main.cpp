@@ -71,13 +71,14 @@ std::string prepare(const fs::path& out) {
   return {};
 }
 
-Finished finish(const Topic& topic, bool quick, const fs::path& out, const Provenance& from) {
+Finished finish(const Topic& topic, bool quick, const fs::path& out, const fs::path& frames,
+                const Provenance& from) {
   Finished done{.topic = std::string(topic.name), .about = std::string(topic.about)};
   const auto begun = std::chrono::steady_clock::now();
   try {
     {
       Progress progress(done.topic);
-      done.result = topic.run({.quick = quick, .out = out, .progress = progress});
+      done.result = topic.run({.quick = quick, .out = out, .frames = frames, .progress = progress});
     }
     for (const Table& t : done.result.tables) {
       write(out / (t.name + ".csv"), csv(t, from));
@@ -117,7 +118,7 @@ int main_or_throw(int argc, char** argv) {
        {kTopicFailed, "a topic failed, the others are there"},
        {kBadInput, "bad input"}}));
   std::vector<std::string> wanted;
-  std::string folder, input, output;
+  std::string folder, frames, input, output;
   bool quick = false;
   app.add_option("TOPIC", wanted, "one or more of: " + names)->required();
   const auto* to_folder =
@@ -125,6 +126,10 @@ int main_or_throw(int argc, char** argv) {
                      "folder of tables, figures and index.html (default: reports/report-DATE)")
           ->type_name("FOLDER");
   app.add_flag("--quick", quick, "fewer points and cells, all together within a minute");
+  const auto* drawn = app.add_option("--frames", frames,
+                                     "vision only: pictures that another renderer drew, in "
+                                     "FOLDER/noise-N[,KEY=VALUE]/SEED/")
+                          ->type_name("FOLDER");
   CLI::Option* in = nullptr;
   if (evaluates != topics().end()) {
     in = app.add_option("--input", input,
@@ -154,6 +159,14 @@ int main_or_throw(int argc, char** argv) {
     }
     return evaluates->evaluate(input, output);
   }
+  if (drawn->count() > 0) {
+    if (!all && std::find(wanted.begin(), wanted.end(), "vision") == wanted.end()) {
+      return bad("--frames: allowed with the topic vision");
+    }
+    if (!fs::is_directory(frames)) {
+      return bad(fmt::format("--frames: {}: is not a folder", frames));
+    }
+  }
   if (to_folder->count() > 0 && folder.empty()) {
     return bad("--out: names no folder");
   }
@@ -171,7 +184,7 @@ int main_or_throw(int argc, char** argv) {
   std::vector<Finished> finished;
   for (const Topic& t : topics()) {
     if (all || std::find(wanted.begin(), wanted.end(), t.name) != wanted.end()) {
-      finished.push_back(finish(t, quick, out, from));
+      finished.push_back(finish(t, quick, out, frames, from));
     }
   }
   write(out / "index.html", page(finished, from, out));

@@ -114,9 +114,10 @@ std::optional<Removal> without(const Scene& scene, const tools::Table& table) {
   return r;
 }
 
-// The instructions that callgrind counted in Servo::tick and below.
+// The instructions that callgrind counted in Servo::tick and below. The steps are what it calls: the compiler
+// makes the smaller ones a part of it.
 TickCost read_callgrind(const fs::path& file, double ticks) {
-  constexpr std::string_view kTick = "punctum::rt::Servo::tick", kServo = "punctum::rt::Servo::";
+  constexpr std::string_view kTick = "punctum::rt::Servo::tick", kCore = "punctum::rt::";
   TickCost cost;
   std::ifstream in(file);
   bool in_tick = false, cost_of_call = false;
@@ -135,8 +136,8 @@ TickCost read_callgrind(const fs::path& file, double ticks) {
       cost_of_call = true;
     } else if (cost_of_call) {
       cost_of_call = false;
-      if (in_tick && called.starts_with(kServo)) {
-        const auto name = called.substr(kServo.size(), called.find('(') - kServo.size());
+      if (in_tick && called.starts_with(kCore)) {
+        const auto name = called.substr(kCore.size(), called.find('(') - kCore.size());
         cost.steps[name] += std::strtod(line.c_str() + line.find(' '), nullptr) / ticks;
       }
     }

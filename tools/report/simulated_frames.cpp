@@ -98,6 +98,7 @@ SimulatedInjection simulate_injection(const InjectionPlan& plan) {
     t.wd_m = truth.wd_m;
     t.a_m = truth.a_m;
     t.R_m = cell.R_m();
+    t.holder = pixel(cell.holder_mouth_m().x(), cell.holder_mouth_m().y());
     out.truth.push_back(std::move(t));
   }
   return out;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "hal/sim/config.hpp"
@@ -16,10 +17,11 @@ inline constexpr int kStretches = 4;
 
 struct FrameTruth {
   Stretch stretch = Stretch::approach;
-  vision::Contour outer, inner;       // px; the edges before blur, with the arcs that pipettes hide
-  vision::Point tip, axis;            // px, unit
-  vision::Point centre;               // of the cell, px
-  double wd_m = 0, a_m = 0, R_m = 0;  // NaN: not told
+  vision::Contour outer, inner;         // px; the edges before blur, with the arcs that pipettes hide
+  vision::Point tip, axis;              // px, unit
+  vision::Point centre;                 // of the cell, px
+  double wd_m = 0, a_m = 0, R_m = 0;    // NaN: not told
+  std::optional<vision::Point> holder;  // the middle of the mouth, px
 };
 
 struct InjectionPlan {

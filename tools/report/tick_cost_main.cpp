@@ -1,6 +1,7 @@
 // punctum-tick-cost TAPE SCENE VARIANT...: runs the servo of a scene through recorded ticks, once for each
 // variant: overrides separated by ',', or "" for the scene itself. Topic scenes runs this program under
-// callgrind and reads the instructions of each variant.
+// callgrind and reads the instructions of each variant. punctum-tick-cost record TAPE SCENE VARIANT makes the
+// tape.
 #include <fmt/format.h>
 
 #include <string>
@@ -25,6 +26,27 @@ std::vector<std::string> overrides_of(std::string_view variant) {
   return replay_ticks(scene, tape);
 }
 
+int bad(const std::string& text) {
+  tools::complain(text);
+  return 2;
+}
+
+int record(const char* file, const char* name, const char* variant) {
+  const auto scene = tools::load_scene(name, overrides_of(variant));
+  if (!scene) {
+    return bad(scene.error());
+  }
+  if (!scene->sim || scene->seconds <= 0) {
+    return bad(scene->name + ": no simulated run of it ends");
+  }
+  const auto tape = record_ticks(*scene, scene->seconds);
+  if (const auto written = write_tape(file, tape); !written) {
+    return bad(written.error());
+  }
+  tools::say(fmt::format("{}\n", tape.size()));
+  return tools::all_was_said() ? 0 : 1;
+}
+
 int run(int argc, char** argv) {
   if (argc == 2 && std::string_view(argv[1]) == "--version") {
     tools::say(tools::version_line("punctum-tick-cost") + "\n");
@@ -33,26 +55,27 @@ int run(int argc, char** argv) {
   if (argc == 2 && (std::string_view(argv[1]) == "--help" || std::string_view(argv[1]) == "-h")) {
     fmt::print(
         "Runs the servo of a scene through recorded ticks, once per variant, for counting instructions.\n"
-        "Usage: punctum-tick-cost TAPE SCENE VARIANT...\n\n"
+        "With record, the ticks of one variant are recorded instead.\n"
+        "Usage: punctum-tick-cost [record] TAPE SCENE VARIANT...\n\n"
         "Examples:\n  punctum-report scenes\n      records the tape and starts this program under "
         "callgrind\n\n"
         "Exit codes:\n  0  all variants were run\n  2  bad input\n");
     return 0;
   }
   if (argc < 4) {
-    tools::complain("punctum-tick-cost TAPE SCENE VARIANT...; `punctum-report scenes` starts this program");
-    return 2;
+    return bad("punctum-tick-cost TAPE SCENE VARIANT...; `punctum-report scenes` starts this program");
+  }
+  if (argc == 5 && std::string_view(argv[1]) == "record") {
+    return record(argv[2], argv[3], argv[4]);
   }
   const auto tape = read_tape(argv[1]);
   if (!tape) {
-    tools::complain(tape.error());
-    return 2;
+    return bad(tape.error());
   }
   for (int i = 3; i < argc; ++i) {
     const auto scene = tools::load_scene(argv[2], overrides_of(argv[i]));
     if (!scene) {
-      tools::complain(scene.error());
-      return 2;
+      return bad(scene.error());
     }
     tools::say(fmt::format("{} {}\n", tape->size(), rt::name(run_variant(*scene, *tape))));
   }

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <deque>
@@ -13,162 +12,27 @@
 #include "hal/sim/truth.hpp"
 #include "hal/sim/world.hpp"
 #include "rt/station/station.hpp"
+#include "tools/shared/taped_devices.hpp"
 #include "tools/shared/truth_observer.hpp"
 
 namespace punctum::report {
 namespace {
 
-// Devices between servo and tape. With a device behind them they record what it returns; without one they
-// return what was recorded.
-struct TapedHand final : hal::HapticDevice {
-  TickTold* told = nullptr;
-  hal::HapticDevice* device = nullptr;
-  hal::Status read(hal::HandState& out) noexcept override {
-    if (device != nullptr) {
-      told->hand_status = device->read(out);
-      told->hand_m = out.position_m;
-      const hal::Quat& q = out.orientation;
-      const double wxyz[4] = {q.w(), q.x(), q.y(), q.z()};
-      std::copy(wxyz, wxyz + 4, told->hand_wxyz);
-      told->buttons = out.buttons;
-    } else if (told->hand_status == hal::Status::ok) {
-      out.position_m = told->hand_m.vec();
-      out.orientation =
-          hal::Quat(told->hand_wxyz[0], told->hand_wxyz[1], told->hand_wxyz[2], told->hand_wxyz[3]);
-      out.buttons = told->buttons;
-      out.sample_ns = told->release_ns;
-    }
-    return told->hand_status;
-  }
-  hal::Status write_force(const hal::Vec3& force_N) noexcept override {
-    return device != nullptr ? device->write_force(force_N) : hal::Status::ok;
-  }
-};
+using tools::TapedDevices;
 
-struct TapedStage final : hal::Stage {
-  TickTold* told = nullptr;
-  hal::Stage* device = nullptr;
-  hal::Status read(hal::StageState& out) noexcept override {
-    if (device != nullptr) {
-      told->stage_status = device->read(out);
-      told->tip_m = out.tip_m;
-      told->axis = out.axis;
-      told->following_error_m = out.following_error_m;
-      told->stage_enabled = out.enabled;
-      told->stage_powered = out.powered;
-      told->stage_at_standstill = out.at_standstill;
-    } else if (told->stage_status == hal::Status::ok) {
-      out = {.tip_m = told->tip_m.vec(),
-             .axis = told->axis.vec(),
-             .following_error_m = told->following_error_m.vec(),
-             .enabled = told->stage_enabled,
-             .powered = told->stage_powered,
-             .at_standstill = told->stage_at_standstill,
-             .sample_ns = told->release_ns};
-    }
-    return told->stage_status;
-  }
-  hal::Status command(const hal::StageCommand& set_point) noexcept override {
-    return device != nullptr ? device->command(set_point) : hal::Status::ok;
-  }
-  void quick_stop() noexcept override {
-    if (device != nullptr) {
-      device->quick_stop();
-    }
-  }
-  void enable(bool on) noexcept override {
-    if (device != nullptr) {
-      device->enable(on);
-    }
-  }
-};
+// The devices that a scene has, which only answer what was recorded. The injector obeys at once, since a
+// scene may open the gate at other times than the recorded one.
+rt::Devices devices_of(const tools::Scene& scene, TapedDevices& taped) {
+  taped.injector.obeys = true;
+  rt::Devices devices = taped.of(rt::InputSample::has_stage | rt::InputSample::has_estop);
+  devices.injector = scene.servo.injector ? &taped.injector : nullptr;
+  devices.vacuum = scene.servo.vacuum ? &taped.vacuum : nullptr;
+  devices.force_sensor = scene.servo.force_sensor ? &taped.force_sensor : nullptr;
+  return devices;
+}
 
-struct TapedEstop final : hal::EstopChain {
-  TickTold* told = nullptr;
-  hal::EstopChain* device = nullptr;
-  hal::Status read(hal::EstopState& out) noexcept override {
-    hal::Status status = hal::Status::ok;
-    if (device != nullptr) {
-      status = device->read(out);
-      told->estop = out;
-    } else {
-      out = told->estop;
-      out.sample_ns = told->release_ns;
-    }
-    return status;
-  }
-  void heartbeat(bool level) noexcept override {
-    if (device != nullptr) {
-      device->heartbeat(level);
-    }
-  }
-};
-
-// When it plays, it obeys the gate at once, since a scene may open the gate at other times than the recorded
-// one.
-struct TapedInjector final : hal::Injector {
-  TickTold* told = nullptr;
-  hal::Injector* device = nullptr;
-  bool gate_open = false;
-  void gate(bool open) noexcept override {
-    gate_open = open;
-    if (device != nullptr) {
-      device->gate(open);
-    }
-  }
-  hal::Status read(hal::InjectorState& out) noexcept override {
-    if (device != nullptr) {
-      return device->read(out);
-    }
-    out.open = gate_open;
-    out.sample_ns = told->release_ns;
-    return hal::Status::ok;
-  }
-};
-
-// Holding vacuum or force sensor: one number.
-template <class Device, class Reading, double Reading::* value, double TickTold::* number>
-struct TapedNumber final : Device {
-  TickTold* told = nullptr;
-  Device* device = nullptr;
-  hal::Status read(Reading& out) noexcept override {
-    if (device != nullptr) {
-      const hal::Status status = device->read(out);
-      told->*number = out.*value;
-      return status;
-    }
-    out.*value = told->*number;
-    out.sample_ns = told->release_ns;
-    return hal::Status::ok;
-  }
-};
-
-struct TapedDevices {
-  TapedHand hand;
-  TapedStage stage;
-  TapedEstop estop;
-  TapedInjector injector;
-  TapedNumber<hal::HoldingVacuum, hal::VacuumState, &hal::VacuumState::pressure_Pa, &TickTold::vacuum_Pa>
-      vacuum;
-  TapedNumber<hal::ForceSensor, hal::ForceState, &hal::ForceState::axial_force_N, &TickTold::axial_N>
-      force_sensor;
-
-  void at(TickTold& told) {
-    hand.told = stage.told = estop.told = injector.told = vacuum.told = force_sensor.told = &told;
-  }
-  // The devices that the scene has.
-  [[nodiscard]] rt::Devices of(const tools::Scene& scene) {
-    return {hand,
-            &stage,
-            &estop,
-            scene.servo.injector ? &injector : nullptr,
-            scene.servo.vacuum ? &vacuum : nullptr,
-            scene.servo.force_sensor ? &force_sensor : nullptr};
-  }
-};
-
-rt::TickInfo tick_info(const TickTold& told, double period_s) {
-  return {told.tick, told.release_ns, told.release_ns, period_s, 0};
+rt::TickInfo tick_info(const rt::InputSample& input, double period_s) {
+  return {input.tick, input.release_ns, input.release_ns, period_s, 0};
 }
 
 std::int64_t nanoseconds(double s) { return std::llround(s * 1e9); }
@@ -179,6 +43,12 @@ struct OnItsWay {
 };
 
 }  // namespace
+
+// By name, and a call of its own: callgrind can write its counts after each tick.
+[[gnu::noinline]] void replay_tick(rt::Servo& servo, const rt::TickInfo& now) {
+  servo.tick(now);
+  asm volatile("");
+}
 
 std::vector<TickTold> record_ticks(const tools::Scene& scene, double seconds) {
   if (!scene.sim) {
@@ -196,14 +66,14 @@ std::vector<TickTold> record_ticks(const tools::Scene& scene, double seconds) {
   const std::int64_t period_ns = nanoseconds(period_s), start_ns = period_ns;
   sim::World world(*scene.sim, nullptr, start_ns);
   TapedDevices devices;
-  devices.hand.device = &world.hand();
-  devices.stage.device = &world.stage();
-  devices.estop.device = &world.estop();
-  devices.injector.device = world.injector();
-  devices.vacuum.device = world.vacuum();
-  devices.force_sensor.device = world.force_sensor();
+  const rt::Devices taped = devices.before({.hand = world.hand(),
+                                            .stage = &world.stage(),
+                                            .estop = &world.estop(),
+                                            .injector = world.injector(),
+                                            .vacuum = world.vacuum(),
+                                            .force_sensor = world.force_sensor()});
   const auto station = std::make_unique<rt::LocalStation>();
-  const auto servo = std::make_unique<rt::Servo>(scene.servo, devices.of(scene), station->station);
+  const auto servo = std::make_unique<rt::Servo>(scene.servo, taped, station->station);
 
   const bool seen = scene.vision && scene.simulated_camera();
   const std::int64_t frame_ns = seen ? nanoseconds(1 / scene.sim->microscope->fps) : 0;
@@ -218,24 +88,25 @@ std::vector<TickTold> record_ticks(const tools::Scene& scene, double seconds) {
   tape.reserve(most);
   while (tape.size() < most && !servo->finished()) {
     TickTold& told = tape.emplace_back();
-    told.tick = tape.size() - 1;
-    told.release_ns = start_ns + static_cast<std::int64_t>(told.tick) * period_ns;
-    devices.at(told);
-    world.step(told.release_ns);
-    if (frame_ns > 0 && told.release_ns >= next_frame_ns) {
+    rt::InputSample& input = told.input;
+    input.tick = input.number = tape.size() - 1;
+    input.release_ns = input.start_ns = start_ns + static_cast<std::int64_t>(input.tick) * period_ns;
+    devices.at(input);
+    world.step(input.release_ns);
+    if (frame_ns > 0 && input.release_ns >= next_frame_ns) {
       next_frame_ns += frame_ns;
       const sim::Truth truth = sim::truth_of(*scene.sim, world.snapshot());
       on_its_way.push_back(
-          {told.release_ns + latency_ns, tools::observe_truth(truth, frame++, told.release_ns, before)});
+          {input.release_ns + latency_ns, tools::observe_truth(truth, frame++, input.release_ns, before)});
       before = truth;
     }
-    if (!on_its_way.empty() && on_its_way.front().deliver_ns <= told.release_ns) {
+    if (!on_its_way.empty() && on_its_way.front().deliver_ns <= input.release_ns) {
       told.observed = true;
       told.observation = on_its_way.front().observation;
       on_its_way.pop_front();
       station->observation.slot.push(told.observation);
     }
-    servo->tick(tick_info(told, period_s));
+    servo->tick(tick_info(input, period_s));
   }
   return tape;
 }
@@ -243,13 +114,13 @@ std::vector<TickTold> record_ticks(const tools::Scene& scene, double seconds) {
 rt::Fault replay_ticks(const tools::Scene& scene, const std::vector<TickTold>& tape) {
   TapedDevices devices;
   const auto station = std::make_unique<rt::LocalStation>();
-  const auto servo = std::make_unique<rt::Servo>(scene.servo, devices.of(scene), station->station);
+  const auto servo = std::make_unique<rt::Servo>(scene.servo, devices_of(scene, devices), station->station);
   for (TickTold told : tape) {
-    devices.at(told);
+    devices.at(told.input);
     if (told.observed) {
       station->observation.slot.push(told.observation);
     }
-    servo->tick(tick_info(told, 1 / scene.servo.rate_Hz));
+    replay_tick(*servo, tick_info(told.input, 1 / scene.servo.rate_Hz));
   }
   return servo->fault();
 }

@@ -8,25 +8,15 @@
 #include <type_traits>
 #include <vector>
 
-#include "hal/devices.hpp"
-#include "hal/sim/point.hpp"
 #include "rt/control/servo.hpp"
+#include "rt/station/input.hpp"
 #include "tools/scene/scene.hpp"
 
 namespace punctum::report {
 
 struct TickTold {
-  std::uint64_t tick = 0;
-  std::int64_t release_ns = 0;
-  sim::Point hand_m;
-  double hand_wxyz[4] = {1, 0, 0, 0};
-  std::uint32_t buttons = 0;
-  hal::Status hand_status = hal::Status::no_data, stage_status = hal::Status::no_data;
-  bool stage_enabled = false, stage_powered = false, stage_at_standstill = false;
-  sim::Point tip_m, axis, following_error_m;
-  hal::EstopState estop;
+  rt::InputSample input;
   bool observed = false;
-  double vacuum_Pa = 0, axial_N = 0;
   rt::Observation observation;
 };
 static_assert(std::is_trivially_copyable_v<TickTold>);

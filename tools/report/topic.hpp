@@ -196,6 +196,7 @@ class Progress {
 struct Job {
   bool quick = false;  // fewer cells and points, the same columns
   std::filesystem::path out;
+  std::filesystem::path frames;  // drawn beforehand by another renderer; empty: none were
   Progress& progress;
 };
 

@@ -7,28 +7,22 @@
 #include <chrono>
 #include <cmath>
 #include <iterator>
-#include <numbers>
+#include <map>
 #include <utility>
 
 #include "tools/report/foreign_frames.hpp"
 #include "tools/report/real_frames.hpp"
 #include "tools/report/simulated_frames.hpp"
 #include "tools/report/topic.hpp"
+#include "tools/report/vision_phases.hpp"
 #include "tools/report/vision_trials.hpp"
 
 namespace punctum::report {
 
 namespace {
 
-constexpr int kModes = 18;
-
-// Cramer-Rao bound of a contour with kModes free modes, when contrast, blur and background are known: the
-// position of one pixel of edge along its normal has the variance 2 sqrt(pi) sigma_p sigma_n^2 / C^2, and the
-// modes share the pixels.
-double contour_bound_um(double noise, double length_px, const sim::MicroscopeParams& lens) {
-  const double variance =
-      2 * std::sqrt(std::numbers::pi) * lens.psf_px * noise * noise / (lens.contrast * lens.contrast);
-  return std::sqrt(variance * kModes / length_px) * lens.pixel_m * 1e6;
+double bound_um(double noise, double length_px, const sim::MicroscopeParams& lens) {
+  return contour_bound_px(noise, length_px, lens.psf_px, lens.contrast) * lens.pixel_m * 1e6;
 }
 
 double now_us() {
@@ -75,7 +69,7 @@ std::vector<InjectionPlan> plans(bool quick) {
 std::vector<ForeignPlan> foreign_plans(bool quick) {
   constexpr int kFirst = 100;  // the renderer's seeds below are there to tune with
   std::vector<ForeignPlan> all;
-  for (const double noise : quick ? std::vector<double>{5} : std::vector<double>{2, 5, 10}) {
+  for (const double noise : quick ? std::vector<double>{5} : std::vector<double>{2, 5, 10, 20}) {
     for (int seed = kFirst; seed < kFirst + (quick ? 1 : 3); ++seed) {
       all.push_back({.seed = seed, .noise = noise, .frames = quick ? 40 : 80});
     }
@@ -282,7 +276,7 @@ void Output::add_noise_level(const std::vector<Trial>& trials, const Measurement
   const sim::MicroscopeParams lens;  // either renderer's
   const std::vector<Work> works = works_of(trials, m.overhead_us), compared = comparable(trials, works);
   const double noise = trials.front().noise, pixel_um = lens.pixel_m * 1e6;
-  const double bound = contour_bound_um(noise, trials.front().length_px, lens);
+  const double bound = bound_um(noise, trials.front().length_px, lens);
   for (std::size_t i = 0; i < trials.size(); ++i) {
     const Trial& t = trials[i];
     Row row = row_of(t, bound);
@@ -303,7 +297,7 @@ void Output::add_noise_level(const std::vector<Trial>& trials, const Measurement
       add_point("the paper's method (16 nodes)" + whose, noise, works[i].error, Style::line_points);
     }
   }
-  const std::string bound_name = fmt::format("Cramer-Rao, {} modes", kModes);
+  const std::string bound_name = fmt::format("Cramer-Rao, {} modes", kContourModes);
   if (whose.empty()) {
     add_point(bound_name, noise, bound, Style::limit);
     add_point("one pixel", noise, pixel_um, Style::limit);
@@ -335,9 +329,9 @@ std::string reading(const Measurement& m, const Trial& shipped, const Trial& pap
       "by {:.2f} um in "
       "{:.1f} ms; what is seen puts the force {:.0f} % off; on this front: {}. {}",
       shipped.noise, shipped.outer_frames.rms(),
-      shipped.outer_frames.rms() / contour_bound_um(shipped.noise, shipped.length_px, lens),
-      1e-6 * time_ns(shipped), 1e-3 * m.first_us, paper.outer_frames.rms(), 1e-6 * time_ns(paper),
-      100 * shipped.force.rms(), front_sentence(nominal), others_frames);
+      shipped.outer_frames.rms() / bound_um(shipped.noise, shipped.length_px, lens), 1e-6 * time_ns(shipped),
+      1e-3 * m.first_us, paper.outer_frames.rms(), 1e-6 * time_ns(paper), 100 * shipped.force.rms(),
+      front_sentence(nominal), others_frames);
 }
 
 std::string foreign_reading(const Measurement& m, const std::string& missing) {
@@ -353,8 +347,26 @@ std::string foreign_reading(const Measurement& m, const std::string& missing) {
   return fmt::format("Frames of another renderer: {}. ", fmt::join(seen, ", "));
 }
 
+constexpr int kSequencesOfAllMethods = 3;  // of each noise; the others are for the phases
+
 // Returns why the frames of another renderer were not seen; empty: they were.
-std::string observe_foreign(const Job& job, Measurement& m) {
+std::string observe_foreign(const Job& job, Measurement& m, PhaseScores& phases) {
+  if (!job.frames.empty()) {
+    const std::vector<ForeignFolder> folders = foreign_folders(job.frames);
+    job.progress.start("another renderer", static_cast<std::int64_t>(folders.size()));
+    std::map<PictureKind, int> seen;
+    for (const ForeignFolder& f : folders) {
+      DrawnInjection injection = read_foreign(f.folder);
+      injection.lens.noise = f.kind.noise;
+      phases.see(f.kind, injection);
+      if (f.kind.name == fmt::format("noise-{:g}", f.kind.noise) &&
+          ++seen[f.kind] <= (job.quick ? 1 : kSequencesOfAllMethods)) {
+        observe(injection, job.quick, m);
+      }
+      job.progress.step();
+    }
+    return folders.empty() ? job.frames.string() + " holds none" : "";
+  }
   const std::vector<ForeignPlan> injections = foreign_plans(job.quick);
   job.progress.start("another renderer", static_cast<std::int64_t>(injections.size()));
   for (const ForeignPlan& plan : injections) {
@@ -363,9 +375,30 @@ std::string observe_foreign(const Job& job, Measurement& m) {
       return injection.error();
     }
     observe(*injection, job.quick, m);
+    phases.see({"another", fmt::format("noise-{:g}", plan.noise), plan.noise, injection->lens.psf_px},
+               *injection);
     job.progress.step();
   }
   return {};
+}
+
+// The station's own pictures, as many as a share of right ones needs.
+void observe_phases(const Job& job, PhaseScores& phases) {
+  const std::vector<double> noises = job.quick ? std::vector<double>{5} : std::vector<double>{2, 5, 10, 20};
+  const int seeds = job.quick ? 1 : 5;
+  job.progress.start("phases", static_cast<std::int64_t>(noises.size()) * seeds);
+  for (const double noise : noises) {
+    for (int k = 0; k < seeds; ++k) {
+      InjectionPlan plan;
+      plan.seed = 21 + static_cast<std::uint64_t>(k);
+      plan.noise = noise;
+      plan.aim_m = 3e-6 * (k - 2);
+      plan.tilt_rad = 0.02 * (k - 2);
+      const SimulatedInjection injection = simulate_injection(plan);
+      phases.see({"station", fmt::format("noise-{:g}", noise), noise, injection.lens.psf_px}, injection);
+      job.progress.step();
+    }
+  }
 }
 
 }  // namespace
@@ -378,7 +411,9 @@ Result run_vision(const Job& job) {
     observe(simulate_injection(plan), job.quick, m);
     job.progress.step();
   }
-  const std::string missing = observe_foreign(job, foreign);
+  PhaseScores phases;
+  observe_phases(job, phases);
+  const std::string missing = observe_foreign(job, foreign, phases);
 
   const sim::MicroscopeParams lens;
   const Trial& shipped = trial_that(m, [](const Trial& t) { return t.shipped(); });
@@ -396,18 +431,22 @@ Result run_vision(const Job& job) {
       "sqrt(2 sqrt(pi) s_p s_n^2 / C^2 K / L) with blur s_p = {} px, contrast C = {}, K = {} modes over L = "
       "{:.0f} "
       "px, all but the modes known.",
-      lens.psf_px, lens.contrast, kModes, shipped.length_px);
+      lens.psf_px, lens.contrast, kContourModes, shipped.length_px);
   const RealFrames real = see_real_frames(job.quick, job.progress);
   Result out;
   out.tables = {std::move(table), stages_table(m.stages)};
   if (!foreign_table.rows.empty()) {
     out.tables.push_back(std::move(foreign_table));
   }
+  for (Table& t : phases.tables()) {
+    out.tables.push_back(std::move(t));
+  }
   if (real.table) {
     out.tables.push_back(*real.table);
   }
-  out.figures = {std::move(figure)};
-  out.reading = reading(m, shipped, paper, lens, foreign_reading(foreign, missing) + real.summary);
+  out.figures = {std::move(figure), phases.figure()};
+  out.reading = reading(m, shipped, paper, lens,
+                        foreign_reading(foreign, missing) + phases.reading() + " " + real.summary);
   return out;
 }
 

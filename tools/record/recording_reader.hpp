@@ -1,0 +1,118 @@
+// The messages of a recording, each as what it is.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <climits>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <tl/expected.hpp>
+#include <utility>
+
+#include "tools/record/mcap_reader.hpp"
+#include "tools/record/recording.hpp"
+#include "tools/wire/messages.hpp"
+
+namespace punctum::tools {
+
+class RecordingReader {
+ public:
+  // The error is one line.
+  [[nodiscard]] static tl::expected<RecordingReader, std::string> open(const std::string& path) {
+    auto file = mcap::Reader::open(path);
+    if (!file) {
+      return tl::unexpected(file.error());
+    }
+    return RecordingReader(std::move(*file), path);
+  }
+
+  // Calls `take` with the next message if it takes such; false at the end. The error is one line: why it ends
+  // before its end.
+  template <class Take>
+  [[nodiscard]] tl::expected<bool, std::string> next(Take& take) {
+    mcap::Message m;
+    const auto more = file_.next(m);
+    if (!more) {
+      return tl::unexpected(more.error());
+    }
+    if (!*more) {
+      return file_.finished()
+                 ? tl::expected<bool, std::string>(false)
+                 : tl::unexpected(fmt::format("{}: was not finished; all of it up to byte {} is read", path_,
+                                              file_.complete()));
+    }
+    if (!give(m, take)) {
+      return tl::unexpected(
+          fmt::format("{}: a message of channel {} is none of its schema", path_, m.channel));
+    }
+    return true;
+  }
+
+  // All that are left, in the order of the file. The result: why it ends before its end, in a line; empty if
+  // it does not.
+  template <class Take>
+  [[nodiscard]] std::string read_all(Take& take) {
+    for (;;) {
+      const auto more = next(take);
+      if (!more || !*more) {
+        return more ? std::string() : more.error();
+      }
+    }
+  }
+
+ private:
+  RecordingReader(mcap::Reader file, std::string path) : file_(std::move(file)), path_(std::move(path)) {}
+
+  template <class Message, class Take>
+  [[nodiscard]] bool give(const mcap::Message& m, Message& message, Take& take) {
+    if (m.data.size() > INT_MAX || !message.ParseFromArray(m.data.data(), static_cast<int>(m.data.size()))) {
+      return false;
+    }
+    if constexpr (requires { take.log_ns; }) {
+      take.log_ns = m.log_ns;
+    }
+    if constexpr (requires { take.publish_ns; }) {
+      take.publish_ns = m.publish_ns;
+    }
+    if constexpr (requires { take(std::as_const(message)); }) {
+      take(std::as_const(message));
+    }
+    return true;
+  }
+  template <class Take>
+  [[nodiscard]] bool give(const mcap::Message& m, Take& take) {
+    const mcap::Channel& channel = file_.channels().at(m.channel);
+    const auto schema = file_.schemas().find(channel.schema);
+    const auto is = [&](Stream s) {
+      const Topic& t = kTopics[static_cast<std::size_t>(s)];
+      return channel.topic == t.name && schema != file_.schemas().end() && schema->second.name == t.schema;
+    };
+    return is(Stream::telemetry)     ? give(m, telemetry_, take)
+           : is(Stream::truth)       ? give(m, truth_, take)
+           : is(Stream::observation) ? give(m, observation_, take)
+           : is(Stream::event)       ? give(m, event_, take)
+           : is(Stream::surface)     ? give(m, surface_, take)
+           : is(Stream::status)      ? give(m, status_, take)
+           : is(Stream::scene)       ? give(m, scene_, take)
+           : is(Stream::loss)        ? give(m, loss_, take)
+           : is(Stream::input)       ? give(m, input_, take)
+           : is(Stream::picture)     ? give(m, picture_, take)
+                                     : true;
+  }
+
+  mcap::Reader file_;
+  std::string path_;
+  v1::Scene scene_;
+  v1::Telemetry telemetry_;
+  v1::Truth truth_;
+  v1::Observation observation_;
+  v1::CellSurface surface_;
+  v1::Event event_;
+  v1::Status status_;
+  v1::Loss loss_;
+  v1::Input input_;
+  v1::Picture picture_;
+};
+
+}  // namespace punctum::tools

@@ -8,6 +8,7 @@
 #include <set>
 #include <sstream>
 
+#include "tests/e2e/pause.hpp"
 #include "tests/support/programs.hpp"
 
 namespace punctum::e2e {
@@ -122,11 +123,11 @@ TEST_F(Programs, each_program_can_write_what_it_has_to_say_and_nothing_else) {
   for (int i = 0; i < 3000 && look.vision() == 0; ++i) {
     std::this_thread::sleep_for(10ms);
   }
-  EXPECT_EQ(written_segments(look.vision()), (std::set<std::string>{"observation", "camera"}));
+  EXPECT_EQ(written_segments(look.vision()), (std::set<std::string>{"observation", "camera", "view"}));
   EXPECT_EQ(written_segments(look.core()),
             (std::set<std::string>{"core", "commands.parent", "commands.console", "bench", "camera"}));
   const std::set<std::string> parents = written_segments(run.pid());
-  EXPECT_FALSE(parents.contains("core") || parents.contains("observation"));
+  EXPECT_FALSE(parents.contains("core") || parents.contains("observation") || parents.contains("view"));
   run.send(SIGINT);
   run.wait();
 }
@@ -164,6 +165,39 @@ TEST_F(Programs, vision_that_hangs_or_that_somebody_ends_is_started_again_and_th
   EXPECT_EQ(r["outcome"], "stopped");
   ASSERT_EQ(r["vision_restarts"].size(), 2U) << run.output();
   EXPECT_NE(r["vision_restarts"][1]["why"].get<std::string>().find("hung"), std::string::npos);
+}
+
+// In three phases of one run: before the cell, in it, and on the way out.
+TEST_F(Programs, vision_that_is_stopped_for_five_seconds_and_goes_on_finds_everything_again) {
+  Running run(slow_injection({"--set", kPatientRelay, "--report", report(), "--no-figure", "--no-frames"}),
+              words());
+  Look look("icsi", run);
+  std::vector<double> resumed_s;
+  pid_t vision = 0;
+  for (const rt::Phase phase : {rt::Phase::indentation, rt::Phase::injection, rt::Phase::withdrawal}) {
+    ASSERT_TRUE(look.until(phase)) << run.output();
+    std::this_thread::sleep_for(300ms);
+    vision = look.vision();
+    ASSERT_GT(vision, 1);
+    ASSERT_EQ(kill(vision, SIGSTOP), 0);
+    std::this_thread::sleep_for(std::chrono::duration<double>(kPause_s));
+    ASSERT_EQ(kill(vision, SIGCONT), 0);
+    resumed_s.push_back(look.t_s());
+    std::this_thread::sleep_for(1500ms);
+  }
+  EXPECT_EQ(look.vision(), vision) << "nobody has started another";
+  const int code = run.wait();
+  const auto r = json();
+  EXPECT_TRUE(r["outcome"] == "done" || r["outcome"] == "injected in part") << run.output();
+  EXPECT_EQ(code, r["outcome"] == "done" ? 0 : 1) << run.output();
+  EXPECT_EQ(r["cells"]["lost"], 0) << run.output();
+  EXPECT_EQ(r["needle_at_end"]["where"], "outside") << run.output();
+  EXPECT_EQ(r["vision_restarts"].size(), 0U) << run.output();
+  EXPECT_GT(expect_no_advance_while_stale(Table(fs::path(report()) / "samples.csv")), 12000U);
+  const Table obs(fs::path(report()) / "obs.csv");
+  for (const double t_s : resumed_s) {
+    expect_everything_found(obs, t_s + 0.2);  // after a picture that was waiting
+  }
 }
 
 TEST_F(Programs, frames_that_show_nothing_most_of_the_time_are_no_run_that_is_done) {

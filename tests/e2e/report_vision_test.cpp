@@ -2,6 +2,7 @@
 // are only compared with each other.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <map>
 #include <string>
@@ -9,6 +10,7 @@
 
 #include "tests/e2e/quick_report.hpp"
 #include "tests/support/programs.hpp"
+#include "tools/report/vision_phases.hpp"
 
 namespace punctum::e2e {
 namespace {
@@ -44,6 +46,43 @@ TEST(ReportVision, nothing_faster_than_the_shipped_settings_sees_better) {
     EXPECT_LT(number(s, "tip_rms_um"), 0.825) << noise;
     EXPECT_LT(number(s, "R_rms_um"), 0.1) << noise;
   }
+}
+
+TEST(ReportVision, judges_every_phase_of_both_methods_in_the_stations_pictures) {
+  ASSERT_EQ(quick_report().code, 0) << quick_report().said;
+  const Table lines(quick_report().folder() / "vision_phases.csv");
+  int of_station = 0;
+  for (std::size_t l = 0; l < lines.rows.size(); ++l) {
+    if (lines.text(l, "renderer") != "station") {
+      continue;
+    }
+    ++of_station;
+    const double bias = lines.number(l, "bias_um"), spread = lines.number(l, "spread_um");
+    EXPECT_NEAR(std::hypot(bias, spread), lines.number(l, "rms_um"), 1e-9) << l;
+    EXPECT_LE(lines.number(l, "right_low"), lines.number(l, "right_share")) << l;
+    EXPECT_GE(lines.number(l, "right_high"), lines.number(l, "right_share")) << l;
+    EXPECT_LE(lines.number(l, "claimed"), lines.number(l, "frames")) << l;
+    if (lines.text(l, "method") == "tracker" && lines.text(l, "membrane") == "outer") {
+      EXPECT_LT(lines.number(l, "rms_um"), 0.825) << lines.text(l, "phase");
+      EXPECT_GT(lines.number(l, "rms_um"), 0.5 * lines.number(l, "bound_um")) << lines.text(l, "phase");
+    }
+  }
+  EXPECT_EQ(of_station, 4 * (3 + 2)) << "phases; membranes of the tracker with the surface, of the paper";
+}
+
+// Of Wilson (1927), by hand: 150 of 150, and 5 of 10.
+TEST(ReportVision, tells_the_interval_of_a_share) {
+  EXPECT_NEAR(report::share_interval(150, 150).low, 1 / (1 + 1.96 * 1.96 / 150), 1e-12);
+  EXPECT_NEAR(report::share_interval(150, 150).high, 1, 1e-12);
+  EXPECT_NEAR(report::share_interval(5, 10).low, 0.2366, 1e-4);
+  EXPECT_NEAR(report::share_interval(5, 10).high, 0.7634, 1e-4);
+}
+
+// 0.344 sqrt(K / L) px at a noise of 5, contrast 30 and a blur of 1.2 px.
+TEST(ReportVision, tells_the_bound_of_cramer_and_rao) {
+  constexpr double kLength_px = 457;
+  EXPECT_NEAR(report::contour_bound_px(5, kLength_px, 1.2, 30),
+              0.344 * std::sqrt(report::kContourModes / kLength_px), 2e-4);
 }
 
 TEST(ReportVision, frames_of_another_renderer_are_seen_as_well_or_what_is_missing_is_said) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "tests/e2e/pause.hpp"
 #include "tests/support/programs.hpp"
 
 namespace punctum::e2e {
@@ -13,15 +14,64 @@ using Strings = std::vector<std::string>;
 
 // ---- its health ----
 
-TEST_F(Programs, vision_finds_the_needle_again_after_seconds_without_a_frame_in_contact) {
-  ASSERT_EQ(punctum({"run", "icsi", "--clock", "virtual", "--seconds", "40", "--set",
-                     "sim.failure=[{device=\"camera\", kind=\"drop\", at_s=6, for_s=3.5}]"}),
-            0)
-      << said_;
-  const auto r = json();
-  EXPECT_EQ(r["outcome"], "done");
-  EXPECT_LT(r["stale_s"], 3.5 + 1) << "as quickly as a vision that was started again";
-  EXPECT_EQ(r["vision_restarts"].size(), 0U) << "a camera without frames is no vision that hangs";
+TEST_F(Programs, after_five_seconds_without_a_frame_in_any_phase_vision_finds_everything_again) {
+  ASSERT_EQ(punctum(slow_injection({"--clock", "virtual"})), 0) << said_;
+  const auto undisturbed = json();
+  ASSERT_EQ(undisturbed["outcome"], "done");
+  int paused = 0;
+  for (const auto& phase : undisturbed["phases"]) {
+    if (phase["name"] == "clear") {
+      continue;
+    }
+    const std::string name = phase["name"];
+    SCOPED_TRACE(name);
+    const double at_s = 0.7 * phase["start_s"].get<double>() + 0.3 * phase["end_s"].get<double>();
+    const int code = punctum(
+        slow_injection({"--clock", "virtual", "--set",
+                        "sim.failure=[{device=\"camera\", kind=\"drop\", at_s=" + std::to_string(at_s) +
+                            ", for_s=" + std::to_string(kPause_s) + "}]"}));
+    const auto r = json();
+    // Within the cell nothing is injected while nobody sees the needle, and the operator does not wait for
+    // that.
+    EXPECT_EQ(r["outcome"], name == "puncture"    ? "not injected"
+                            : name == "injection" ? "injected in part"
+                                                  : "done");
+    EXPECT_EQ(code, r["outcome"] == "done" ? 0 : 1) << said_;
+    EXPECT_EQ(r["cells"]["lost"], 0);
+    EXPECT_EQ(r["needle_at_end"]["where"], "outside");
+    EXPECT_EQ(r["vision_restarts"].size(), 0U) << "a camera without frames is no vision that hangs";
+    EXPECT_LT(r["stale_s"], kPause_s + 1);
+    EXPECT_GT(expect_no_advance_while_stale(Table(fs::path(report()) / "samples.csv")), 4500U);
+    expect_everything_found(Table(fs::path(report()) / "obs.csv"), at_s + kPause_s);
+    ++paused;
+  }
+  EXPECT_EQ(paused, 6);
+}
+
+// The needle's end then lies in the wall of the cell, or beside it, where a start has least to hold on to.
+TEST_F(Programs, after_a_pause_that_ends_while_the_needle_leaves_the_wall_vision_finds_everything_again) {
+  for (const char* seed : {"1", "6"}) {
+    ASSERT_EQ(punctum(slow_injection({"--clock", "virtual", "--no-figure", "--no-frames", "--seed", seed})),
+              0)
+        << said_;
+    const auto undisturbed = json();
+    const auto withdrawal = std::find_if(undisturbed["phases"].begin(), undisturbed["phases"].end(),
+                                         [](const auto& phase) { return phase["name"] == "withdrawal"; });
+    ASSERT_NE(withdrawal, undisturbed["phases"].end());
+    const double began_s = (*withdrawal)["start_s"];
+    for (const double after_s : {1.1, 1.7, 2.0}) {
+      SCOPED_TRACE(testing::Message() << "seed " << seed << ", " << after_s);
+      const double at_s = began_s + after_s;
+      EXPECT_EQ(
+          punctum(slow_injection({"--clock", "virtual", "--no-figure", "--no-frames", "--seed", seed, "--set",
+                                  "sim.failure=[{device=\"camera\", kind=\"drop\", at_s=" +
+                                      std::to_string(at_s) + ", for_s=" + std::to_string(kPause_s) + "}]"})),
+          0)
+          << said_;
+      // The first picture may be looked at before all is settled.
+      expect_everything_found(Table(fs::path(report()) / "obs.csv"), at_s + kPause_s + 0.1);
+    }
+  }
 }
 
 TEST_F(Programs, vision_goes_on_when_none_of_its_files_can_be_kept) {

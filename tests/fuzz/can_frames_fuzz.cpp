@@ -3,22 +3,14 @@
 //
 // The input is read byte by byte as steps: what to do in its low three bits, then the bytes of a frame.
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 
 #include "hal/cia402/cia402_stage.hpp"
+#include "tests/fuzz/must.hpp"
 #include "tests/support/virtual_can.hpp"
 
 namespace {
 
 using namespace punctum;
-
-void must(bool holds, const char* what) {
-  if (!holds) {
-    std::fprintf(stderr, "%s\n", what);
-    std::abort();
-  }
-}
 
 class Input {
  public:

@@ -2,11 +2,10 @@
 // emulated processor takes to its last byte, with as many words as the check found.
 #include <array>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <initializer_list>
 
 #include "hal/falcon/boot_stream.hpp"
+#include "tests/fuzz/must.hpp"
 #include "tools/emulators/falcon/falcon.hpp"
 
 namespace {
@@ -19,13 +18,6 @@ class NoHand final : public emulator::Hand {
   emulator::Grip grip(std::int64_t) override { return {}; }
   void push(const emulator::Triple&, std::int64_t) override {}
 };
-
-void must(bool holds, const char* what) {
-  if (!holds) {
-    std::fprintf(stderr, "%s\n", what);
-    std::abort();
-  }
-}
 
 // A device that was greeted and waits for its image.
 class Loader {

@@ -4,22 +4,14 @@
 // The input is read as packets: a byte with their size (0x40: one that did not fit), then their bytes.
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <string>
 
 #include "hal/falcon/session.hpp"
+#include "tests/fuzz/must.hpp"
 
 namespace {
 
 using namespace punctum;
-
-void must(bool holds, const char* what) {
-  if (!holds) {
-    std::fprintf(stderr, "%s\n", what);
-    std::abort();
-  }
-}
 
 // A device that says what the input says, and ends with it.
 class Script final : public hal::Clock, public falcon::UsbLink {

@@ -1,23 +1,11 @@
 // Any text is either a scene, which then survives being written and read again, or one line that says what is
 // wrong.
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <string>
 #include <string_view>
 
+#include "tests/fuzz/must.hpp"
 #include "tools/scene/scene.hpp"
-
-namespace {
-
-void must(bool holds, const char* what, const std::string& text) {
-  if (!holds) {
-    std::fprintf(stderr, "%s\n%s\n", what, text.c_str());
-    std::abort();
-  }
-}
-
-}  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace punctum::tools;

@@ -5,9 +5,8 @@
 // size, then the bytes.
 #include <array>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 
+#include "tests/fuzz/must.hpp"
 #include "tools/emulators/falcon/usbip.hpp"
 
 namespace {
@@ -19,13 +18,6 @@ class NoHand final : public emulator::Hand {
   emulator::Grip grip(std::int64_t) override { return {}; }
   void push(const emulator::Triple&, std::int64_t) override {}
 };
-
-void must(bool holds, const char* what) {
-  if (!holds) {
-    std::fprintf(stderr, "%s\n", what);
-    std::abort();
-  }
-}
 
 std::uint32_t word_of(const std::vector<std::uint8_t>& bytes, std::size_t at) {
   return static_cast<std::uint32_t>(bytes[at]) << 24U | static_cast<std::uint32_t>(bytes[at + 1]) << 16U |

@@ -4,22 +4,14 @@
 //
 // The input is read byte by byte: the camera first, then steps.
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 
 #include "hal/v4l2/v4l2_camera.hpp"
+#include "tests/fuzz/must.hpp"
 #include "tests/support/fake_video.hpp"
 
 namespace {
 
 using namespace punctum;
-
-void must(bool holds, const char* what) {
-  if (!holds) {
-    std::fprintf(stderr, "%s\n", what);
-    std::abort();
-  }
-}
 
 class Input {
  public:

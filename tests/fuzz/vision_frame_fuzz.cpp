@@ -1,22 +1,10 @@
 // Any bytes as a picture of any size: the tracker gives a verdict, never crashes, and its numbers are finite.
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <vector>
 
+#include "tests/fuzz/must.hpp"
 #include "vision/tracker.hpp"
-
-namespace {
-
-void must(bool holds, const char* what) {
-  if (!holds) {
-    std::fprintf(stderr, "%s\n", what);
-    std::abort();
-  }
-}
-
-}  // namespace
 
 // Bytes 0 and 1: width and height (1 .. 256). Byte 2: bits of the configuration. The rest: pixels, repeated
 // to fill the picture; a second frame starts at another place of them.

@@ -2,11 +2,10 @@
 // answer is a whole line, and no axis leaves its limits unless they were set anew.
 #include <cmath>
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <string>
 #include <string_view>
 
+#include "tests/fuzz/must.hpp"
 #include "tools/emulators/positioner/positioner.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -30,9 +29,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const bool whole = said.empty() || said.ends_with('\n');
   const bool left = text.find("set") == std::string_view::npos &&
                     !(devices.position(2, 1) >= -1 && devices.position(2, 1) <= 1001);
-  if (!whole || left || !std::isfinite(devices.position(1, 2))) {
-    std::fprintf(stderr, "half a line, or an axis beyond its limits\n");
-    std::abort();
-  }
+  must(whole, "half a line");
+  must(!left && std::isfinite(devices.position(1, 2)), "an axis beyond its limits");
   return 0;
 }

@@ -1,24 +1,12 @@
 // Anything that a serial line may bring, to the parser of replies and to the driver that waits for them:
 // nothing crashes, no position that is no number, and an answer of another device or command is never taken.
 #include <cstdint>
-#include <cstdio>
-#include <cstdlib>
 #include <string>
 #include <string_view>
 
 #include "hal/zaber/zaber_positioner.hpp"
+#include "tests/fuzz/must.hpp"
 #include "tests/support/virtual_zaber.hpp"
-
-namespace {
-
-void must(bool holds, const char* what) {
-  if (!holds) {
-    std::fprintf(stderr, "%s\n", what);
-    std::abort();
-  }
-}
-
-}  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace punctum;

@@ -8,7 +8,6 @@
 #include <functional>
 #include <thread>
 
-#include "rt/control/tick_timing.hpp"
 #include "rt/executive/executive.hpp"
 
 namespace punctum::loopback {
@@ -32,11 +31,6 @@ inline void run_beside(rt::Executive& executive, const std::function<void()>& ou
   const sched_param ordinary{0};
   pthread_setschedparam(pthread_self(), SCHED_OTHER, &ordinary);
   wires.join();
-}
-
-[[nodiscard]] inline rt::TickInfo tick_info(const rt::Tick& tick) noexcept {
-  return {tick.index, tick.release_ns, tick.wake_ns, static_cast<double>(tick.period_ns) * 1e-9,
-          tick.missed_in_window};
 }
 
 }  // namespace punctum::loopback

@@ -79,7 +79,7 @@ class CoreRun : public testing::Test {
     return rt::After::go_on;
   }
   rt::After tick_servo(const rt::Tick& tick) noexcept {
-    servo->tick(tick_info(tick));
+    servo->tick(tick.info());
     missed = tick.missed;
     seen.push_back({tick.index, tick.wake_ns, servo->fault(), servo->stop_stage(), servo->sample().estop});
     return tick.index >= last_tick ? rt::After::end : rt::After::go_on;

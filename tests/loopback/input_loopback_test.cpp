@@ -480,7 +480,7 @@ class HandsOn : public testing::Test {
     return rt::After::go_on;
   }
   rt::After tick_servo(const rt::Tick& tick) noexcept {
-    servo->tick(tick_info(tick));
+    servo->tick(tick.info());
     missed = tick.missed;
     ++ticks;
     const rt::TelemetrySample& s = servo->sample();

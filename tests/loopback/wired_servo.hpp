@@ -417,7 +417,7 @@ class WiredServo {
     seen.seen_ns = seen_ns_;
     seen.punctured_frames = std::exchange(punctured_frames_, 0);
 
-    servo_->tick(tick_info(tick));
+    servo_->tick(tick.info());
     missed = tick.missed;
 
     // The force that acts is one of those that were written last, to the steps of the motors.

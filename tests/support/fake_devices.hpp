@@ -115,6 +115,7 @@ struct FakeStage final : hal::Stage {
   std::vector<hal::StageState> readings;
   int commands = 0, quick_stops = 0;
   std::vector<Vec3> commanded;
+  Vec3 commanded_axis = axis;
 
   explicit FakeStage(const Vec3& start) : tip(start), target(start) {}
   void step(double dt) {
@@ -162,6 +163,7 @@ struct FakeStage final : hal::Stage {
       target = set_point.tip_m - registration;
     }
     commanded.push_back(set_point.tip_m);
+    commanded_axis = set_point.axis;
     ++commands;
     return Status::ok;
   }

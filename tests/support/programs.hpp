@@ -186,6 +186,11 @@ class Look {
   bool until_started() { return until(rt::Phase::free); }
   [[nodiscard]] pid_t core() const { return static_cast<pid_t>((*core_)->status.pid.load()); }
   [[nodiscard]] std::uint64_t ticks() const { return (*core_)->status.ticks.load(); }
+  // Of the newest tick. Missed ticks count here.
+  [[nodiscard]] double t_s() const {
+    const rt::CoreStatus& core = (*core_)->status;
+    return static_cast<double>(core.tick_index.load() * core.period_ns.load()) * 1e-9;
+  }
   [[nodiscard]] const sim::Bench& bench() const { return **bench_; }
   [[nodiscard]] const rt::ObservationSegment& observation() const { return **observation_; }
   [[nodiscard]] pid_t vision() const { return static_cast<pid_t>((*camera_)->pid.load()); }

@@ -35,8 +35,10 @@ constexpr std::string_view kMayFail = "Eigen/.*|tl/expected.hpp";
 constexpr std::string_view kPictures = "Eigen/.*|tl/expected.hpp|opencv2/.*";
 constexpr std::string_view kTools =
     "Eigen/.*|tl/expected.hpp|opencv2/.*|fmt/.*|toml\\+\\+/.*|CLI/.*|nlohmann/.*";
+constexpr std::string_view kMessages = "google/protobuf/.*";
 constexpr std::string_view kTests =
-    "Eigen/.*|tl/expected.hpp|opencv2/.*|fmt/.*|toml\\+\\+/.*|CLI/.*|nlohmann/.*|gtest/.*|gmock/.*|"
+    "Eigen/.*|tl/expected.hpp|opencv2/.*|fmt/.*|toml\\+\\+/.*|CLI/.*|nlohmann/.*|gtest/.*|gmock/.*|openssl/"
+    ".*|"
     "sanitizer/.*";
 
 using Names = std::vector<std::string_view>;
@@ -105,6 +107,8 @@ std::vector<Room> house() {
       {"hal/v4l2/", ground + Names{"hal/v4l2/config"}, kMayFail},
       {"hal/evdev/config", interfaces, kMayFail},
       {"hal/evdev/", ground + Names{"hal/evdev/config", "hal/kernel_call"}, "Eigen/.*|tl/expected.hpp"},
+      {"hal/browser/fingers", interfaces + Names{"hal/ipc/"}, kPlain, true},
+      {"hal/browser/", ground + Names{"hal/browser/fingers"}, kMayFail},
       {"hal/zaber/config", interfaces, kMayFail},
       {"hal/zaber/", ground + Names{"hal/zaber/config"}, kMayFail},
       // The simulated backend; hal/sim/ is the bench and whatever stands beside it.
@@ -143,15 +147,34 @@ std::vector<Room> house() {
            Names{"hal/gpiod/config", "hal/evdev/config", "hal/zaber/config", "hal/falcon/config",
                  "hal/v4l2/config", "hal/aravis/config", "vision/config", "tools/shared/"},
        kTools},
-      {"tools/core/", station + Names{"hal/gpiod/", "hal/cia402/", "hal/falcon/", "hal/evdev/", "hal/zaber/"},
+      // What a station tells, as messages.
+      {"tools/wire/", interfaces + Names{"hal/ipc/", "rt/station/", "rt/forces/", "tools/shared/"},
+       kMessages},
+      {"tools/vision/surface_files",
+       interfaces + Names{"hal/ipc/", "rt/station/", "vision/surface/", "vision/image/", "tools/shared/"},
        kTools},
+      {"tools/vision/picture_file", interfaces + Names{"hal/recorded/", "tools/shared/"}, kTools},
+      // The surfaces and pictures of a recording, as vision writes them.
+      {"tools/record/",
+       station + Names{"tools/wire/", "tools/vision/surface_files", "tools/vision/picture_file"}, kTools},
+      {"tools/console/",
+       ground + core + Names{"hal/browser/fingers", "tools/scene/", "tools/shared/", "tools/wire/"},
+       "boost/.*|openssl/.*|fmt/.*|nlohmann/.*|CLI/.*|tl/expected.hpp"},
+      {"tools/core/",
+       station + Names{"hal/browser/fingers", "hal/browser/", "hal/gpiod/", "hal/cia402/", "hal/falcon/",
+                       "hal/evdev/", "hal/zaber/"},
+       kTools},
+      // The devices of a scene, put together as the core does it; GPIO lines, from edge to edge.
+      {"tools/jitter/", station + Names{"hal/gpiod/config", "hal/gpiod/", "tools/core/"}, kTools},
       {"tools/punctum/",
        station + Names{"hal/gpiod/config", "hal/gpiod/", "hal/cia402/", "hal/zaber/config", "hal/zaber/",
-                       "hal/v4l2/config", "hal/v4l2/", "hal/aravis/", "hal/evdev/"},
+                       "hal/v4l2/config", "hal/v4l2/", "hal/aravis/", "hal/evdev/", "hal/browser/fingers"},
        kTools},
-      {"tools/vision/", pictures + Names{"hal/v4l2/", "hal/aravis/"}, kTools},
+      {"tools/vision/",
+       pictures +
+           Names{"tools/vision/surface_files", "tools/vision/picture_file", "hal/v4l2/", "hal/aravis/"},
+       kTools},
       {"tools/report/", pictures, kTools},
-      {"tools/jitter/", ground + core + Names{"tools/shared/"}, kTools},
       {"tools/emulators/drive/", {"tools/shared/"}, kTools},
       {"tools/emulators/falcon/", {"tools/shared/"}, kTools},
       {"tools/emulators/positioner/", {"tools/shared/"}, kTools},
@@ -159,8 +182,8 @@ std::vector<Room> house() {
       {"tools/emulators/world/",
        station + Names{"hal/sim/camera/", "tools/emulators/drive/", "tools/emulators/falcon/"}, kTools},
       {"tests/support/",
-       pictures + Names{"hal/v4l2/config", "hal/v4l2/", "hal/cia402/", "hal/falcon/", "hal/zaber/config",
-                        "hal/zaber/", "tools/emulators/drive/", "tools/emulators/falcon/",
+       pictures + Names{"hal/browser/fingers", "hal/v4l2/config", "hal/v4l2/", "hal/cia402/", "hal/falcon/",
+                        "hal/zaber/config", "hal/zaber/", "tools/emulators/drive/", "tools/emulators/falcon/",
                         "tools/emulators/positioner/"},
        kTests},
       // A libusb of its own in place of the real one.
@@ -177,6 +200,8 @@ std::vector<Room> house() {
                         "hal/falcon/",
                         "hal/evdev/config",
                         "hal/evdev/",
+                        "hal/browser/",
+                        "hal/browser/fingers",
                         "hal/zaber/config",
                         "hal/zaber/",
                         "tools/emulators/positioner/",
@@ -184,9 +209,14 @@ std::vector<Room> house() {
                         "tools/emulators/falcon/",
                         "tools/emulators/world/",
                         "tests/support/",
+                        "tools/wire/",
+                        "tools/record/",
+                        "tools/console/",
                         "tools/core/",
                         "tools/punctum/",
                         "tools/vision/",
+                        "tools/vision/surface_files",
+                        "tools/vision/picture_file",
                         "tools/jitter/",
                         "tools/report/"},
        kTests},
@@ -256,8 +286,9 @@ std::string objection(std::string_view file, std::string_view target, bool quote
   }
   const bool standard =
       target.find('/') == std::string_view::npos && target.find(".hpp") == std::string_view::npos;
-  const bool system =
-      target.starts_with("sys/") || target.starts_with("linux/") || target.starts_with("net/");
+  const bool system = target.starts_with("sys/") || target.starts_with("linux/") ||
+                      target.starts_with("net/") || target.starts_with("netinet/") ||
+                      target.starts_with("arpa/");
   const bool foreign =
       std::regex_match(std::string(target), std::regex("gpiod.*|libusb.*|curl.*|fmt.*|spdlog.*"));
   if ((standard || system) && !foreign) {
@@ -536,6 +567,10 @@ TEST_F(PlantedBreach, is_seen_at_every_wall) {
       {"tools/scene/a.cpp", "\"tools/core/assembly.hpp\""},
       {"tools/scene/a.cpp", "\"vision/tracker.hpp\""},
       {"tools/core/a.cpp", "\"tools/punctum/recorder.hpp\""},
+      {"tools/wire/a.cpp", "\"tools/scene/scene.hpp\""},
+      {"tools/core/a.cpp", "<google/protobuf/message_lite.h>"},
+      {"tools/console/a.cpp", "\"tools/punctum/recorder.hpp\""},
+      {"tools/punctum/a.cpp", "\"tools/console/gateway.hpp\""},
       {"tools/core/a.cpp", "\"hal/recorded/picture.hpp\""},
       {"tools/core/a.cpp", "\"vision/tracker.hpp\""},
       {"tools/punctum/a.cpp", "\"tools/vision/track.hpp\""},

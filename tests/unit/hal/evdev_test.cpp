@@ -289,10 +289,10 @@ TEST_F(EvdevMotion, stays_within_reach_and_comes_back_at_once) {
   use(of_a_gamepad());
   tell(EV_ABS, ABS_X, -1000);
   pass(5000);
-  EXPECT_NEAR(at_m.x(), -HandMotion::kReach_m, 1e-6);
+  EXPECT_NEAR(at_m.x(), -hal::HandFollower::kReach_m, 1e-6);
   tell(EV_ABS, ABS_X, 1000);
   pass(100);
-  EXPECT_GT(at_m.x(), -HandMotion::kReach_m + 0.05);
+  EXPECT_GT(at_m.x(), -hal::HandFollower::kReach_m + 0.05);
 }
 
 TEST_F(EvdevMotion, whatever_is_told_the_hand_is_continuous) {
@@ -307,7 +307,7 @@ TEST_F(EvdevMotion, whatever_is_told_the_hand_is_continuous) {
       }
       const hal::HandState state = pass(1);
       ASSERT_TRUE(state.position_m.allFinite());
-      ASSERT_LE(state.position_m.cwiseAbs().maxCoeff(), HandMotion::kReach_m);
+      ASSERT_LE(state.position_m.cwiseAbs().maxCoeff(), hal::HandFollower::kReach_m);
     }
     EXPECT_LE(fastest_m_s, params.speed_m_s * (1 + 1e-9));
   }

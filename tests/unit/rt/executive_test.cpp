@@ -105,9 +105,18 @@ TEST_F(ExecutiveTest, a_tick_that_takes_too_long_skips_the_releases_it_missed_an
   // Tick 2 ends 3.2 periods after its release: 3, 4 and 5 have passed, 6 is the next that lies ahead.
   EXPECT_EQ(work.indices(), (Indices{0, 1, 2, 6, 7, 8, 9}));
   EXPECT_EQ(work.ticks[3].wake_ns, work.ticks[3].release_ns);
+  EXPECT_EQ(work.ticks[3].late_ns, 0);
   EXPECT_EQ(work.ticks[3].missed, 3U);
   EXPECT_EQ(work.ticks[3].period_ns, 4 * kMs) << "the real period, not the nominal one";
   EXPECT_EQ(work.ticks[4].period_ns, 1 * kMs);
+  LateTick late;
+  ASSERT_EQ(status->late.head(), 1U);
+  ASSERT_EQ(status->late.read(0, late), hal::Read::ok);
+  EXPECT_EQ(late.index, 2U);
+  EXPECT_EQ(late.missed, 3U);
+  EXPECT_EQ(late.end_ns - late.release_ns, 3 * kMs + 200 * kUs);
+  EXPECT_EQ(late.wake_ns, late.release_ns);
+  EXPECT_EQ(late.longest_slot_ns, 3 * kMs + 200 * kUs);
   EXPECT_EQ(status->missed.load(), 3U);
   EXPECT_EQ(status->ticks.load(), 7U);
   EXPECT_EQ(status->slots[0].skipped.load(), 3U);
@@ -126,6 +135,7 @@ TEST_F(ExecutiveTest, a_late_wake_up_runs_one_tick_for_the_newest_release_and_co
   run({slot<&Work::run>("servo", work)});
   EXPECT_EQ(work.indices(), (Indices{0, 1, 4, 5, 6, 7}));
   EXPECT_EQ(work.ticks[2].wake_ns - work.ticks[2].release_ns, 700 * kUs);
+  EXPECT_EQ(work.ticks[2].late_ns, 2 * kMs + 700 * kUs) << "after the release it slept for";
   EXPECT_EQ(work.ticks[2].period_ns, 3 * kMs + 700 * kUs);
   EXPECT_EQ(work.ticks[3].period_ns, 300 * kUs) << "back on the grid at once";
   EXPECT_EQ(status->missed.load(), 2U);

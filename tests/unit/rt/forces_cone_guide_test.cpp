@@ -253,7 +253,7 @@ TEST(ConeGuide, stores_at_the_fixture_point_and_is_off_until_the_cell_is_known) 
   in.cell_known = true;
   const EffectOutput out = guide.step(in);
   EXPECT_GT(out.storing_N.norm(), 0);
-  EXPECT_EQ(out.point, EnergyPoint::fixture_point);
+  EXPECT_EQ(ConeGuide::kGives.point, EnergyPoint::fixture_point);
   EXPECT_EQ(out.dissipative_N.norm() + out.active_N.norm() + out.damping_Ns_m, 0);
 }
 

@@ -101,7 +101,7 @@ TEST(ForbiddenWalls, push_away_with_the_force_of_their_energy) {
     }
     EXPECT_LT((out.storing_N + slope).norm(), 2e-3) << i;
     felt += out.storing_N.norm() > 0.01 ? 1 : 0;
-    EXPECT_EQ(out.point, EnergyPoint::handle);
+    EXPECT_EQ(ForbiddenWalls::kGives.point, EnergyPoint::handle);
     EXPECT_LE(out.storing_N.norm(), 2 * p.K_N_m * in.position_scale * p.felt_m);
     EXPECT_EQ(out.stiffness_N_m > 0, out.stored_J > 0);
   }

@@ -102,7 +102,7 @@ TEST(Membrane, gives_force_energy_and_stiffness_at_the_scale_of_the_hand) {
   const EffectOutput out = membrane.step(in);
   const MembraneState needle = membrane_law(MembraneParams{}, 20e-6, 60e-6, 0.5);
   const double scale = 0.5 * 0.25 * 2e5;
-  EXPECT_EQ(out.point, EnergyPoint::needle);
+  EXPECT_EQ(Membrane::kGives.point, EnergyPoint::needle);
   EXPECT_NEAR(out.storing_N.x(), scale * needle.force_N, 1e-12);  // against the approach along -x
   EXPECT_NEAR(out.stored_J, scale * 400 * needle.energy_J, 1e-15);
   EXPECT_NEAR(out.stiffness_N_m, scale / 400 * needle.stiffness_N_m, 1e-9);

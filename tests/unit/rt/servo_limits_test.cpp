@@ -203,6 +203,41 @@ TEST(Servo, does_not_slice_the_cell_sideways) {
   EXPECT_GT(most_m, 4e-6);
 }
 
+TEST(Servo, turns_the_needle_with_the_handle_outside_the_cell_and_not_inside) {
+  for (const bool with_phases : {true, false}) {
+    SCOPED_TRACE(with_phases);
+    ServoConfig config = icsi();
+    config.injector.reset();
+    if (with_phases) {
+      config.phases.emplace();
+    } else {
+      config.phases.reset();
+    }
+    Bench b(config);
+    const auto turn = [&b] {
+      const Vec3 before = b.stage.commanded_axis;
+      const double from = b.hand.turn_rad;
+      for (int k = 1; k <= 500; ++k) {
+        b.hand.turn_rad = from + 0.03 * k / 500;
+        b.tick();
+      }
+      b.run(0.5);
+      return (b.stage.commanded_axis - before).norm();
+    };
+    b.run(1);
+    EXPECT_GT(turn(), 0.01);
+    b.move(10e-6, 15e-6);
+    while (!b.punctured && b.ticks < 60000) {
+      b.wanted_x -= 5e-9;
+      b.tick();
+    }
+    ASSERT_TRUE(b.punctured);
+    b.run(0.3);  // until vision has told it twice
+    EXPECT_EQ(turn(), 0);
+    EXPECT_EQ(b.servo->fault(), Fault::none);
+  }
+}
+
 TEST(Servo, moves_nothing_and_powers_no_drive_before_the_enabling_device_is_pressed) {
   ServoConfig config = icsi();
   config.enabling.emplace();

@@ -155,18 +155,22 @@ TEST(ReportTiming, measures_twice_the_time_for_twice_the_work_and_none_for_nothi
   std::iota(input.begin(), input.end(), 1.0);
   const std::array<Timed, 3> calls{Timed(Chain{input, 300}), Timed(Chain{input, 600}),
                                    Timed([](std::size_t i) { return i; })};
-  const auto t = time_interleaved(calls, {.batches = 300, .batch_us = 20, .seconds = 5});
-  ASSERT_EQ(t.size(), 3U);
-  EXPECT_NEAR(t[1].median_ns / t[0].median_ns, 2, 0.4);
-  EXPECT_GT(t[2].overhead_ns, 0);
-  // Of an empty call g++ 14 leaves as much as the overhead itself, g++ 12 nothing.
-  EXPECT_LT(t[2].median_ns, 2 * t[2].overhead_ns);
-  for (const CallTime& c : t) {
-    EXPECT_LE(c.median_ns, c.p99_9_ns);
-    EXPECT_LE(c.p99_9_ns, c.max_ns);
-    EXPECT_GE(c.batches, 11);
+  bool told = false;
+  // Others may hold the processor during one measurement; whoever measures wrongly does so in each.
+  for (int attempt = 0; attempt < 5 && !told; ++attempt) {
+    const auto t = time_interleaved(calls, {.batches = 300, .batch_us = 20, .seconds = 5});
+    ASSERT_EQ(t.size(), 3U);
+    EXPECT_GT(t[2].overhead_ns, 0);
+    for (const CallTime& c : t) {
+      EXPECT_LE(c.median_ns, c.p99_9_ns);
+      EXPECT_LE(c.p99_9_ns, c.max_ns);
+      EXPECT_GE(c.batches, 11);
+    }
+    // Of an empty call g++ 14 leaves as much as the overhead itself, g++ 12 nothing.
+    told = std::abs(t[1].median_ns / t[0].median_ns - 2) < 0.4 && t[2].median_ns < 2 * t[2].overhead_ns &&
+           t[2].batch > t[1].batch;
   }
-  EXPECT_GT(t[2].batch, t[1].batch);
+  EXPECT_TRUE(told);
 }
 
 TEST(ReportTiming, times_a_long_call_by_itself_and_keeps_to_its_budget) {

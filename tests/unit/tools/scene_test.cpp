@@ -57,7 +57,7 @@ std::string many_failures(int n) {
 // As a message lists them.
 const std::string kTables =
     "scene, servo, haptic, stage, estop, vacuum, injector, force_sensor, camera, positioner, gpiod, cia402, "
-    "evdev, zaber, falcon, v4l2, aravis, watchdog, "
+    "evdev, zaber, falcon, v4l2, aravis, watchdog, stream, "
     "velocity, mapping, limits, vision, phases, local_model, membrane, cone, axis, damping, repulsive, "
     "friction, vibration, forbidden, guard, enabling, sim";
 
@@ -138,7 +138,7 @@ const std::vector<Broken>& broken() {
        "b.toml:6:10: cone.method: \"funnel\" is not one of the choices, allowed: \"potential\" or \"paper\""},
       {"a device that does not exist", "[haptic]\ndevice = \"phantom\"\n",
        "b.toml:2:10: haptic.device: \"phantom\" is not one of the choices, allowed: \"simulated\", "
-       "\"falcon\" or \"evdev\""},
+       "\"falcon\", \"evdev\" or \"browser\""},
       {"a Falcon that nobody holds", kLeast + "[falcon]\nfirmware = \"a.bin\"\n",
        "b.toml:5:2: falcon: no handle uses it, allowed: with device = \"falcon\" in [haptic], or leave it "
        "out"},
@@ -237,6 +237,35 @@ const std::vector<Broken>& broken() {
       {"a mouse with force", "[haptic]\ndevice = \"evdev\"\n[evdev]\n" + needle,
        "b.toml:1:2: haptic.force_max_N: 8.5, but mice, gamepads and knobs render no force, allowed: 0 with "
        "haptic.device = \"evdev\""},
+      {"a stream to a name", kLeast + "[stream]\nto = \"render:9000\"\n",
+       "b.toml:6:6: stream.to: \"render:9000\": no address with a port, allowed: \"192.168.1.7:9000\" or "
+       "\"[fd00::7]:9000\""},
+      {"a stream to nowhere", kLeast + "[stream]\n",
+       "b.toml:5:2: stream.to: \"\": no address with a port, allowed: \"192.168.1.7:9000\" or "
+       "\"[fd00::7]:9000\""},
+      {"a page with force", "[haptic]\ndevice = \"browser\"\n[enabling]\n" + needle,
+       "b.toml:1:2: haptic.force_max_N: 8.5, but a page renders no force, allowed: 0 with haptic.device = "
+       "\"browser\""},
+      {"a page that may be left alone", "[haptic]\ndevice = \"browser\"\nforce_max_N = 0\n" + needle,
+       "b.toml:2:10: haptic.device: \"browser\" needs [enabling] (letting go of the button stops), allowed: "
+       "add "
+       "[enabling]"},
+      {"a page that opens a real injector",
+       "[haptic]\ndevice = \"browser\"\nforce_max_N = 0\n[enabling]\n[injector]\ndevice = "
+       "\"gpiod\"\n[gpiod]\ngate = "
+       "5\n" +
+           needle,
+       "b.toml:6:10: injector.device: \"gpiod\", but the hand on a page moves simulated devices alone, "
+       "allowed: "
+       "\"simulated\" with haptic.device = \"browser\""},
+      {"a page that moves a real manipulator",
+       "[haptic]\ndevice = \"browser\"\nforce_max_N = 0\n[enabling]\n[positioner]\ndevice = "
+       "\"zaber\"\n[zaber]\n"
+       "[[zaber.axis]]\ndevice = 1\n" +
+           needle,
+       "b.toml:6:10: positioner.device: \"zaber\", but the hand on a page moves simulated devices alone, "
+       "allowed: "
+       "\"simulated\" with haptic.device = \"browser\""},
       {"a hand of Linux without a path",
        "[haptic]\ndevice = \"evdev\"\nforce_max_N = 0\n[evdev]\npath = \"event5\"\n" + needle,
        "b.toml:5:8: evdev.path: is no path, allowed: an input device, such as \"/dev/input/event5\", or "
@@ -467,8 +496,8 @@ TEST(Scene, each_broken_file_is_told_in_one_line) {
 
 TEST(Scene, every_built_in_scene_reads_back_to_the_same_numbers) {
   const auto names = builtin_names();
-  for (const char* wanted :
-       {"icsi", "zebrafish", "outer-only", "no-holder", "free", "recorded", "hands-on", "loopback"}) {
+  for (const char* wanted : {"icsi", "zebrafish", "outer-only", "no-holder", "free", "recorded", "hands-on",
+                             "own-hand", "loopback"}) {
     EXPECT_NE(std::find(names.begin(), names.end(), wanted), names.end()) << wanted;
   }
   for (const auto name : names) {
@@ -1013,12 +1042,12 @@ class SceneFiles : public testing::Test {
 TEST_F(SceneFiles, what_is_no_scene_file_is_refused_in_one_line) {
   EXPECT_EQ(load_scene("icis").error(),
             "icis: unknown scene (did you mean icsi?), allowed: free, hands-on, icsi, loopback, no-holder, "
-            "outer-only, "
+            "outer-only, own-hand, "
             "recorded, "
             "zebrafish, or a path");
   EXPECT_EQ(load_scene("/nowhere/a.toml").error(),
             "/nowhere/a.toml: no such file, allowed: a path, or free, hands-on, icsi, loopback, no-holder, "
-            "outer-only, "
+            "outer-only, own-hand, "
             "recorded, "
             "zebrafish");
   EXPECT_EQ(load_scene(folder_.string()).error(),

@@ -14,6 +14,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <regex>
 #include <string>
 #include <utility>
@@ -22,6 +23,7 @@
 #include "tests/support/full_disk.hpp"
 #include "tools/shared/child.hpp"
 #include "tools/shared/csv.hpp"
+#include "tools/shared/event_words.hpp"
 #include "tools/shared/program_start.hpp"
 #include "tools/shared/row_file.hpp"
 #include "tools/shared/say.hpp"
@@ -331,6 +333,19 @@ TEST(VersionTest, names_the_program_the_version_and_the_commit) {
   EXPECT_TRUE(std::regex_match(
       line, std::regex("punctum-core [0-9]+\\.[0-9]+ \\((unknown|[0-9a-f]{12,40}(\\+changes)?)\\)")))
       << line;
+}
+
+TEST(EventLine, names_a_target_only_where_a_command_has_one) {
+  rt::Event e{
+      .tick = 12, .t_s = 0.5, .kind = rt::Event::command, .what = rt::Command::effect_gain, .value = 0.25};
+  e.writer = 1;
+  e.target = 3;
+  EXPECT_EQ(event_line(e), "0.500000,12,command,effect_gain,,0.25,damping,console\n");
+  e.what = rt::Command::force_scale;
+  EXPECT_EQ(event_line(e), "0.500000,12,command,force_scale,,0.25,,console\n");
+  e.writer = 99;
+  e.value = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(event_line(e), "0.500000,12,command,force_scale,,,,99\n");
 }
 
 }  // namespace

@@ -83,26 +83,38 @@ lock_build() {
 }
 unlock_build() { exec 9>&-; }
 
+# known A|B: the first of them that this release of Debian has.
+known() {
+  local one
+  for one in ${1//|/ }; do
+    if [ -n "$(apt-cache madison "$one")" ]; then break; fi
+  done
+  printf '%s' "$one"
+}
+
 # install_packages SET...: what toolchain/packages lists and this machine lacks; no apt call when nothing is missing.
 install_packages() {
-  local sets=" $* " set package missing=() as_root=()
+  local sets=" $* " set package missing=() as_root=() there
+  # What is installed, and what that provides: an npm, for example, that came with a nodejs of another origin.
+  there=$(dpkg-query -W -f '${db:Status-Abbrev} ${Package} ${Provides}\n' | sed -n 's/^ii *//p' | sed 's/([^)]*)//g' | tr -s ', ' '\n\n')
   while read -r set package _; do
     case "$set" in '' | '#'*) continue ;; esac
     [[ $sets == *" $set "* ]] || continue
-    [ "$(dpkg-query -W -f '${Status}' "$package" 2>/dev/null)" = 'install ok installed' ] || missing+=("$package")
+    grep -qxF "${package//|/$'\n'}" <<<"$there" || missing+=("$package")
   done <"$root/toolchain/packages"
   if [ ${#missing[@]} -eq 0 ]; then
     say packages "all there"
     return
   fi
   if [ "$(id -u)" -ne 0 ]; then
-    command -v sudo >/dev/null || fail "missing packages, and neither root nor sudo to install them. As root: apt-get install --no-install-recommends ${missing[*]}"
+    command -v sudo >/dev/null || fail "missing packages, and neither root nor sudo to install them. As root: apt-get install --no-install-recommends ${missing[*]//|*/}"
     as_root=(sudo)
     # sudo may ask for a password here, once, where there is a terminal; later calls stay silent.
-    sudo -n true 2>/dev/null || sudo -v || fail "sudo was refused. As root: apt-get install --no-install-recommends ${missing[*]}"
+    sudo -n true 2>/dev/null || sudo -v || fail "sudo was refused. As root: apt-get install --no-install-recommends ${missing[*]//|*/}"
   fi
   local apt=(env DEBIAN_FRONTEND=noninteractive apt-get -q -y -o DPkg::Lock::Timeout=300 -o Acquire::Retries=3)
   step packages "read the package lists" "$root/build/apt-update.log" "${as_root[@]}" "${apt[@]}" update || exit 1
+  for package in "${!missing[@]}"; do missing[package]=$(known "${missing[package]}"); done
   step packages "install ${missing[*]}" "$root/build/apt-install.log" \
     "${as_root[@]}" "${apt[@]}" install --no-install-recommends "${missing[@]}" || exit 1
 }

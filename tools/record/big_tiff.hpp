@@ -2,8 +2,10 @@
 // compressed. The format: https://www.awaresystems.be/imaging/tiff/bigtiff.html
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,9 +14,14 @@ namespace punctum::tools {
 
 class BigTiff {
  public:
-  // The description is that of the first page.
-  BigTiff(std::FILE* file, std::uint32_t width, std::uint32_t height, std::string description)
-      : file_(file), width_(width), height_(height), description_(std::move(description)) {
+  // The description is that of the first page. pixels_per_m: 0 if nobody knows.
+  BigTiff(std::FILE* file, std::uint32_t width, std::uint32_t height, double pixels_per_m,
+          std::string description)
+      : file_(file),
+        width_(width),
+        height_(height),
+        resolution_(resolution(pixels_per_m)),
+        description_(std::move(description)) {
     bytes_ = "II";
     put(std::uint16_t{43});
     put(std::uint16_t{8});  // bytes of an offset
@@ -26,7 +33,8 @@ class BigTiff {
 
   // width * height pixels, row by row from the top.
   void page(std::string_view pixels) {
-    enum Type : std::uint16_t { ascii = 2, u16 = 3, u32 = 4, u64 = 16 };
+    enum Type : std::uint16_t { ascii = 2, u16 = 3, u32 = 4, rational = 5, u64 = 16 };
+    enum Unit : std::uint64_t { none = 1, centimetre = 3 };
     const std::uint64_t strip = at_;
     bytes_.assign(pixels);
     bytes_.resize((bytes_.size() + 7) / 8 * 8);
@@ -59,6 +67,9 @@ class BigTiff {
     entry(277, u16, 1, 1);  // sample per pixel
     entry(278, u32, 1, height_);
     entry(279, u64, 1, std::uint64_t{width_} * height_);
+    entry(282, rational, 1, resolution_);  // along a row
+    entry(283, rational, 1, resolution_);
+    entry(296, u16, 1, resolution_ == kUnknown ? none : centimetre);
     list.swap(bytes_);
     put(entries);
     bytes_ += list;
@@ -73,6 +84,17 @@ class BigTiff {
   [[nodiscard]] bool good() const { return good_; }
 
  private:
+  // A rational number: the numerator in the lower half, the denominator in the upper one.
+  static constexpr std::uint64_t kUnknown = 1 | std::uint64_t{1} << 32U;
+  static std::uint64_t resolution(double pixels_per_m) {
+    constexpr double kM_per_cm = 1e-2, kDenominator = 100;
+    const double numerator = std::round(pixels_per_m * kM_per_cm * kDenominator);
+    if (!(numerator >= 1 && numerator <= std::numeric_limits<std::uint32_t>::max())) {
+      return kUnknown;
+    }
+    return static_cast<std::uint64_t>(numerator) | static_cast<std::uint64_t>(kDenominator) << 32U;
+  }
+
   template <class Number>
   void put(Number n) {
     for (std::size_t i = 0; i < sizeof n; ++i) {
@@ -94,6 +116,7 @@ class BigTiff {
 
   std::FILE* file_;
   std::uint32_t width_, height_;
+  std::uint64_t resolution_;
   std::string description_;
   std::string bytes_;
   std::uint64_t at_ = 0;    // bytes written

@@ -19,6 +19,7 @@
 
 #include "rt/forces/list.hpp"
 #include "tools/record/recording_reader.hpp"
+#include "tools/shared/html.hpp"
 #include "tools/shared/whole_file.hpp"
 
 namespace punctum::tools {
@@ -91,17 +92,21 @@ void write_text(hid_t in, const char* name, const std::string& text, bool as_lis
   must_be(H5Dwrite(set.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, static_cast<const void*>(&bytes)));
 }
 
-// Every object of NWB says what it is, and has a name of its own in the world.
-void set_kind(hid_t of, const char* kind) {
+// A name that nothing else in the world has: a UUID, RFC 9562, version 4.
+std::string own_name() {
   static std::random_device random;
   std::array<unsigned, 4> r{random(), random(), random(), random()};
   r[1] = (r[1] & 0xFFFF0FFFU) | 0x4000U;
   r[2] = (r[2] & 0x3FFFFFFFU) | 0x80000000U;
+  return fmt::format("{:08x}-{:04x}-{:04x}-{:04x}-{:04x}{:08x}", r[0], r[1] >> 16U, r[1] & 0xFFFFU,
+                     r[2] >> 16U, r[2] & 0xFFFFU, r[3]);
+}
+
+// Every object of NWB says what it is.
+void set_kind(hid_t of, const char* kind) {
   set_text(of, "namespace", "core");
   set_text(of, "neurodata_type", kind);
-  set_text(of, "object_id",
-           fmt::format("{:08x}-{:04x}-{:04x}-{:04x}-{:04x}{:08x}", r[0], r[1] >> 16U, r[1] & 0xFFFFU,
-                       r[2] >> 16U, r[2] & 0xFFFFU, r[3]));
+  set_text(of, "object_id", own_name());
 }
 
 std::string date(std::uint64_t utc_ns) {
@@ -295,16 +300,17 @@ class NwbFile {
         file_.id(), "file_create_date",
         date(static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(now).count())),
         true);
-    const std::string begin = date(begin_ns);
+    // A virtual clock begins in 1970.
+    const std::string begin = date(scene_.virtual_time() ? scene_.begun_ns() : begin_ns);
     write_text(file_.id(), "session_start_time", begin);
     write_text(file_.id(), "timestamps_reference_time", begin);
-    write_text(file_.id(), "identifier", scene_.station() + " " + begin);
+    write_text(file_.id(), "identifier", own_name());
     write_text(
         file_.id(), "session_description",
         fmt::format("A run of {}, {} station, {} time; made of {}.",
                     scene_.station().empty() ? "a station" : scene_.station(),
                     scene_.simulated() ? "simulated" : "real", scene_.virtual_time() ? "virtual" : "real",
-                    std::filesystem::path(recording).filename().string()));
+                    readable(std::filesystem::path(recording).filename().string())));
     const H5Object general(must_be(H5Gopen2(file_.id(), "general", H5P_DEFAULT)), H5Gclose);
     write_text(general.id(), "data_collection", scene_.toml());
     write_text(general.id(), "session_id", scene_.station());

@@ -18,6 +18,7 @@
 #include "tools/record/big_tiff.hpp"
 #include "tools/record/recording_reader.hpp"
 #include "tools/scene/scene.hpp"
+#include "tools/shared/html.hpp"
 #include "tools/shared/version.hpp"
 #include "tools/shared/whole_file.hpp"
 #include "tools/vision/picture_file.hpp"
@@ -94,14 +95,10 @@ tl::expected<void, std::string> each_picture(const std::string& recording, Take 
 }
 
 // https://docs.openmicroscopy.org/ome-model/latest/ome-tiff/; lengths in um, times in s, as its defaults are.
-std::string ome_xml(const PicturesOverview& all, const std::string& name) {
+std::string ome_xml(const PicturesOverview& all, double pixel_m, const std::string& name) {
   std::string size;
-  if (const auto scene = parse_scene(all.scene, "scene"); scene && scene->vision) {
-    size = fmt::format(" PhysicalSizeX=\"{0:.9g}\" PhysicalSizeY=\"{0:.9g}\"", scene->vision->pixel_m * 1e6);
-  }
-  std::string escaped;
-  for (const char c : name) {
-    escaped += c == '<' ? "&lt;" : c == '&' ? "&amp;" : c == '"' ? "&quot;" : std::string(1, c);
+  if (pixel_m > 0) {
+    size = fmt::format(" PhysicalSizeX=\"{0:.9g}\" PhysicalSizeY=\"{0:.9g}\"", pixel_m * 1e6);
   }
   const char* space = "http://www.openmicroscopy.org/Schemas/OME/2016-06";
   std::string xml = fmt::format(
@@ -110,7 +107,7 @@ std::string ome_xml(const PicturesOverview& all, const std::string& name) {
       "Creator=\"{1}\"><Image ID=\"Image:0\" Name=\"{2}\"><Pixels ID=\"Pixels:0\" DimensionOrder=\"XYCZT\" "
       "Type=\"uint8\" SizeX=\"{3}\" SizeY=\"{4}\" SizeC=\"1\" SizeZ=\"1\" SizeT=\"{5}\"{6}>"
       "<Channel ID=\"Channel:0:0\" SamplesPerPixel=\"1\"/><TiffData IFD=\"0\" PlaneCount=\"{5}\"/>",
-      space, version_line("punctum-export"), escaped, all.width, all.height, all.pictures.size(), size);
+      space, version_line("punctum-export"), escaped(name), all.width, all.height, all.pictures.size(), size);
   for (std::size_t i = 0; i < all.pictures.size(); ++i) {
     fmt::format_to(std::back_inserter(xml), "<Plane TheZ=\"0\" TheC=\"0\" TheT=\"{}\" DeltaT=\"{:.9f}\"/>", i,
                    all.t_s(all.pictures[i]));
@@ -184,8 +181,10 @@ tl::expected<std::string, std::string> export_ome_tiff(const std::string& record
   if (!out) {
     return tl::unexpected(fmt::format("{}: {}", file, std::strerror(errno)));
   }
-  BigTiff tiff(out.get(), all->width, all->height,
-               ome_xml(*all, std::filesystem::path(recording).filename().string()));
+  const auto scene = parse_scene(all->scene, "scene");
+  const double pixel_m = scene && scene->vision ? scene->vision->pixel_m : 0;
+  BigTiff tiff(out.get(), all->width, all->height, pixel_m > 0 ? 1 / pixel_m : 0,
+               ome_xml(*all, pixel_m, std::filesystem::path(recording).filename().string()));
   std::size_t i = 0;
   const auto read = each_picture(recording, [&](const v1::Picture& p) {
     tiff.page(p.grey());

@@ -111,6 +111,9 @@ void StationRecorder::take(const rt::TelemetrySample& sample) {
   if (!scene_told_) {
     chunk_begun_ns_ = now_ns_;
     scene_told_ = true;
+    const auto now = std::chrono::system_clock::now().time_since_epoch();
+    scene_.set_begun_ns(
+        static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(now).count()));
     add(Stream::scene, scene_);
   }
   to_wire(sample, telemetry_message_);

@@ -36,17 +36,22 @@ std::size_t letter_length(std::string_view s) {
 
 }  // namespace
 
-std::string escaped(std::string_view text) {
+std::string readable(std::string_view text) {
   std::string s;
   while (!text.empty()) {
     const std::size_t n = letter_length(text);
     const auto c = static_cast<unsigned char>(text[0]);
-    if (n == 0 || (c < 0x20 && c != '\n' && c != '\t') || c == 0x7F) {
-      s += kNoText;
-      text.remove_prefix(1);
-      continue;
-    }
-    switch (text[0]) {
+    const bool is_text = n > 0 && (c >= 0x20 || c == '\n' || c == '\t') && c != 0x7F;
+    s += is_text ? text.substr(0, n) : kNoText;
+    text.remove_prefix(is_text ? n : 1);
+  }
+  return s;
+}
+
+std::string escaped(std::string_view text) {
+  std::string s;
+  for (const char c : readable(text)) {
+    switch (c) {
       case '&':
         s += "&amp;";
         break;
@@ -63,9 +68,8 @@ std::string escaped(std::string_view text) {
         s += "&#39;";
         break;
       default:
-        s += text.substr(0, n);
+        s += c;
     }
-    text.remove_prefix(n);
   }
   return s;
 }

@@ -1,4 +1,4 @@
-// Text inside a page of HTML.
+// Text that others wrote, inside a page or a file.
 #pragma once
 
 #include <string>
@@ -6,8 +6,11 @@
 
 namespace punctum::tools {
 
-// Letters that mean something to HTML, and what is no text (control characters, broken UTF-8), replaced: what
-// a file or a person wrote stays text, in elements and in quoted attributes.
+// What is no text (control characters, broken UTF-8), replaced.
+[[nodiscard]] std::string readable(std::string_view text);
+
+// Letters that mean something to HTML and XML replaced, too: what a file or a person wrote stays text, in
+// elements and in quoted attributes.
 [[nodiscard]] std::string escaped(std::string_view text);
 
 // For data: URIs.

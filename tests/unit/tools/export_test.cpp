@@ -171,6 +171,13 @@ TEST_F(ExportTest, pictures_become_pages_of_an_ome_tiff) {
             tiff + ": is there already; an export replaces nothing");
 }
 
+TEST_F(ExportTest, a_file_name_that_is_no_text_leaves_the_xml_whole) {
+  const std::string odd = (folder_ / "<a>&\x01\xff.mcap").string(), tiff = (folder_ / "odd.ome.tif").string();
+  std::filesystem::rename(recorded_pictures(folder_), odd);
+  ASSERT_TRUE(export_ome_tiff(odd, tiff));
+  EXPECT_NE(bytes_of(tiff).find("Name=\"&lt;a&gt;&amp;\xEF\xBF\xBD\xEF\xBF\xBD.mcap\""), std::string::npos);
+}
+
 TEST_F(ExportTest, a_surface_of_no_numbers_and_a_picture_too_wide_are_said_and_leave_nothing) {
   const std::string odd = (folder_ / "odd.mcap").string();
   {

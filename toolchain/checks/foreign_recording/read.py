@@ -1,6 +1,6 @@
 #!/usr/bin/python3
 """read.py FOLDER: what tifffile, OpenCV and h5py make of exports in FOLDER: pictures.ome.tif beside png/, run.nwb beside samples.csv."""
-import csv, pathlib, sys
+import csv, datetime, pathlib, sys
 from xml.etree import ElementTree
 import cv2, h5py, numpy, tifffile
 
@@ -25,6 +25,8 @@ def pictures():
     space = {"o": "http://www.openmicroscopy.org/Schemas/OME/2016-06"}
     pixels = ElementTree.fromstring(tiff.ome_metadata).find(".//o:Pixels", space)
     assert abs(float(pixels.get("PhysicalSizeX")) - 0.825) < 1e-9, pixels.attrib
+    many, per = tiff.pages[0].tags["XResolution"].value
+    assert tiff.pages[0].tags["ResolutionUnit"].value == 3 and abs(many / per - 1 / 0.825e-4) < 0.01, (many, per)
     times = [float(plane.get("DeltaT")) for plane in pixels.findall("o:Plane", space)]
     assert times == [float(row["t_s"]) for row in rows]
     assert min(abs(stack[0].astype(int) - stack[-1]).max(), stack.std()) > 5  # they show something
@@ -41,9 +43,9 @@ def nwb():
         value = file[name][()]
         value = value[0] if name == "file_create_date" else value
         assert text(value), name
-        if name.endswith(("time", "date")):
-            import datetime
-            assert datetime.datetime.fromisoformat(text(value)).tzinfo is not None, value
+        if name.endswith(("time", "date")):  # of a run that has just been, whatever its own clock says
+            age = datetime.datetime.now(datetime.timezone.utc) - datetime.datetime.fromisoformat(text(value))
+            assert datetime.timedelta() <= age < datetime.timedelta(hours=2), value
     for name in ("acquisition", "analysis", "processing", "general", "stimulus/presentation", "stimulus/templates"):
         assert isinstance(file[name], h5py.Group), name
     identities = set()

@@ -7,7 +7,7 @@ import {Parameters, type Parameter} from './parameters';
 import {LivePicture, type PictureColours} from './picture';
 import {Plots, type PlotColours} from './plots';
 import {Replay} from './replay';
-import {SceneView, type Colours} from './scene';
+import {kNotTold, SceneView, type Colours} from './scene';
 import {Scope, type ScopeColours} from './scope';
 import {Target} from './target';
 import {drawTiming, quantile_us, timingText, type Status} from './timing';
@@ -180,7 +180,10 @@ const link = new Link(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${loca
     console.error(topic, error);
   }
 }, () => {
-  if (link.state.connected) by('events').replaceChildren();  // all are told again
+  if (link.state.connected) {  // perhaps to another station, which tells all anew
+    by('events').replaceChildren();
+    view?.fixtures(kNotTold);
+  }
   show();
 });
 

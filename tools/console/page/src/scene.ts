@@ -7,8 +7,10 @@ import type {CellSurface, Fixtures, Observation, Telemetry, Vector} from './wire
 
 const kUm = 1e6;
 // Drawn sizes of what the station does not tell.
-const kNeedleLength_um = 400, kNeedleRadius_um = 4, kNeedleFar_um = 14, kHolderRadius_um = 40, kHolderLength_um = 300;
+const kNeedleLength_um = 400, kHolderRadius_um = 40, kHolderLength_um = 300;
 const kConeLength_um = 60, kConeAngle = Math.PI / 6;
+const kNeedle = {tip_radius_m: 4e-6, shaft_radius_m: 14e-6, taper_m: 400e-6};
+export const kNotTold: Fixtures = {cone: {alpha_rad: kConeAngle}, needle: null, floor: null, holder: null};
 const kFloor_um = 600, kFloorLines = 12;
 const kLongestArrow_um = 90, kArrow_um_per_uN = 20;
 
@@ -40,6 +42,7 @@ export class SceneView {
   private axisLine: THREE.Line<THREE.BufferGeometry, THREE.LineDashedMaterial>;
   private forbidden = new THREE.Group();  // floor and holder that the needle is kept from
   private hasCone = true;
+  private rim_um = 0;
   private arrows: THREE.ArrowHelper[] = [];
   private dirty = true;
   private cellIsNew = true;
@@ -70,10 +73,7 @@ export class SceneView {
     };
     this.membranes = {inner: membrane(0.5, 1), outer: membrane(0.2, 2)};
 
-    // A cylinder of three.js lies along y; the needle's tip is at the origin and the glass behind it.
-    const glass = new THREE.CylinderGeometry(kNeedleRadius_um, kNeedleFar_um, kNeedleLength_um, 24);
-    glass.translate(0, -kNeedleLength_um / 2, 0);
-    this.needleGlass = new THREE.Mesh(glass, standard());
+    this.needleGlass = new THREE.Mesh(new THREE.BufferGeometry(), standard());
     this.tipMark = new THREE.Mesh(new THREE.SphereGeometry(3, 16, 12), new THREE.MeshBasicMaterial());
     this.needle.add(this.needleGlass, this.tipMark);
     const pipette = new THREE.CylinderGeometry(kHolderRadius_um, kHolderRadius_um, kHolderLength_um, 32, 1, true);
@@ -122,6 +122,7 @@ export class SceneView {
     ];
     this.show(1);
     this.paint(colours);
+    this.fixtures(kNotTold);
   }
 
   paint(colours: Colours): void {
@@ -192,13 +193,14 @@ export class SceneView {
     this.dirty = true;
   }
 
-  // Shapes that the station tells, in place of the drawn ones.
+  // Shapes that the station tells.
   fixtures(f: Fixtures): void {
-    if (f.needle) {
-      const tip = f.needle.tip_radius_m * kUm, shaft = f.needle.shaft_radius_m * kUm, taper = Math.min(f.needle.taper_m * kUm, kNeedleLength_um);
-      this.needleGlass.geometry.dispose();
-      this.needleGlass.geometry = new THREE.LatheGeometry([[0, 0], [tip, 0], [shaft, -taper], [shaft, -kNeedleLength_um]].map(([x, y]) => new THREE.Vector2(x, y)), 24);
-    }
+    const needle = f.needle ?? kNeedle;
+    const tip = needle.tip_radius_m * kUm, shaft = needle.shaft_radius_m * kUm, taper = Math.min(needle.taper_m * kUm, kNeedleLength_um);
+    this.rim_um = tip;
+    this.needleGlass.geometry.dispose();
+    // Along y, the tip at the origin and the glass behind it.
+    this.needleGlass.geometry = new THREE.LatheGeometry([[0, 0], [tip, 0], [shaft, -taper], [shaft, -kNeedleLength_um]].map(([x, y]) => new THREE.Vector2(x, y)), 24);
     this.hasCone = f.cone !== null;
     if (f.cone) {
       const wider = Math.tan(f.cone.alpha_rad) / Math.tan(kConeAngle);
@@ -366,7 +368,7 @@ export class SceneView {
       const arrow = this.arrows[i]!;
       // The four points lie round the pipette's rim.
       const angle = (i * Math.PI) / 2;
-      const rim = new THREE.Vector3(Math.cos(angle), 0, Math.sin(angle)).multiplyScalar(kNeedleRadius_um).applyQuaternion(this.needle.quaternion);
+      const rim = new THREE.Vector3(Math.cos(angle), 0, Math.sin(angle)).multiplyScalar(this.rim_um).applyQuaternion(this.needle.quaternion);
       arrow.position.copy(this.tip).add(rim);
       arrow.setDirection(direction(force));
       arrow.setLength(Math.min(uN * kArrow_um_per_uN, kLongestArrow_um), 7, 5);

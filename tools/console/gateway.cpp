@@ -546,10 +546,7 @@ tl::expected<void, std::string> Gateway::Server::Client::replay_wish(std::string
   if (!wish) {
     return tl::unexpected(wish.error());
   }
-  if (person_.role != Role::operate) {
-    return tl::unexpected(std::string("only whoever has a token to operate may play a recording"));
-  }
-  return server_.feed_.ask(*wish);
+  return server_.feed_.ask(*wish);  // of anybody: nothing moves but what is shown
 }
 
 tl::expected<void, std::string> Gateway::Server::Client::move_hand(std::string_view request) {

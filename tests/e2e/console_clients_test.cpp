@@ -550,7 +550,7 @@ TEST_F(SafeConsole, lets_nobody_operate_but_who_was_told_the_token_and_has_contr
     return in_control(*ada, [&] { return set(*ada, name, value); });
   };
   forbidden("token to operate", control(*eve));
-  forbidden("token to operate", problem(*eve, 4, R"({"playing":true})"));
+  forbidden("no recording", problem(*eve, 4, R"({"playing":true})"));
   forbidden("no recording", problem(*ada, 4, R"({"playing":true})"));
   forbidden("allowed", problem(*ada, 4, R"({"speed":1000})"));
   forbidden("take control first", set(*eve, "force_scale", 0.5));

@@ -33,6 +33,7 @@ enum class Op : std::uint8_t {
   metadata_index,
   summary_offset,
   data_end,
+  others = 0x80,  // and all above: other people's
 };
 
 // CRC-32 as zlib has it.

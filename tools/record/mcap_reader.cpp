@@ -71,8 +71,8 @@ tl::expected<Reader::Got, std::string> Reader::next_record() {
   Fields head(head_);
   const auto op = head.number<std::uint8_t>();
   const auto size = head.number<std::uint64_t>();
-  // Those from 0x80 on are other people's.
-  if (op == 0 || (op > static_cast<std::uint8_t>(Op::data_end) && op < 0x80)) {
+  const bool of_others = op >= static_cast<std::uint8_t>(Op::others);
+  if (op == 0 || (op > static_cast<std::uint8_t>(Op::data_end) && !of_others)) {
     return wrong(fmt::format("a record of kind {}, which does not exist", op));
   }
   if (size > kLargestRecord) {
@@ -84,7 +84,7 @@ tl::expected<Reader::Got, std::string> Reader::next_record() {
     }
     return Got::cut;
   }
-  op_ = static_cast<Op>(op);
+  op_ = of_others ? Op::others : static_cast<Op>(op);
   next_ = at_ + kRecordHead + size;
   return Got::record;
 }
@@ -148,7 +148,7 @@ tl::expected<bool, std::string> Reader::next(Message& out) {
         taken = wrong("a footer before the end of the data");
         break;
       default:
-        if (static_cast<std::uint8_t>(op) < 0x80) {
+        if (op != Op::others) {
           taken = wrong(fmt::format("a record of kind {} among the data", static_cast<int>(op)));
         }
     }

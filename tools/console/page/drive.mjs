@@ -114,6 +114,13 @@ async function all() {
     assert.equal(await page.locator('#freeze').getAttribute('aria-pressed'), 'true');
     await page.keyboard.press('p');
     await page.waitForFunction(() => punctum.drawn.plots.points > 10);
+    const heights = () => page.evaluate(() => [...document.querySelectorAll('.uplot .u-wrap')].map((chart) => chart.clientHeight).join());
+    const before = await heights();
+    for (const key of ['s', 'e', 'c', 'e']) {
+      await page.keyboard.press(key);
+      await page.evaluate(() => new Promise((go) => requestAnimationFrame(() => requestAnimationFrame(go))));
+    }
+    await until('the plots have their room again', async () => await heights() === before);
     for (let i = 0; i < 5; i++) await page.keyboard.press(',');
     await until('the cursor reads an earlier time', async () => {
       const read = await page.locator('.u-legend .u-value').first().innerText();
@@ -139,10 +146,10 @@ async function all() {
   await shoot('page', 1280, 720);
   await shoot('page', 2560, 1440);
 
-  await step('force is pitch; contact, puncture and alarm sound different', async () => {
+  await step('force is pitch; contact, puncture, an alarm, a fault and data that stop sound different', async () => {
     const heard = await page.evaluate(async () => {
       const result = {};
-      for (const cue of ['contact', 'puncture', 'alarm']) {
+      for (const cue of ['contact', 'puncture', 'warning', 'alarm', 'stale']) {
         const context = new OfflineAudioContext(1, 44100, 44100);
         punctum.playCue(context, cue, 0);
         const samples = (await context.startRendering()).getChannelData(0);
@@ -155,8 +162,9 @@ async function all() {
       }
       return {...result, pitches: [0, 1, 2, 3, 9].map((f) => punctum.pitchOf(f))};
     });
-    assert.ok(heard.contact.length_s < 0.1 && heard.puncture.length_s > 0.1 && heard.alarm.length_s > 0.5, JSON.stringify(heard));
-    assert.ok(heard.contact.Hz > heard.alarm.Hz && heard.alarm.Hz > heard.puncture.Hz, JSON.stringify(heard));
+    assert.ok(heard.contact.length_s < 0.1 && heard.puncture.length_s > 0.1 && heard.alarm.length_s > 0.5 && heard.warning.length_s < 0.35 && heard.stale.length_s > 0.5, JSON.stringify(heard));
+    const Hz = ['contact', 'alarm', 'puncture', 'warning', 'stale'].map((cue) => heard[cue].Hz);
+    assert.ok(Hz.every((one, i) => i === 0 || one < 0.85 * Hz[i - 1]), JSON.stringify(heard));
     assert.deepEqual([...heard.pitches].sort((a, b) => a - b), heard.pitches);
     assert.equal(heard.pitches[3], heard.pitches[4], 'no force is shriller than the highest');
     await page.keyboard.press('m');
@@ -186,7 +194,6 @@ async function all() {
     assert.ok(shown.ticks.every((t, i) => i === 0 || t > shown.ticks[i - 1]));
     assert.equal(lost, 0);
     assert.equal(csv.trim().split('\n').length, shown.times.length + 1);
-    await page.evaluate(() => document.activeElement.blur());
     for (let i = 0; i < 3; i++) await page.keyboard.press(',');
     assert.equal((await page.evaluate(() => punctum.scope.read())).t_s, shown.times.at(-4));
     await shoot('scope', 420, 900, true);
@@ -205,7 +212,7 @@ async function all() {
     await page.waitForFunction(() => punctum.parameters.length > 4 && !document.getElementById('control').disabled);
     assert.match(await text('control-note'), /Take control first/);
     assert.equal(await page.locator('#parameter-list :is(input, button):enabled').count(), 0);
-    assert.match(await row('position scale').locator('input').getAttribute('placeholder'), /fixed in this scene/);
+    assert.match(await row('position scale').innerText(), /fixed in this scene/);
     await scale.locator('button').first().dispatchEvent('click');
     await page.click('#control');
     await page.waitForFunction(() => punctum.state.control === 'yours');
@@ -224,8 +231,13 @@ async function all() {
     await shoot('parameters', 2560, 1440);
     await page.waitForTimeout(2000);
     assert.equal(await page.evaluate(() => punctum.state.control), 'yours', 'control is kept while the page is there');
-    await scale.getByRole('button', {name: 'Back to 1'}).click();
-    await page.waitForFunction(() => punctum.parameters.find((p) => p.name === 'force_scale').value === 1);
+    await scale.locator('input').fill('0.25');
+    await page.keyboard.press('Enter');
+    for (const earlier of [0.5, 1]) {
+      await scale.getByRole('button', {name: `Back to ${earlier}`}).click();
+      await page.waitForFunction((value) => punctum.parameters.find((p) => p.name === 'force_scale').value === value, earlier);
+    }
+    await until('there is nothing earlier', async () => !await scale.getByRole('button', {name: 'Back to'}).isEnabled());
     // A key that means something elsewhere is only text in a field.
     await scale.locator('input').pressSequentially('m0');
     assert.equal(await page.evaluate(() => punctum.sound.on), false);
@@ -251,13 +263,15 @@ async function all() {
     await page.evaluate(() => document.activeElement?.blur());
   });
 
-  await step('a gateway that stands still: what is shown is grey; it goes on, and it is fresh again', async () => {
+  await step('a gateway that stands still: what is shown is grey; it goes on, and it is fresh again, with a gap in the plots', async () => {
     const pid = Number(execFileSync('pgrep', ['-P', String(run.pid), 'punctum-consol']).toString());
     process.kill(pid, 'SIGSTOP');
     await until('it is grey', isStale);
     assert.match(await text('banner-title'), /No data/);
+    await until('it is old', async () => Number(/([\d.]+) s old/.exec(await text('time'))?.[1]) > 3);
     process.kill(pid, 'SIGCONT');
     await until('it is fresh', async () => !await isStale());
+    await page.waitForFunction(() => punctum.drawn.plots.gaps > 0);
   });
 
   await step('a gateway that is killed: the page says so, the core goes on, and a new gateway is found', async () => {
@@ -333,7 +347,7 @@ async function all() {
     const report = JSON.parse(readFileSync(join(folder, 'run/report.json'), 'utf8'));
     // Everything else that was clicked left no command.
     const commands = report.events.filter((e) => /^command/.test(e.event) && e.writer === 'console');
-    assert.deepEqual(commands.map((e) => e.what), ['force_scale', 'force_scale', 'stop']);
+    assert.deepEqual(commands.map((e) => e.what), ['force_scale', 'force_scale', 'force_scale', 'force_scale', 'stop']);
     assert.equal(report.faults[0].name ?? report.faults[0].fault ?? report.faults[0], 'command_stop');
   });
 
@@ -358,17 +372,20 @@ async function all() {
     await page.waitForFunction(() => punctum.replay.now_s === 0);
     await page.evaluate(() => document.activeElement.blur());
     await pressed('n', () => punctum.replay.now_s > 0 && punctum.newest.phase === 1);
+    await page.waitForFunction(() => punctum.drawn.plots.gaps > 0);
     const contact = await page.evaluate(() => punctum.replay.now_s);
     await page.waitForTimeout(1500);
     assert.equal(await page.evaluate(() => punctum.replay.now_s), contact, 'it stands still');
     assert.ok(!await isStale(), 'what stands still is not old');
     assert.match(page.url(), new RegExp(`t=${contact.toFixed(3)}`));
+    await page.keyboard.press('Escape');
+    assert.ok(!await page.locator('#stop').isEnabled() && !await page.locator('#banner').isVisible());
+    assert.match(await text('stop-why'), /nothing to stop/);
     await shoot('replay', 420, 900, true);
     await shoot('replay', 1280, 720);
     await shoot('replay', 2560, 1440);
     await page.selectOption('#replay select', '2');
     await page.waitForFunction(() => punctum.replay.speed === 2);
-    await page.evaluate(() => document.activeElement.blur());
     await pressed('s', () => punctum.scope.lost === 0);
     await pressed(' ', () => punctum.replay.playing);
     await page.waitForFunction((from) => punctum.replay.now_s > from + 1.2, contact);
@@ -389,6 +406,18 @@ async function all() {
       assert.ok(Math.abs(Number(r[column]) - depth.get(at(r[1]))) < 1e-3, `${r[1]} s: ${r[column]}, ${depth.get(at(r[1]))}`);
     }
     assert.ok(compared > 400, `${compared} of ${shown.length}`);
+    // Armed, it catches its trigger while another panel is shown; a link has the set-up.
+    const set = (label, value) => page.locator(`#scope [aria-label="${label}"]`).selectOption(value);
+    await set('when it shows', 'single');
+    await set('quantity of the trigger', {label: 'phase'});
+    await set('edge of the trigger', 'changes');
+    await page.keyboard.press('e');
+    await page.locator('#replay input').fill('0');
+    await page.waitForFunction(() => punctum.replay.now_s === 0);
+    await page.evaluate(() => document.activeElement.blur());
+    await pressed(' ', (at) => Math.abs(punctum.scope.triggered - at) < 0.01, contact);
+    await until('the page says so', async () => /caught/.test(await text('show-scope')));
+    await page.waitForFunction(() => /trigger=single_phase_changes/.test(location.hash));
     await page.goto(link.replace('#', `#t=${contact.toFixed(3)}&view=5&panel=events&`));
     await page.reload();
     await page.waitForFunction((at) => punctum.replay && !punctum.replay.playing && Math.abs(punctum.replay.now_s - at) < 0.01, contact);

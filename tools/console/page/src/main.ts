@@ -18,7 +18,7 @@ import {decode, word, type CellSurface, type Event, type Fixtures, type Observat
 const kStale_ms = 500;
 // A stop that the core has not confirmed by then is told to be unconfirmed.
 const kStopConfirmed_ms = 300;
-const kMostEvents = 200;
+const kMostEvents = 200, kWarning_ms = 1000;  // between two sounds of new alarms
 
 interface State {
   core: string; run_end: string; t_s: number; tick: number; phase: string; cell: number; stop: string;
@@ -58,7 +58,7 @@ const say = (id: string, text: string) => {
   if (element.textContent !== text) element.textContent = text;
 };
 
-// What the address keeps: view, follow, panel, theme; of a recording the moment, too.
+// What the address keeps: view, follow, panel, theme, where the free view looks from, the scope's set-up; of a recording the moment, too.
 const layout = new URLSearchParams(location.hash.slice(1));
 function keep(key: string, value: string): void {
   layout.set(key, value);
@@ -83,7 +83,7 @@ const sceneColours = (): Colours => ({
 });
 const plotColours = (): PlotColours => ({line: [css('--one'), css('--two')], axis: css('--faint'), grid: css('--line')});
 
-const scopeColours = (): ScopeColours => ({line: css('--one'), axis: css('--faint'), grid: css('--line'), mark: css('--two'), ground: css('--panel')});
+const scopeColours = (): ScopeColours => ({line: css('--one'), axis: css('--faint'), grid: css('--line'), mark: css('--two')});
 const pictureColours = (): PictureColours => ({
   background: css('--panel'), text: css('--text'), outer: '#5cb8f0', inner: '#f0a040', needle: '#ff7f50', holder: '#aeb9c1', mark: '#f0c000',
 });
@@ -108,6 +108,7 @@ let panel: Panel | undefined;
 let newest: Telemetry | undefined, state: State | undefined;
 let tick = -1, tickAt = -Infinity;  // when a new tick last came
 let stopAsked = -1, stopProblem = '';
+let warnedAt = -Infinity, wasStale = true;
 let unreadable = 0;
 let coreStatus: Status | undefined;
 
@@ -122,7 +123,10 @@ function onTelemetry(t: Telemetry): void {
     tick = t.tick;
     tickAt = performance.now();
   }
-  plots.add(t);
+  if (before && t.tick < before.tick) {  // another run, or a recording that was turned back: what was listed is still to come
+    for (const line of [...by('events').children] as HTMLElement[]) if (Number(line.dataset['t']) > t.t_s) line.remove();
+  }
+  plots.add(t, replay.now?.speed ?? 1);
   view?.telemetry(t);
   sound.force(t.force_N ? Math.hypot(t.force_N.x, t.force_N.y, t.force_N.z) : 0);
   if (before && before.phase !== t.phase) {
@@ -130,6 +134,10 @@ function onTelemetry(t: Telemetry): void {
     else if (t.phase === 3) sound.cue('puncture');
   }
   if (t.fault !== 0 && before?.fault === 0) sound.cue('alarm');
+  else if (before && t.alarms & ~before.alarms && performance.now() - warnedAt > kWarning_ms) {
+    warnedAt = performance.now();
+    sound.cue('warning');
+  }
 }
 
 function eventText(e: Event): [text: string, kind: string] {
@@ -145,6 +153,7 @@ function onEvent(e: Event): void {
   const line = document.createElement('li'), [text, kind] = eventText(e);
   line.textContent = `${e.t_s.toFixed(3).padStart(9, '\u2007')} s  ${text}`;
   if (kind) line.className = kind;
+  line.dataset['t'] = String(e.t_s);
   const list = by('events');
   list.prepend(line);
   while (list.childElementCount > kMostEvents) list.lastElementChild!.remove();
@@ -182,6 +191,8 @@ const link = new Link(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${loca
 }, () => {
   if (link.state.connected) {  // perhaps to another station, which tells all anew
     by('events').replaceChildren();
+    replay.forget();
+    parameters.forget();
     view?.fixtures(kNotTold);
   }
   show();
@@ -261,9 +272,11 @@ function show(): void {
   const stale = isStale() || !link.state.connected || (state !== undefined && state.core !== 'ticking' && !replay.now);
   document.body.classList.toggle('stale', stale);
   if (stale) sound.silence();
+  if (stale && !wasStale) sound.cue('stale');
+  wasStale = stale;
   say('station', link.state.station || 'punctum');
   say('link', link.state.connected ? 'connected' : `not connected: ${link.state.reason}`);
-  const age = (performance.now() - tickAt) / 1000;
+  const age = (performance.now() - tickAt) / 1000, alarms = state?.alarms ?? [];
   const phase = newest ? word('Phase', newest.phase) : '–';
   say('phase', newest ? (newest.stop === 0 ? phase : `${word('StopStage', newest.stop)}, ${phase}`) : '–');
   say('time', newest ? `${newest.t_s.toFixed(1)} s, cell ${newest.cell + 1}${stale ? `, ${Number.isFinite(age) ? age.toFixed(1) : '?'} s old` : ''}` : '–');
@@ -272,10 +285,12 @@ function show(): void {
     say('hand', (f ? Math.hypot(f.x, f.y, f.z) : 0).toFixed(2));
     say('needle', (newest.tip_force_N * 1e6).toFixed(2));
     say('depth', (newest.wd_m * 1e6).toFixed(1));
-    say('vision', state?.vision === false ? 'none' : newest.obs_age_s < 0 ? 'starts' : (newest.obs_age_s * 1e3).toFixed(0));
-    say('vision-unit', state?.vision === false || newest.obs_age_s < 0 ? '' : 'ms old');
+    const seen_s = newest.obs_age_s, none = state?.vision === false || seen_s < 0;
+    say('vision', state?.vision === false ? 'none' : none ? 'starts' : seen_s < 1 ? (seen_s * 1e3).toFixed(0) : seen_s.toFixed(1));
+    say('vision-unit', none ? '' : seen_s < 1 ? 'ms' : 's');
+    view?.age(!none && (seen_s * 1e3 > kStale_ms || alarms.includes('vision_stale')) ? seen_s : undefined);
   }
-  const alarms = state?.alarms ?? [], box = by('alarms');
+  const box = by('alarms');
   const key = alarms.join();
   if (box.dataset['key'] !== key) {
     box.dataset['key'] = key;
@@ -289,6 +304,8 @@ function show(): void {
   by('stop').classList.toggle('asked', stopAsked >= 0 || stopped);
   by('stop').classList.toggle('unconfirmed', stopAsked >= 0 && !stopped && performance.now() - stopAsked > kStopConfirmed_ms);
   if (stopped) stopAsked = -1;
+  by<HTMLButtonElement>('stop').disabled = replay.now !== undefined;
+  say('stop-why', replay.now ? kRecording : '');
   banner();
   parameters.show(state, !stale);
   target.show(!by('live').hidden);
@@ -308,7 +325,9 @@ function showTiming(): void {
 }
 
 // ---- what is done ----
+const kRecording = 'A recording: there is nothing to stop.';
 function stop(): void {
+  if (replay.now) return;
   stopAsked = performance.now();
   stopProblem = '';
   link.call('/punctum/stop', {}, (problem) => {
@@ -347,6 +366,11 @@ const follow = toggle('follow', (on) => {
   keep('follow', on ? '1' : '0');
 });
 const freeze = toggle('freeze', (on) => plots.freeze(on));
+// A scope that is armed listens, whatever is shown.
+function wantTicks(): void {
+  link.want('/punctum/ticks', panel === 'scope' || scope.armed);
+  by('show-scope').firstChild!.textContent = scope.armed ? 'Scope (armed)' : scope.holds ? 'Scope (caught)' : 'Scope';
+}
 // One of them is shown; its key again shows the events.
 function showPanel(which: Panel): void {
   panel = which === panel ? 'events' : which;
@@ -355,7 +379,7 @@ function showPanel(which: Panel): void {
     by(`show-${one}`).setAttribute('aria-pressed', String(one === panel));
   }
   document.body.dataset['panel'] = panel;
-  link.want('/punctum/ticks', panel === 'scope');
+  wantTicks();
   say('panel-title', panel === 'events' ? 'Events' : panel === 'parameters' ? 'Parameters' : panel === 'scope' ? 'Scope: every tick' : '');
   keep('panel', panel);
   showTiming();
@@ -401,6 +425,8 @@ const keys: Record<string, () => void> = {
   ',': () => moveCursor(-1), '.': () => moveCursor(1), s: () => showPanel('scope'),
   v: wear, h: takeHand, ' ': () => replay.toggle(), n: () => replay.toMark(true), b: () => replay.toMark(false),
 };
+// Once the choice is made the keys are the page's again.
+addEventListener('change', (event) => { if (event.target instanceof HTMLSelectElement) event.target.blur(); });
 addEventListener('keyup', (event) => { if (hand.key(event)) event.preventDefault(); });
 addEventListener('keydown', (event) => {
   if (event.ctrlKey || event.altKey || event.metaKey) return;
@@ -413,7 +439,7 @@ addEventListener('keydown', (event) => {
   // In the list of events the arrows scroll; a button, a box or a list in focus has keys of its own.
   if (!act || (event.key.startsWith('Arrow') && focused?.id === 'events')) return;
   if (event.key !== 'Escape' && (focused instanceof HTMLSelectElement || focused instanceof HTMLInputElement)) return;
-  if (event.key === ' ' && (focused instanceof HTMLButtonElement || focused instanceof HTMLElement && focused.tagName === 'SUMMARY')) return;
+  if (event.key === ' ' && focused instanceof HTMLButtonElement) return;
   event.preventDefault();
   act();
 });
@@ -424,8 +450,20 @@ showPanel(kPanels.find((one) => one === layout.get('panel')) ?? 'events');
 setInterval(show, 100);
 setInterval(() => plots.draw(), 100);
 setInterval(() => {
+  wantTicks();
   if (panel === 'scope') scope.draw();
 }, 100);
+// Into the address once it is another than at first.
+const kept = (): Record<string, string> => ({from: view?.viewpoint ?? '', channels: scope.channels, trigger: scope.setUp});
+if (layout.has('from')) view?.lookFrom(layout.get('from')!);
+scope.restore(layout.get('channels') ?? '', layout.get('trigger') ?? '');
+const atFirst = kept();
+setInterval(() => {
+  for (const [key, value] of Object.entries(kept())) {
+    atFirst[key] ||= value;
+    if (value !== (layout.get(key) ?? atFirst[key])) keep(key, value);
+  }
+}, 300);
 setInterval(() => live.draw(replay.paused), 50);
 // Where drawing is slow, without a graphics processor, it takes a quarter of the time at most: clicks come first.
 const kFrame_ms = 33;

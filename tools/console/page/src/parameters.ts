@@ -9,6 +9,7 @@ export interface Control { role: string; control: string; in_control: string; re
 
 const kHeartbeat_ms = 500;
 const number = (v: number) => String(Number(v.toPrecision(6)));
+const isSame = (a: number, b: number) => number(a) === number(b);  // the station's value went through its own unit
 
 // Why nothing can be changed now; empty: it can.
 function whyNot(control: Control | undefined, fresh: boolean): string {
@@ -26,7 +27,10 @@ const unit = (p: Parameter) => (p.unit === '1' ? '' : ` ${p.unit.replace('um', '
 const isFixed = (p: Parameter) => !(p.most > p.least);
 const range = (p: Parameter) => isFixed(p) ? 'fixed in this scene' : `${p.above_least ? 'more than ' : ''}${number(p.least)} to ${number(p.most)}${unit(p)}`;
 
-interface Row { p: Parameter; value: HTMLElement; input: HTMLInputElement; set: HTMLButtonElement; undo: HTMLButtonElement; who: HTMLElement; note: HTMLElement }
+interface Row {
+  p: Parameter; value: HTMLElement; input: HTMLInputElement; set: HTMLButtonElement; undo: HTMLButtonElement; who: HTMLElement; note: HTMLElement;
+  earlier: number[]; expected: number[];  // values before this one, the newest last; what undoing asked for
+}
 
 export class Parameters {
   all: Parameter[] = [];
@@ -49,13 +53,18 @@ export class Parameters {
     this.all = all;
     if (!same) this.make();
     this.rows.forEach((row, i) => {
-      const p = row.p = all[i]!;
+      const p = all[i]!, undone = row.expected.findIndex((one) => isSame(one, p.value));
+      if (undone >= 0) row.expected.splice(0, undone + 1);
+      else if (!isSame(p.value, row.p.value)) row.earlier.push(row.p.value);
+      row.p = p;
       row.value.textContent = `${number(p.value)}${unit(p)}`;
-      row.undo.textContent = `Back to ${number(p.before)}`;
-      row.who.textContent = p.who === 'scene' ? 'as the scene has it' : `by ${p.who} at ${p.changed_s.toFixed(1)} s`;
+      row.who.textContent = `${isFixed(p) ? '' : 'allowed: '}${range(p)}; ${p.who === 'scene' ? 'as the scene has it' : `by ${p.who} at ${p.changed_s.toFixed(1)} s`}`;
     });
     this.last = '';
   }
+
+  // The connection is another: perhaps to another station, whose values were not these before.
+  forget(): void { this.all = []; }
 
   // Several times a second.
   show(control: Control | undefined, fresh: boolean): void {
@@ -66,7 +75,7 @@ export class Parameters {
     }
     this.mine = mine;
     const mayTake = fresh && control?.role === 'operate' && control.control !== "another's";
-    const key = [why, mine, mayTake, this.problem, this.rows.map((row) => row.p.before === row.p.value)].join();
+    const key = [why, mine, mayTake, this.problem, this.rows.map((row) => row.earlier)].join(';');
     if (key === this.last) return;
     this.last = key;
     this.button.textContent = mine ? 'Give control back' : 'Take control';
@@ -74,7 +83,8 @@ export class Parameters {
     this.note.textContent = why || this.problem ? [this.problem && `${this.problem}.`, why].filter(Boolean).join(' ') : 'You have control.';
     for (const row of this.rows) {
       row.input.disabled = row.set.disabled = why !== '' || isFixed(row.p);
-      row.undo.disabled = why !== '' || row.p.before === row.p.value;
+      row.undo.disabled = why !== '' || row.earlier.length === 0;
+      row.undo.textContent = `Back to ${number(row.earlier.at(-1) ?? row.p.value)}`;
     }
   }
 
@@ -92,13 +102,24 @@ export class Parameters {
     });
   }
 
-  private change(row: Row, asked: {value: number} | {undo: true}): void {
-    row.note.textContent = '';
-    if ('value' in asked) row.note.textContent = Number.isFinite(asked.value) ? outOfRange(row.p, asked.value) : 'Not a number.';
+  private change(row: Row, value: number): void {
+    row.note.textContent = Number.isFinite(value) ? outOfRange(row.p, value) : 'Not a number.';
     if (row.note.textContent) return;
-    this.ask(row.p.name, asked, (problem) => {
+    this.ask(row.p.name, value, (problem) => {
       row.note.textContent = problem ? `${problem}.` : '';
       if (!problem) row.input.value = '';
+    });
+  }
+  // Step by step to what it was when this page came.
+  private undo(row: Row): void {
+    const value = row.earlier.pop();
+    if (value === undefined) return;
+    row.expected.push(value);
+    this.ask(row.p.name, value, (problem) => {
+      row.note.textContent = problem ? `${problem}.` : '';
+      if (!problem) return;
+      row.expected = row.expected.filter((one) => one !== value);
+      row.earlier.push(value);
     });
   }
   // What is wrong with this value, and what is allowed; empty: nothing.
@@ -106,7 +127,7 @@ export class Parameters {
     const p = this.all.find((one) => one.name === name);
     return p ? isFixed(p) ? 'It is fixed in this scene.' : outOfRange(p, value) : 'This station has no such limit.';
   }
-  ask(name: string, asked: {value: number} | {undo: true}, said: (problem: string) => void): void { this.link.call('/punctum/set', {name, ...asked}, said); }
+  ask(name: string, value: number, said: (problem: string) => void): void { this.link.call('/punctum/set', {name, value}, said); }
 
   private make(): void {
     const make = <K extends keyof HTMLElementTagNameMap>(tag: K, text = '') => {
@@ -115,19 +136,19 @@ export class Parameters {
       return element;
     };
     this.rows = this.all.map((p) => {
-      const row: Row = {p, value: make('b'), input: make('input'), set: make('button', 'Set'), undo: make('button'), who: make('span'), note: make('em')};
+      const row: Row = {p, value: make('b'), input: make('input'), set: make('button', 'Set'), undo: make('button'), who: make('span'), note: make('em'),
+        earlier: isSame(p.before, p.value) ? [] : [p.before], expected: []};
       const label = p.name.replaceAll('_', ' ');
       row.input.inputMode = 'decimal';
-      row.input.placeholder = range(p);
       row.input.setAttribute('aria-label', `new ${label}, ${range(p)}`);
       row.set.setAttribute('aria-label', `set ${label}`);
       row.input.addEventListener('keydown', (event) => {
         if (event.key === 'Escape') return;  // stops
         event.stopPropagation();
-        if (event.key === 'Enter') this.change(row, {value: this.typed(row)});
+        if (event.key === 'Enter') this.change(row, this.typed(row));
       });
-      row.set.addEventListener('click', () => this.change(row, {value: this.typed(row)}));
-      row.undo.addEventListener('click', () => this.change(row, {undo: true}));
+      row.set.addEventListener('click', () => this.change(row, this.typed(row)));
+      row.undo.addEventListener('click', () => this.undo(row));
       return row;
     });
     this.list.replaceChildren(...this.rows.map((row) => {

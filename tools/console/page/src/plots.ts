@@ -16,44 +16,57 @@ const kCharts: Series[][] = [
 ];
 const kSeries = kCharts.flat();
 const kFoot_px = 26, kSide_px = 52;  // for the numbers of the axes
+const kLow_px = 60, kLowest_px = 28;  // lower than this the legend lies on the curves; lower than that the charts scroll
+const kGap_s = 0.15;  // of real time: as long without a sample is no curve
 
-// The smallest and the largest of each of so many parts of the time: no peak is lost.
-export function decimate(times: number[], columns: number[][], points: number): number[][] {
+type Column = (number | null)[];  // null: a gap
+// The smallest and the largest of each of so many parts of the time: no peak is lost, and no gap.
+export function decimate(times: number[], columns: Column[], points: number): [number[], ...Column[]] {
   const n = times.length;
   if (n <= points) return [times, ...columns];
-  const parts = Math.floor(points / 2), out: number[][] = [[], ...columns.map(() => [])];
+  const parts = Math.floor(points / 2), outTimes: number[] = [], out = columns.map((): Column => []);
   for (let p = 0; p < parts; p++) {
-    const from = Math.floor((p * n) / parts), to = Math.floor(((p + 1) * n) / parts);
-    if (to <= from) continue;
-    out[0]!.push(times[from]!, times[to - 1]!);
-    columns.forEach((column, c) => {
-      let low = Infinity, high = -Infinity, lowAt = from, highAt = from;
-      for (let i = from; i < to; i++) {
-        if (column[i]! < low) { low = column[i]!; lowAt = i; }
-        if (column[i]! > high) { high = column[i]!; highAt = i; }
-      }
-      out[c + 1]!.push(...(lowAt <= highAt ? [low, high] : [high, low]));
-    });
+    const end = Math.floor(((p + 1) * n) / parts);
+    for (let from = Math.floor((p * n) / parts), to = from; from < end; from = to) {
+      const gap = columns[0]![from] === null;
+      while (to < end && (columns[0]![to] === null) === gap) to++;
+      outTimes.push(times[from]!, times[to - 1]!);
+      columns.forEach((column, c) => {
+        let low = Infinity, high = -Infinity, lowAt = from, highAt = from;
+        for (let i = from; i < to && !gap; i++) {
+          if (column[i]! < low) { low = column[i]!; lowAt = i; }
+          if (column[i]! > high) { high = column[i]!; highAt = i; }
+        }
+        out[c]!.push(...(gap ? [null, null] : lowAt <= highAt ? [low, high] : [high, low]));
+      });
+    }
   }
-  return out;
+  return [outTimes, ...out];
 }
 
 export interface PlotColours { line: string[]; axis: string; grid: string }
 
 export class Plots {
-  readonly drawn = {points: 0};
+  readonly drawn = {points: 0, gaps: 0};
   private times: number[] = [];
-  private columns: number[][] = kSeries.map(() => []);
+  private columns: Column[] = kSeries.map(() => []);
   private plots: uPlot[] = [];
   private frozen = false;
+  private resized = new ResizeObserver(() => this.size());
 
   constructor(private parent: HTMLElement, private colours: PlotColours) {
     this.make();
-    new ResizeObserver(() => this.size()).observe(parent);
+    this.resized.observe(parent);
   }
 
-  add(t: Telemetry): void {
-    if (this.times.length > 0 && t.t_s < this.times[this.times.length - 1]!) this.clear();  // another run
+  // speed: of a recording that is played; else 1.
+  add(t: Telemetry, speed: number): void {
+    const before_s = this.times.at(-1) ?? t.t_s;
+    if (t.t_s < before_s) this.clear();  // another run, or a recording that was turned back
+    else if (t.t_s - before_s > kGap_s * Math.max(speed, 0.1)) {
+      this.times.push((before_s + t.t_s) / 2);
+      for (const column of this.columns) column.push(null);
+    }
     this.times.push(t.t_s);
     kSeries.forEach((series, i) => this.columns[i]!.push(series.of(t)));
     if (this.times.length > kMost) {
@@ -81,11 +94,12 @@ export class Plots {
     let first = this.times.findIndex((t) => t >= end - kWindow_s);
     if (first < 0) first = 0;
     const [times, ...columns] = decimate(this.times.slice(first), this.columns.map((c) => c.slice(first)), kPoints);
-    this.drawn.points = times!.length;
+    this.drawn.points = times.length;
+    this.drawn.gaps = columns[0]!.filter((v, i, all) => v === null && all[i - 1] !== null).length;
     let at = 0;
     this.plots.forEach((plot, i) => {
       const n = kCharts[i]!.length;
-      plot.setData([times!, ...columns.slice(at, at + n)]);
+      plot.setData([times, ...columns.slice(at, at + n)]);
       at += n;
     });
   }
@@ -94,30 +108,32 @@ export class Plots {
     for (const column of [this.times, ...this.columns]) column.length = 0;
   }
 
+  // The lowest alone has the time at its foot. How many lines a legend has follows from the width.
   private size(): void {
-    this.plots.forEach((plot, i) => plot.setSize(this.room(i)));
-  }
-
-  // The lowest alone has the time at its foot.
-  private room(chart: number): {width: number; height: number} {
-    const legend = this.parent.querySelector<HTMLElement>('.u-legend')?.clientHeight || 26;
-    const all = this.parent.clientHeight - kCharts.length * legend - kFoot_px;
-    return {
-      width: Math.max(this.parent.clientWidth, 120),
-      height: Math.max(Math.floor(all / kCharts.length), 28) + (chart === kCharts.length - 1 ? kFoot_px : 0),
-    };
+    const width = this.parent.clientWidth, high = this.parent.clientHeight;
+    if (width === 0 || high === 0) return;  // another panel has the place
+    for (const plot of this.plots) plot.root.style.width = `${width}px`;
+    const part = (legends: number) => Math.floor((high - kFoot_px - legends) / kCharts.length);
+    this.parent.classList.remove('low');
+    let height = part(this.plots.reduce((sum, plot) => sum + plot.root.querySelector<HTMLElement>('.u-legend')!.offsetHeight, 0));
+    if (height < kLow_px) {
+      this.parent.classList.add('low');
+      height = Math.max(part(0), kLowest_px);
+    }
+    this.plots.forEach((plot, i) => plot.setSize({width, height: height + (i === kCharts.length - 1 ? kFoot_px : 0)}));
   }
 
   private make(): void {
     for (const plot of this.plots) plot.destroy();
-    const axis = {stroke: this.colours.axis, grid: {stroke: this.colours.grid, width: 1}, ticks: {stroke: this.colours.grid, width: 1}, font: '14px system-ui, sans-serif'};
+    const axis = {stroke: this.colours.axis, grid: {stroke: this.colours.grid, width: 1}, ticks: {stroke: this.colours.grid, width: 1}, font: '15px system-ui, sans-serif'};
     // Without a cursor the newest value is read.
-    const value = (digits: number) => (plot: uPlot, v: number | null, series: number) => {
-      const read = v ?? plot.data[series]?.at(-1);
+    const value = (digits: number) => (plot: uPlot, v: number | null, series: number, at: number | null) => {
+      const read = at === null ? plot.data[series]?.at(-1) : v;
       return read === null || read === undefined ? '–' : read.toFixed(digits);
     };
     this.plots = kCharts.map((series, chart) => new uPlot({
-      ...this.room(chart),
+      width: 120,
+      height: kLowest_px,
       padding: [8, series.length > 1 ? 0 : kSide_px, 4, 0],
       cursor: {sync: {key: 'time'}, drag: {x: false, y: false}},
       scales: {x: {time: false}},
@@ -135,9 +151,11 @@ export class Plots {
           width: 2,
           dash: k === 0 ? undefined : [6, 4],
           value: value(one.digits),
+          spanGaps: false,
         })),
       ],
     }, [[], ...series.map(() => [])] as uPlot.AlignedData, this.parent));
+    for (const plot of this.plots) this.resized.observe(plot.root.querySelector('.u-legend')!);
     this.size();
   }
 }

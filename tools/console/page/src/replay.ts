@@ -51,6 +51,11 @@ export class Replay {
       this.speed, this.time, this.note);
   }
 
+  // The connection is another: perhaps to a station.
+  forget(): void {
+    this.now = undefined;
+    this.parent.hidden = true;
+  }
   get paused(): boolean { return this.now !== undefined && !this.now.playing; }
 
   told(told: Told): void {

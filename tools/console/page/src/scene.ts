@@ -12,6 +12,7 @@ const kConeLength_um = 60, kConeAngle = Math.PI / 6;
 const kNeedle = {tip_radius_m: 4e-6, shaft_radius_m: 14e-6, taper_m: 400e-6};
 export const kNotTold: Fixtures = {cone: {alpha_rad: kConeAngle}, needle: null, floor: null, holder: null};
 const kFloor_um = 600, kFloorLines = 12;
+const kZooms = [0.2, 20] as const, kPan_um = 150;
 const kLongestArrow_um = 90, kArrow_um_per_uN = 20;
 
 export interface Colours {
@@ -23,14 +24,13 @@ const place = (v: Vector) => new THREE.Vector3(v.x * kUm, -v.y * kUm, -v.z * kUm
 const direction = (v: Vector) => new THREE.Vector3(v.x, -v.y, -v.z).normalize();
 const finite = (v?: Vector): v is Vector => v !== undefined && Number.isFinite(v.x + v.y + v.z);
 
-interface View { name: string; camera: THREE.PerspectiveCamera | THREE.OrthographicCamera }
+interface View { name: string; camera: THREE.PerspectiveCamera | THREE.OrthographicCamera; orbit: OrbitControls }
 
 export class SceneView {
-  readonly drawn = {outer: 'nothing', inner: 'nothing', forbidden: '', coneAngle: kConeAngle, arrows: 0, views: 1, frames: 0};
+  readonly drawn = {outer: 'nothing', inner: 'nothing', forbidden: '', coneAngle: kConeAngle, arrows: 0, views: 1, frames: 0, old: false};
   private renderer: THREE.WebGLRenderer;
   private scene = new THREE.Scene();
   private free = new THREE.PerspectiveCamera(35, 1, 1, 20000);
-  private orbit: OrbitControls;
   private views: View[];
   private shown = 0;  // 0: all four; 1 ..: one
   private membranes: Record<'outer' | 'inner', THREE.Mesh<THREE.BufferGeometry, THREE.MeshStandardMaterial>>;
@@ -47,6 +47,7 @@ export class SceneView {
   private dirty = true;
   private cellIsNew = true;
   private follows = false;
+  private old_s?: number;
   private tip = new THREE.Vector3();
   private newest?: Telemetry;
   private seen?: Observation;
@@ -106,19 +107,27 @@ export class SceneView {
     this.scene.add(lamp);
 
     this.free.position.set(220, 180, 520);
-    this.orbit = new OrbitControls(this.free, canvas);
-    this.orbit.addEventListener('change', () => { this.dirty = true; });
-    const flat = (x: number, y: number, z: number, up: [number, number, number]) => {
+    const view = (name: string, camera: View['camera']): View => {
+      const orbit = new OrbitControls(camera, canvas);
+      orbit.addEventListener('change', () => { this.dirty = true; });
+      return {name, camera, orbit};
+    };
+    const flat = (name: string, x: number, y: number, z: number, up: [number, number, number]): View => {
       const camera = new THREE.OrthographicCamera(-1, 1, 1, -1, 1, 20000);
       camera.position.set(x, y, z);
       camera.up.set(...up);
-      return camera;
+      const made = view(name, camera);
+      made.orbit.enableRotate = false;
+      made.orbit.mouseButtons.LEFT = THREE.MOUSE.PAN;
+      made.orbit.touches.ONE = THREE.TOUCH.PAN;
+      [made.orbit.minZoom, made.orbit.maxZoom] = kZooms;
+      return made;
     };
     this.views = [
-      {name: 'free', camera: this.free},
-      {name: 'microscope', camera: flat(0, 0, 2000, [0, 1, 0])},
-      {name: 'from above', camera: flat(0, 2000, 0, [0, 0, -1])},
-      {name: 'along the needle', camera: flat(2000, 0, 0, [0, 1, 0])},
+      view('free', this.free),
+      flat('microscope', 0, 0, 2000, [0, 1, 0]),
+      flat('from above', 0, 2000, 0, [0, 0, -1]),
+      flat('along the needle', 2000, 0, 0, [0, 1, 0]),
     ];
     this.show(1);
     this.paint(colours);
@@ -129,12 +138,14 @@ export class SceneView {
     this.scene.background = new THREE.Color(colours.background);
     for (const which of ['outer', 'inner'] as const) {
       const material = this.membranes[which].material;
-      material.color.set(colours[which]);
-      material.emissive.set(colours[which]).multiplyScalar(0.55);
+      const colour = this.old_s === undefined ? colours[which] : colours.guide;
+      material.color.set(colour);
+      material.emissive.set(colour).multiplyScalar(0.55);
     }
     this.needleGlass.material.color.set(colours.needle);
     this.tipMark.material.color.set(colours.tip);
-    this.holder.material.color.set(colours.holder);
+    this.holder.material.color.set(this.old_s === undefined ? colours.holder : colours.guide);
+    this.holder.material.opacity = this.old_s === undefined ? 0.5 : 0.2;
     this.cone.material.color.set(colours.guide);
     this.axisLine.material.color.set(colours.guide);
     this.colours = colours;
@@ -147,34 +158,71 @@ export class SceneView {
   show(view: number): void {
     this.shown = view;
     this.drawn.views = view === 0 ? 4 : 1;
-    this.orbit.enabled = view <= 1;
+    this.views.forEach((one, i) => { one.orbit.enabled = i === Math.max(view, 1) - 1; });
     const names = view === 0 ? this.views : [this.views[view - 1]!];
     this.labels.replaceChildren(...names.map((one) => {
       const label = document.createElement('span');
-      label.textContent = one.name;
+      label.textContent = one.name + (this.old_s === undefined ? '' : `; cell and holder as they were ${this.old_s.toFixed(1)} s ago`);
       return label;
     }));
     this.labels.classList.toggle('four', view === 0);
     this.dirty = true;
   }
 
+  // How old is what vision saw, where that is too old to be taken for now.
+  age(old_s: number | undefined): void {
+    if (old_s?.toFixed(1) === this.old_s?.toFixed(1)) return;
+    this.old_s = old_s;
+    this.drawn.old = old_s !== undefined;
+    this.show(this.shown);
+    this.paint(this.colours);
+  }
+
   follow(on: boolean): void {
     this.follows = on;
+    if (!on) for (const one of this.views.slice(1)) this.lookAt(one, new THREE.Vector3());
+    this.dirty = true;
+  }
+  private lookAt(one: View, target: THREE.Vector3): void {
+    one.camera.position.add(target).sub(one.orbit.target);
+    one.orbit.target.copy(target);
+  }
+  private get led(): View { return this.views[Math.max(this.shown, 1) - 1]!; }
+
+  // Where the free view looks from, as a link has it: degrees around and from the zenith, micrometres away.
+  get viewpoint(): string {
+    const place = new THREE.Spherical().setFromVector3(this.free.position.clone().sub(this.views[0]!.orbit.target));
+    return [THREE.MathUtils.radToDeg(place.theta), THREE.MathUtils.radToDeg(place.phi), place.radius].map((v) => v.toFixed(0)).join('_');
+  }
+  lookFrom(viewpoint: string): void {
+    const [around, down, far] = viewpoint.split('_').map(Number), target = this.views[0]!.orbit.target;
+    if (!Number.isFinite(around! + down! + far!) || far! <= 0) return;
+    const [theta, phi] = [THREE.MathUtils.degToRad(around!), THREE.MathUtils.degToRad(Math.min(Math.max(down!, 3), 177))];
+    this.free.position.setFromSpherical(new THREE.Spherical(far, phi, theta)).add(target);
     this.dirty = true;
   }
 
+  // What is seen flat is moved instead.
   turn(around: number, up: number): void {
-    const from = this.free.position.clone().sub(this.orbit.target);
+    const {camera, orbit} = this.led;
+    if (camera instanceof THREE.OrthographicCamera) {
+      this.lookAt(this.led, new THREE.Vector3(around, -up, 0).multiplyScalar(kPan_um / camera.zoom).applyQuaternion(camera.quaternion).add(orbit.target));
+      this.dirty = true;
+      return;
+    }
+    const from = this.free.position.clone().sub(orbit.target);
     const place = new THREE.Spherical().setFromVector3(from);
     place.theta += around;
     place.phi = Math.min(Math.max(place.phi + up, 0.05), Math.PI - 0.05);
-    this.free.position.setFromSpherical(place).add(this.orbit.target);
-    this.orbit.update();
+    this.free.position.setFromSpherical(place).add(orbit.target);
+    orbit.update();
     this.dirty = true;
   }
 
   zoom(factor: number): void {
-    this.free.position.sub(this.orbit.target).multiplyScalar(factor).add(this.orbit.target);
+    const {camera, orbit} = this.led;
+    if (camera instanceof THREE.OrthographicCamera) camera.zoom = Math.min(Math.max(camera.zoom / factor, kZooms[0]), kZooms[1]);
+    else camera.position.sub(orbit.target).multiplyScalar(factor).add(orbit.target);
     this.dirty = true;
   }
 
@@ -263,25 +311,16 @@ export class SceneView {
 
   private draw(view: View, x: number, y: number, width: number, height: number): void {
     const camera = view.camera;
-    if (camera instanceof THREE.PerspectiveCamera) {
-      camera.aspect = width / height;
-      if (this.follows) {
-        camera.position.add(this.tip).sub(this.orbit.target);
-        this.orbit.target.copy(this.tip);
-      }
-      camera.lookAt(this.orbit.target);
-    } else {
-      const centre = this.follows ? this.tip : new THREE.Vector3();
+    if (this.follows) this.lookAt(view, this.tip);
+    if (camera instanceof THREE.PerspectiveCamera) camera.aspect = width / height;
+    else {
       const half = this.follows ? 70 : 170, aspect = width / height;
       camera.left = -half * Math.max(aspect, 1);
       camera.right = half * Math.max(aspect, 1);
       camera.top = half / Math.min(aspect, 1);
       camera.bottom = -half / Math.min(aspect, 1);
-      const from = camera.position.clone().sub((camera.userData['centre'] as THREE.Vector3 | undefined) ?? new THREE.Vector3());
-      camera.userData['centre'] = centre.clone();
-      camera.position.copy(centre).add(from);
-      camera.lookAt(centre);
     }
+    camera.lookAt(view.orbit.target);
     camera.updateProjectionMatrix();
     this.renderer.setScissorTest(true);
     this.renderer.setViewport(x, y, width, height);

@@ -1,10 +1,11 @@
 // A triggered scope: up to 16 quantities of every tick, from before the trigger on.
 import type {Telemetry, Vector} from './wire';
 
-export interface ScopeColours { line: string; axis: string; grid: string; mark: string; ground: string }
+export interface ScopeColours { line: string; axis: string; grid: string; mark: string }
 interface Channel { name: string; unit: string; of: (t: Telemetry) => number; steps?: boolean }
 
 const kCapacity = 1 << 16, kMost = 16;
+const kLabel = 0.45;  // of the width at most, where labels stand beside the curves
 const kWindows_s = [0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5], kBefore = [0.1, 0.5, 0.9];
 const norm = (v?: Vector) => (v ? Math.hypot(v.x, v.y, v.z) : 0);
 const of3 = (name: string, unit: string, scale: number, of: (t: Telemetry) => Vector | undefined): Channel[] =>
@@ -38,6 +39,9 @@ function channels(effects: string[]): Channel[] {
   ];
 }
 
+// As a link has it.
+const plain = (name: string) => name.replaceAll(' ', '-');
+
 type Edge = 'rises' | 'falls' | 'changes';
 interface Shown { times: Float64Array; ticks: Float64Array; columns: Float64Array[]; begin_s: number; length_s: number; zero_s: number }
 
@@ -54,6 +58,9 @@ export class Scope {
   private from = 0;    // of the same run and without a jump back
   private at = -1;     // sample of the trigger
   private held = false;
+  private left = 0;   // where the curves begin, in pixels
+  private wantedChannels: string[] = [];
+  private wantedSource = 'needle-force';  // both of a link, until it is known what there is
   private cursor = -1;  // sample of what is shown
   private dirty = true;
   private source: HTMLSelectElement; private edge: HTMLSelectElement; private level: HTMLInputElement;
@@ -90,15 +97,16 @@ export class Scope {
     this.note = document.createElement('span');
     this.note.setAttribute('role', 'status');
     this.list = document.createElement('div');
-    const which = document.createElement('details'), title = document.createElement('summary');
-    title.textContent = 'Quantities';
-    which.append(title, this.list);
+    this.list.id = 'scope-list';
+    this.list.popover = 'auto';
+    const which = button('Quantities', () => {});
+    which.popoverTargetElement = this.list;
     const row = document.createElement('p');
     row.append(this.mode, this.source, this.edge, this.level, this.window, this.before, this.arm, button('Save as CSV', () => this.save()), which, this.note);
     this.canvas = document.createElement('canvas');
     this.canvas.tabIndex = 0;
     this.canvas.addEventListener('pointermove', (event) => this.point(event.offsetX));
-    parent.append(row, this.canvas);
+    parent.append(row, this.list, this.canvas);
     new ResizeObserver(() => { this.dirty = true; }).observe(this.canvas);
   }
 
@@ -107,19 +115,45 @@ export class Scope {
     if (this.all.length > 0) return;
     this.all = channels(effects);
     this.columns = this.all.map(() => new Float64Array(kCapacity));
-    this.source.replaceChildren(...this.all.map((c, i) => new Option(c.name, String(i), i === 1, i === 1)));
+    const index = (name: string) => this.all.findIndex((c) => plain(c.name) === name), found = index(this.wantedSource), source = found < 0 ? 1 : found;
+    this.source.replaceChildren(...this.all.map((c, i) => new Option(c.name, String(i), i === source, i === source)));
+    const wanted = this.wantedChannels.map(index).filter((i) => i >= 0).slice(0, kMost).sort((a, b) => a - b);
+    if (wanted.length > 0) this.chosen = wanted;
     this.list.replaceChildren(...this.all.map((c, i) => {
       const label = document.createElement('label'), box = document.createElement('input');
       box.type = 'checkbox';
       box.checked = this.chosen.includes(i);
       box.addEventListener('change', () => {
         this.chosen = box.checked ? [...this.chosen, i].sort((a, b) => a - b) : this.chosen.filter((one) => one !== i);
-        for (const other of this.list.querySelectorAll('input')) other.disabled = !other.checked && this.chosen.length >= kMost;
+        this.full();
         this.dirty = true;
       });
       label.append(box, ` ${c.name}${c.unit ? ` [${c.unit}]` : ''}`);
       return label;
     }));
+    this.full();
+  }
+  private full(): void {
+    for (const other of this.list.querySelectorAll('input')) other.disabled = !other.checked && this.chosen.length >= kMost;
+  }
+
+  // It waits for its trigger, or fills what it shows after it.
+  get holds(): boolean { return this.mode.value !== 'free' && this.held; }
+  get armed(): boolean { return this.mode.value !== 'free' && !this.held; }
+  // What is set up, as a link has it: the quantities; when, of what, edge, level, length, part before.
+  get channels(): string { return this.all.length > 0 ? this.chosen.map((i) => plain(this.all[i]!.name)).join('_') : this.wantedChannels.join('_'); }
+  get setUp(): string {
+    const source = this.all.length > 0 ? plain(this.all[Number(this.source.value)]!.name) : this.wantedSource;
+    return [this.mode.value, source, this.edge.value, this.threshold(), this.window.value, this.before.value].join('_');
+  }
+  restore(channels: string, setUp: string): void {
+    const [mode, source, edge, level, window, before] = setUp.split('_');
+    this.wantedChannels = channels.split('_');
+    this.wantedSource = source || this.wantedSource;
+    if (level !== undefined && Number.isFinite(Number(level))) this.level.value = level;
+    for (const [element, value] of [[this.mode, mode], [this.edge, edge], [this.window, window], [this.before, before]] as const) {
+      if ([...element.options].some((o) => o.value === value)) element.value = value!;
+    }
   }
 
   add(samples: Telemetry[], lost: number): void {
@@ -177,7 +211,7 @@ export class Scope {
 
   private point(x: number): void {
     if (!this.shown) return;
-    const part = Math.min(Math.max(x / this.canvas.clientWidth, 0), 1), n = this.shown.times.length;
+    const part = Math.min(Math.max((x - this.left) / (this.canvas.clientWidth - this.left), 0), 1), n = this.shown.times.length;
     const at = this.shown.begin_s + part * this.shown.length_s;
     let i = 0;
     while (i < n - 1 && this.shown.times[i]! < at) i++;
@@ -220,8 +254,8 @@ export class Scope {
   draw(): void {
     if (this.all.length === 0) return;
     const free = this.mode.value === 'free';
-    this.source.disabled = this.edge.disabled = this.before.disabled = this.arm.disabled = free;
-    this.level.disabled = free || this.edge.value === 'changes';
+    for (const one of [this.source, this.edge, this.before, this.arm]) one.hidden = free;
+    this.level.hidden = free || this.edge.value === 'changes';
     this.level.setAttribute('aria-invalid', String(!Number.isFinite(this.threshold())));
     if (free && this.count > this.from) {
       const end = this.times[(this.count - 1) % kCapacity]!;
@@ -240,21 +274,23 @@ export class Scope {
     this.canvas.height = height * ratio;
     const c = this.canvas.getContext('2d')!;
     c.scale(ratio, ratio);
-    const font = Math.round(0.78 * parseFloat(getComputedStyle(document.body).fontSize)), foot = Math.round(1.4 * font);
+    const font = Math.round(0.83 * parseFloat(getComputedStyle(document.body).fontSize)), foot = Math.round(1.4 * font);
     c.font = `${font}px system-ui, sans-serif`;
     const lane = (height - foot) / Math.max(this.chosen.length, 1), s = this.shown;
     const begin = s?.begin_s ?? 0, length = s?.length_s ?? this.window_s, left = s ? s.zero_s - begin : 0;
-    const x = (t: number) => ((t - begin) / length) * width;
+    const rows = this.chosen.map((which) => this.row(which, s)), above = lane > 2.4 * font;
+    this.left = above ? 0 : Math.min(24 * Math.ceil((Math.max(...rows.map((row) => c.measureText(row.short).width), 0) + 12) / 24), kLabel * width);
+    const x = (t: number) => this.left + ((t - begin) / length) * (width - this.left);
     c.strokeStyle = this.colours.grid;
     c.fillStyle = this.colours.axis;
     for (let k = 0; k <= 10; k++) {
-      const at = (k / 10) * width;
+      const at = this.left + (k / 10) * (width - this.left);
       c.beginPath();
       c.moveTo(at, 0);
       c.lineTo(at, height - foot);
       c.stroke();
       c.textAlign = k === 0 ? 'left' : k === 10 ? 'right' : 'center';
-      if (k % (width > 560 ? 2 : 5) === 0) c.fillText(`${(((k / 10) * length - left) * 1e3).toFixed(0)} ms`, at, height - 5);
+      if (k % (width - this.left > 560 ? 2 : width - this.left > 260 ? 5 : 10) === 0) c.fillText(`${(((k / 10) * length - left) * 1e3).toFixed(0)} ms`, at, height - 5);
     }
     c.textAlign = 'left';
     this.chosen.forEach((which, row) => {
@@ -264,25 +300,12 @@ export class Scope {
       c.moveTo(0, top + lane);
       c.lineTo(width, top + lane);
       c.stroke();
-      let low = Infinity, high = -Infinity;
-      const column = s?.columns[which] ?? new Float64Array();
-      for (const v of column) {
-        if (v < low) low = v;
-        if (v > high) high = v;
-      }
-      const text = lane > 2.4 * font ? font + 2 : 0, room = lane - text - 4, span = high > low ? high - low : 1;
+      const {column, low, high, short, range} = rows[row]!, text = above ? font + 2 : 0, room = lane - text - 4, span = high > low ? high - low : 1;
       const y = (v: number) => top + text + 2 + room * (high > low ? 1 - (v - low) / span : 0.5);
-      if (s) this.trace(c, s, column, x, y, width, channel.steps ?? false);
-      const digits = Math.max(0, Math.min(4, 3 - Math.floor(Math.log10(Math.max(Math.abs(low), Math.abs(high), 1e-3)))));
-      const number = (v: number) => (Number.isFinite(v) ? v.toFixed(channel.steps ? 0 : digits) : '–');
-      const read = this.cursor >= 0 && column.length > this.cursor ? column[this.cursor]! : column.at(-1) ?? NaN;
-      const label = `${channel.name}: ${number(read)} ${channel.unit}   (${number(low)} to ${number(high)})`;
-      c.fillStyle = this.colours.ground;
-      c.globalAlpha = 0.7;
-      c.fillRect(2, top + 2, c.measureText(label).width + 6, font + 1);
-      c.globalAlpha = 1;
+      if (s) this.trace(c, s, column, x, y, width - this.left, channel.steps ?? false);
       c.fillStyle = this.colours.axis;
-      c.fillText(label, 4, top + font);
+      if (above) c.fillText(`${short}   ${range}`, 4, top + font);
+      else c.fillText(short, 4, top + lane / 2 + 0.35 * font, this.left - 8);
     });
     c.strokeStyle = this.colours.mark;
     const line = (at: number, dash: number[]) => {
@@ -295,6 +318,19 @@ export class Scope {
     if (s && !free) line(x(s.zero_s), [4, 4]);
     if (s && this.cursor >= 0 && this.cursor < s.times.length) line(x(s.times[this.cursor]!), []);
     c.setLineDash([]);
+  }
+
+  private row(which: number, s?: Shown): {column: Float64Array; low: number; high: number; short: string; range: string} {
+    const channel = this.all[which]!, column = s?.columns[which] ?? new Float64Array();
+    let low = Infinity, high = -Infinity;
+    for (const v of column) {
+      if (v < low) low = v;
+      if (v > high) high = v;
+    }
+    const digits = Math.max(0, Math.min(4, 3 - Math.floor(Math.log10(Math.max(Math.abs(low), Math.abs(high), 1e-3)))));
+    const number = (v: number) => (Number.isFinite(v) ? v.toFixed(channel.steps ? 0 : digits) : '–');
+    const read = this.cursor >= 0 && column.length > this.cursor ? column[this.cursor]! : column.at(-1) ?? NaN;
+    return {column, low, high, short: `${channel.name}: ${number(read)} ${channel.unit}`, range: `(${number(low)} to ${number(high)})`};
   }
 
   // Of each column of the screen the lowest and the highest: no peak is lost. A tick that is missing is a gap.

@@ -1,4 +1,4 @@
-// The station as sound: force as pitch, contact, puncture and alarm, each distinct.
+// The station as sound: force as pitch; contact, puncture, an alarm, a latched fault and data that stop coming, each distinct.
 
 export const kLowest_Hz = 180, kHighest_Hz = 900, kFullForce_N = 3;
 // Equal steps of force are equal intervals.
@@ -8,7 +8,7 @@ export function pitchOf(force_N: number): number {
 }
 const loudness = (force_N: number) => (force_N < 0.02 ? 0 : Math.min(0.02 + force_N * 0.05, 0.12));
 
-export type Cue = 'contact' | 'puncture' | 'alarm';
+export type Cue = 'contact' | 'puncture' | 'warning' | 'alarm' | 'stale';
 
 function beep(context: BaseAudioContext, at_s: number, from_Hz: number, to_Hz: number, for_s: number, loud: number, type: OscillatorType): void {
   const tone = context.createOscillator(), gain = context.createGain();
@@ -28,6 +28,10 @@ export function playCue(context: BaseAudioContext, cue: Cue, at_s: number): void
     beep(context, at_s, 1200, 1000, 0.06, 0.3, 'square');
   } else if (cue === 'puncture') {  // a falling pop
     beep(context, at_s, 700, 90, 0.4, 0.5, 'triangle');
+  } else if (cue === 'warning') {  // a rising sweep
+    beep(context, at_s, 330, 700, 0.3, 0.4, 'triangle');
+  } else if (cue === 'stale') {  // two low, long tones
+    for (const k of [0, 1]) beep(context, at_s + 0.45 * k, 220, 200, 0.4, 0.4, 'square');
   } else {  // two tones, twice
     for (const k of [0, 1, 2, 3]) beep(context, at_s + 0.18 * k, k % 2 === 0 ? 880 : 660, k % 2 === 0 ? 880 : 660, 0.16, 0.4, 'square');
   }

@@ -28,7 +28,7 @@ export class Target {
     if (this.chosen_um === undefined) return;
     const asked_um = this.chosen_um;
     this.chosen_um = undefined;
-    this.parameters.ask(kParameter, {value: asked_um}, (problem) => this.say(problem ? `${problem}.` : `Asked for ${asked_um.toFixed(kDecimals)} µm.`));
+    this.parameters.ask(kParameter, asked_um, (problem) => this.say(problem ? `${problem}.` : `Asked for ${asked_um.toFixed(kDecimals)} µm.`));
   }
 
   // Several times a second. seen: the picture is shown.

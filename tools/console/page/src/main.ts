@@ -140,13 +140,22 @@ function onTelemetry(t: Telemetry): void {
   }
 }
 
+// As it was given.
+function commandValue(e: Event): string {
+  const is = e.command === undefined ? '' : word('CommandKind', e.command), value = Number(e.value.toPrecision(6));
+  if (is === 'depth limit') return ` ${Number((1e6 * e.value).toPrecision(6))} µm`;
+  if (is === 'hand force limit') return ` ${value} N`;
+  if (is === 'effect gain') return ` of ${link.state.effects[e.target] ?? e.target} ${value}`;
+  return is.endsWith('scale') ? ` ${value}` : '';
+}
+
 function eventText(e: Event): [text: string, kind: string] {
   const what = e.fault !== undefined ? word('Fault', e.fault) : e.alarm !== undefined ? word('Alarm', e.alarm)
     : e.phase !== undefined ? word('Phase', e.phase) : e.command !== undefined ? word('CommandKind', e.command)
     : e.end !== undefined ? word('RunEnd', e.end) : '';
   const kind = word('Event.Kind', e.kind);
   const who = kind.startsWith('command') ? (e.writer === 1 ? ' from the console' : ' from the parent') : '';
-  return [`${kind}: ${what}${who}`, kind === 'fault' ? 'bad' : kind === 'alarm on' || kind === 'command refused' ? 'warning' : ''];
+  return [`${kind}: ${what}${commandValue(e)}${who}`, kind === 'fault' ? 'bad' : kind === 'alarm on' || kind === 'command refused' ? 'warning' : ''];
 }
 
 function onEvent(e: Event): void {

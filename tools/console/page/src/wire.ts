@@ -29,7 +29,7 @@ export interface Fixtures {
   floor: null | {z_m: number}; holder: null | {mouth_m: [number, number, number]; axis: [number, number, number]; radius_m: number};
 }
 export interface Event {
-  tick: number; t_s: number; kind: number; value: number; writer: number;
+  tick: number; t_s: number; kind: number; value: number; target: number; writer: number;
   fault?: number; alarm?: number; phase?: number; command?: number; end?: number;
 }
 

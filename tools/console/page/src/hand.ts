@@ -15,7 +15,8 @@ const kWays: Record<string, [axis: number, sign: number]> = {
 const kPad: Record<number, Button> = {5: 'hold', 0: 'inject', 4: 'clutch', 3: 'next'};
 
 // What to do next, for somebody who does it for the first time.
-export function nextStep(t: Telemetry, taken: boolean, holds: boolean): string {
+// opened: the injector was open since the membranes gave way.
+export function nextStep(t: Telemetry, taken: boolean, holds: boolean, opened: boolean): string {
   const kNotEnabled = 1 << 13, kRefused = 1 << 14;
   if (!taken) return 'Take the hand: click the button or press H. Then the mouse moves the needle, in the directions of the picture.';
   const kReleased = 17;
@@ -25,8 +26,10 @@ export function nextStep(t: Telemetry, taken: boolean, holds: boolean): string {
   switch (t.phase) {
     case 0: case 1: return 'Move left to the cell, straight at its middle.';
     case 2: return 'Push on, until both membranes give way.';
-    case 3: return t.alarms & kRefused ? 'Not yet: let inject go, push on a little, and press it again.' : 'Press inject: the right button, or I.';
-    case 4: return t.injector_open ? 'Keep inject pressed.' : 'Draw back to the right.';
+    case 3: case 4:
+      if (t.injector_open) return 'Keep inject pressed.';
+      if (opened) return 'Draw back to the right.';
+      return t.alarms & kRefused ? 'Not yet: let inject go, push on a little, and press it again.' : 'Press inject: the right button, or I.';
     case 5: return 'Draw back to the right, out of the cell.';
     default: return 'Done: the run ends by itself.';
   }

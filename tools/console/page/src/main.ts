@@ -106,6 +106,7 @@ const kPanels = ['events', 'scope', 'timing', 'parameters'] as const;
 type Panel = (typeof kPanels)[number];
 let panel: Panel | undefined;
 let newest: Telemetry | undefined, state: State | undefined;
+let opened = false;  // the injector, since the membranes gave way
 let tick = -1, tickAt = -Infinity;  // when a new tick last came
 let stopAsked = -1, stopProblem = '';
 let warnedAt = -Infinity, wasStale = true;
@@ -119,6 +120,7 @@ function isStale(): boolean { return !replay.paused && performance.now() - tickA
 function onTelemetry(t: Telemetry): void {
   const before = newest;
   newest = t;
+  opened = t.injector_open || opened && (t.phase === 3 || t.phase === 4);
   if (t.tick !== tick) {
     tick = t.tick;
     tickAt = performance.now();
@@ -241,7 +243,7 @@ function showHand(): void {
   by('take-hand').setAttribute('aria-pressed', String(hand.taken));
   by('take-hand').firstChild!.textContent = hand.taken ? 'Give the hand back' : 'Take the hand';
   by<HTMLButtonElement>('take-hand').disabled = state.role !== 'operate' || state.control === "another's";
-  say('hand-step', newest ? nextStep(newest, hand.taken, hand.holds) : '');
+  say('hand-step', newest ? nextStep(newest, hand.taken, hand.holds, opened) : '');
   if (state.control === "another's") say('hand-note', `${state.in_control} has it.`);
 }
 by('take-hand').addEventListener('click', takeHand);

@@ -74,6 +74,16 @@ int run(int argc, char** argv) {
   }
   const std::string& recording = recordings.front();
   std::string ends;
+  bool refused = false;
+  // What cannot be made does not keep the rest from being made.
+  const auto made = [&](const tl::expected<std::string, std::string>& exported) {
+    if (!exported) {
+      refused = true;
+      complain("punctum-export: " + exported.error());
+    } else {
+      ends = *exported;
+    }
+  };
   if (!overview.empty()) {
     std::vector<RunFacts> runs;
     std::size_t unreadable = 0;
@@ -105,40 +115,26 @@ int run(int argc, char** argv) {
   }
   if (!csv.empty()) {
     const auto exported = export_csv(recording, csv);
-    if (!exported) {
-      return refuse(exported.error());
+    if (exported) {
+      say(fmt::format("{}: {} ticks, {} events, {} observations\n", csv, exported->ticks, exported->events,
+                      exported->observations));
     }
-    say(fmt::format("{}: {} ticks, {} events, {} observations\n", csv, exported->ticks, exported->events,
-                    exported->observations));
-    ends = exported->ends;
+    made(exported.map([](const auto& counts) { return counts.ends; }));
   }
   if (!hdf5.empty()) {
-    const auto exported = export_hdf5(recording, hdf5);
-    if (!exported) {
-      return refuse(exported.error());
-    }
-    ends = *exported;
+    made(export_hdf5(recording, hdf5));
   }
   if (!surface.empty()) {
-    const auto exported = export_surface(recording, surface, at_s);
-    if (!exported) {
-      return refuse(exported.error());
-    }
-    ends = *exported;
+    made(export_surface(recording, surface, at_s));
   }
   if (!png.empty()) {
-    const auto exported = export_png(recording, png);
-    if (!exported) {
-      return refuse(exported.error());
-    }
-    ends = *exported;
+    made(export_png(recording, png));
   }
   if (!tiff.empty()) {
-    const auto exported = export_ome_tiff(recording, tiff);
-    if (!exported) {
-      return refuse(exported.error());
-    }
-    ends = *exported;
+    made(export_ome_tiff(recording, tiff));
+  }
+  if (refused) {
+    return exit_bad_input;
   }
   if (!ends.empty()) {
     complain("punctum-export: " + ends);

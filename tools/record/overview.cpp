@@ -43,11 +43,17 @@ class Reading {
     facts_.seconds = t.t_s();
     facts_.hand_force_N = std::max(facts_.hand_force_N, length(t.force_n()));
     cells_.insert(t.cell());
+    if (t.phase() == v1::PHASE_CONTACT && before_ != v1::PHASE_CONTACT && before_ != v1::PHASE_INDENTATION) {
+      touched_s_ = t.t_s();
+    }
     if (t.phase() == v1::PHASE_PUNCTURE && before_ == v1::PHASE_INDENTATION) {
       facts_.punctures.push_back(last_);
     }
     if (t.phase() == v1::PHASE_INDENTATION) {
-      last_ = {.t_s = t.t_s(), .depth_m = t.wd_m(), .needle_force_N = t.tip_force_n()};
+      last_ = {.t_s = t.t_s(),
+               .pressed_s = t.t_s() - touched_s_,
+               .depth_m = t.wd_m(),
+               .needle_force_N = t.tip_force_n()};
     }
     if (t.injector_open()) {
       injected_.insert(t.cell());
@@ -97,6 +103,7 @@ class Reading {
   RunFacts::Puncture last_;
   std::set<std::uint32_t> cells_, injected_;
   std::uint64_t ticks_ = 0;
+  double touched_s_ = 0;
   v1::Phase before_ = v1::PHASE_FREE;
   bool was_lost_ = false;
 };
@@ -110,9 +117,9 @@ double mean(const std::vector<RunFacts::Puncture>& all, double RunFacts::Punctur
 }
 
 // Its cells in the order of kColumns; an empty one is not known.
-constexpr std::array kColumns = {"recording",   "scene",    "seed",       "seconds",      "cells",
-                                 "injected",    "lost",     "puncture_s", "depth_um",     "needle_uN",
-                                 "hand_N",      "fault",    "end",        "missed_ticks", "wake_p999_us",
+constexpr std::array kColumns = {"recording",   "scene",    "seed",      "seconds",      "cells",
+                                 "injected",    "lost",     "pressed_s", "depth_um",     "needle_uN",
+                                 "hand_N",      "fault",    "end",       "missed_ticks", "wake_p999_us",
                                  "wake_max_us", "not_told", "whole"};
 using Cells = std::array<std::string, kColumns.size()>;
 Cells cells_of(const RunFacts& r) {
@@ -129,7 +136,7 @@ Cells cells_of(const RunFacts& r) {
           std::to_string(r.cells),
           std::to_string(r.injected),
           known(r.lost_cells),
-          of_punctures(&RunFacts::Puncture::t_s, 1),
+          of_punctures(&RunFacts::Puncture::pressed_s, 1),
           of_punctures(&RunFacts::Puncture::depth_m, 1e-6),
           of_punctures(&RunFacts::Puncture::needle_force_N, 1e-6),
           fmt::format("{:.3g}", r.hand_force_N),
@@ -257,14 +264,14 @@ tl::expected<void, std::string> write_overview(const std::vector<RunFacts>& runs
     }
   }
   std::string lines = fmt::format("{}\n", fmt::join(kColumns, ","));
-  std::string each = "recording,t_s,depth_um,needle_uN\n";
+  std::string each = "recording,t_s,pressed_s,depth_um,needle_uN\n";
   for (const RunFacts& r : runs) {
     Cells row = cells_of(r);
     std::transform(row.begin(), row.end(), row.begin(), quoted);
     fmt::format_to(std::back_inserter(lines), "{}\n", fmt::join(row, ","));
     for (const auto& p : r.punctures) {
-      fmt::format_to(std::back_inserter(each), "{},{:.9g},{:.9g},{:.9g}\n", quoted(r.recording), p.t_s,
-                     p.depth_m * 1e6, p.needle_force_N * 1e6);
+      fmt::format_to(std::back_inserter(each), "{},{:.9g},{:.9g},{:.9g},{:.9g}\n", quoted(r.recording), p.t_s,
+                     p.pressed_s, p.depth_m * 1e6, p.needle_force_N * 1e6);
     }
   }
   if (auto written = write_whole(table, lines); !written) {

@@ -13,7 +13,7 @@ namespace punctum::tools {
 struct RunFacts {
   // Of a cell whose membrane was punctured: the last tick before.
   struct Puncture {
-    double t_s = 0, depth_m = 0, needle_force_N = 0;
+    double t_s = 0, pressed_s = 0, depth_m = 0, needle_force_N = 0;  // pressed: since the needle touched
   };
   std::string recording, scene;
   std::optional<std::uint64_t> seed;

@@ -268,6 +268,9 @@ void StationRecorder::close_chunk() {
   if (file_.failure().empty()) {
     tell_state();
     file_.close_chunk();
+    if (file_.failure().empty()) {
+      written_ = counts_;
+    }
     sync_->want();
   }
 }

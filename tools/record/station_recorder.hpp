@@ -47,8 +47,9 @@ class StationRecorder {
   void finish();
 
   [[nodiscard]] bool core_has_ended() const noexcept { return ended_; }  // by its own last word
+  // Messages in whole chunks.
   [[nodiscard]] std::uint64_t count(Stream stream) const noexcept {
-    return counts_[static_cast<std::size_t>(stream)];
+    return written_[static_cast<std::size_t>(stream)];
   }
   [[nodiscard]] v1::Loss loss() const;
   [[nodiscard]] bool lost_nothing() const;
@@ -82,7 +83,7 @@ class StationRecorder {
   mcap::Writer file_;
   std::unique_ptr<DiskSync> sync_;
   std::array<std::uint16_t, kStreams> channels_{};
-  std::array<std::uint64_t, kStreams> counts_{};
+  std::array<std::uint64_t, kStreams> counts_{}, written_{};  // taken; of these in whole chunks
   const rt::CoreSegment& core_;
   sim::SimConfig sim_;
   std::int64_t utc_ns_;  // its time less the station's

@@ -274,7 +274,8 @@ std::string recorded_run(const std::filesystem::path& folder, bool whole = true)
       file->message(truth, tick, tick, w.SerializeAsString());
     }
   };
-  ticks(v1::PHASE_FREE, 0, 5);
+  ticks(v1::PHASE_FREE, 0, 3);
+  ticks(v1::PHASE_CONTACT, 0, 2);
   ticks(v1::PHASE_INDENTATION, 0, 12);
   ticks(v1::PHASE_PUNCTURE, 0, 3);
   ticks(v1::PHASE_INJECTION, 0, 4, true);
@@ -328,7 +329,7 @@ TEST_F(ExportTest, many_runs_stand_side_by_side) {
                                     {"cells", 2},
                                     {"injected", 1},
                                     {"lost", 1},
-                                    {"puncture_s", 0.16},
+                                    {"pressed_s", 0.13},
                                     {"depth_um", 12},
                                     {"needle_uN", 3},
                                     {"hand_N", 1},

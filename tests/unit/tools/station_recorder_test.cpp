@@ -431,6 +431,7 @@ TEST_F(StationRecorderTest, a_full_disk_ends_the_recording_and_is_told) {
   r->finish();
   has_room_again();
   EXPECT_EQ(read().ticks.size(), kept);
+  EXPECT_EQ(r->count(Stream::telemetry), kept);
 }
 
 TEST_F(StationRecorderTest, the_last_word_of_the_core_ends_it) {

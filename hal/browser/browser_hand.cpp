@@ -35,7 +35,7 @@ std::uint32_t BrowserHand::follow(const Fingers& now) NONBLOCKING {
   constexpr std::uint32_t kButtons =
       hal::kButtonClutch | hal::kButtonInject | hal::kButtonNextCell | hal::kButtonEnable;
   const bool same = now.session == session_;
-  let_go_ = let_go_ && same;  // since this session began
+  let_go_ = let_go_ && same;  // since it was taken
   double way_m[3] = {};
   for (std::size_t i = 0; i < 3; ++i) {
     way_m[i] = same ? now.moved_m[i] - moved_m_[i] : 0;

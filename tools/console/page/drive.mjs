@@ -418,10 +418,14 @@ async function all() {
     await pressed(' ', (at) => Math.abs(punctum.scope.triggered - at) < 0.01, contact);
     await until('the page says so', async () => /caught/.test(await text('show-scope')));
     await page.waitForFunction(() => /trigger=single_phase_changes/.test(location.hash));
-    await page.goto(link.replace('#', `#t=${contact.toFixed(3)}&view=5&panel=events&`));
-    await page.reload();
-    await page.waitForFunction((at) => punctum.replay && !punctum.replay.playing && Math.abs(punctum.replay.now_s - at) < 0.01, contact);
-    assert.ok(await page.locator('#live').isVisible());
+    // By somebody who has no token.
+    const other = await (await browser.newContext({viewport: {width: 640, height: 480}})).newPage();
+    other.setDefaultTimeout(kSlow_ms);
+    await other.goto(link.replace(/#.*/, `#t=${contact.toFixed(3)}&view=5&panel=events`));
+    await other.waitForFunction((at) => punctum.replay && !punctum.replay.playing && Math.abs(punctum.replay.now_s - at) < 0.01, contact);
+    assert.equal(await other.evaluate(() => punctum.state.role), 'view');
+    assert.ok(await other.locator('#live').isVisible());
+    await other.context().close();
     replay.kill('SIGINT');
     await replay.over;
   });

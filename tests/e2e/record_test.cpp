@@ -246,11 +246,14 @@ TEST_F(Recordings, bad_input_is_one_line) {
 TEST_F(Recordings, runs_stand_side_by_side_as_their_reports_say) {
   std::vector<std::string> recordings;
   for (const char* name : {"one", "two"}) {
-    const int code = punctum({"run", "icsi", "--clock", "virtual", "--set", "vision.method=truth", "--seed",
-                              name == std::string("one") ? "3" : "8", "--record"},
-                             name);
-    // The virtual clock waits for no recorder: on a busy machine it says what it missed of vision.
-    ASSERT_TRUE(code == 0 || said_.find(" observations likewise") != std::string::npos) << said_;
+    // The virtual clock waits for no recorder: on a busy machine it may miss something, and says so.
+    int code = 1;
+    for (int tries = 0; tries < 5 && code != 0; ++tries) {
+      code = punctum({"run", "icsi", "--clock", "virtual", "--set", "vision.method=truth", "--seed",
+                      name == std::string("one") ? "3" : "8", "--record", "--overwrite"},
+                     name);
+    }
+    ASSERT_EQ(code, 0) << said_;
     recordings.push_back(report(name) + "/recording.mcap");
   }
   recordings.emplace_back("/dev/null");

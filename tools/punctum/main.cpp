@@ -188,7 +188,7 @@ int main_or_throw(int argc, char** argv) {
   if (given("--seed")) {
     overrides.push_back("scene.seed=" + seed);
   }
-  const auto scene = load_scene(scene_name, overrides);
+  auto scene = load_scene(scene_name, overrides);
   if (!scene) {
     return bad(scene.error());
   }
@@ -219,6 +219,9 @@ int main_or_throw(int argc, char** argv) {
   settings.figure = !no_figure;
   // Its hand is on the page.
   settings.console = settings.console || scene->devices.haptic == kBrowser;
+  if (settings.console && scene->vision && scene->vision->method != punctum::vision::Method::truth) {
+    scene->vision->surface = true;  // which the page draws
+  }
   return run_scene(*scene, settings);
 }
 

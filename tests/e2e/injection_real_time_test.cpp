@@ -167,6 +167,7 @@ TEST_F(Programs, vision_that_hangs_or_that_somebody_ends_is_started_again_and_th
   EXPECT_NE(r["vision_restarts"][1]["why"].get<std::string>().find("hung"), std::string::npos);
 }
 
+#ifndef PUNCTUM_SANITIZED  // vision is too slow there to be in time
 // In three phases of one run: before the cell, in it, and on the way out.
 TEST_F(Programs, vision_that_is_stopped_for_five_seconds_and_goes_on_finds_everything_again) {
   Running run(slow_injection({"--set", kPatientRelay, "--report", report(), "--no-figure", "--no-frames"}),
@@ -199,6 +200,7 @@ TEST_F(Programs, vision_that_is_stopped_for_five_seconds_and_goes_on_finds_every
     expect_everything_found(obs, t_s + 0.2);  // after a picture that was waiting
   }
 }
+#endif
 
 TEST_F(Programs, frames_that_show_nothing_most_of_the_time_are_no_run_that_is_done) {
   const fs::path frames = folder_ / "frames";

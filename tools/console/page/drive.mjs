@@ -371,7 +371,9 @@ async function all() {
     await page.locator('#replay input').fill('0');
     await page.waitForFunction(() => punctum.replay.now_s === 0);
     await page.evaluate(() => document.activeElement.blur());
-    await pressed('n', () => punctum.replay.now_s > 0 && punctum.newest.phase === 1);
+    for (let at = 0, phase = 0; phase !== 1; [at, phase] = await page.evaluate(() => [punctum.replay.now_s, punctum.newest.phase])) {
+      await pressed('n', (before) => punctum.replay.now_s > before && Math.abs(punctum.newest.t_s - punctum.replay.now_s) < 0.01, at);  // other marks may come before the contact
+    }
     await page.waitForFunction(() => punctum.drawn.plots.gaps > 0);
     const contact = await page.evaluate(() => punctum.replay.now_s);
     await page.waitForTimeout(1500);
@@ -437,6 +439,9 @@ async function all() {
     await page.goto('about:blank');
     await page.goto(`${link}&view=5&panel=events`);
     await page.waitForFunction(() => punctum.drawn.live.tip && punctum.parameters.length > 4);
+    await page.keyboard.press('1');
+    await page.waitForFunction(() => punctum.drawn.scene?.outer === 'surface' && punctum.drawn.scene.inner === 'surface');
+    await page.keyboard.press('5');
     const note = () => text('target-note');
     // So deep past the membrane, which is the gap that vision measured ahead of the tip; without a depth the tip itself. The gap.
     const at = async (depth_um) => {

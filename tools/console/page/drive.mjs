@@ -441,11 +441,10 @@ async function all() {
       '--report', 'target', '--no-figure', '--no-frames', '--quiet']);
     const link = await until('the address is printed', () => /http:\S+/.exec(seen.said)?.[0]);
     await page.goto('about:blank');
-    await page.goto(`${link}&view=5&panel=events`);
-    await page.waitForFunction(() => punctum.drawn.live.tip && punctum.parameters.length > 4);
-    await page.keyboard.press('1');
+    await page.goto(`${link}&view=1&panel=events`);
     await page.waitForFunction(() => punctum.drawn.scene?.outer === 'surface' && punctum.drawn.scene.inner === 'surface');
     await page.keyboard.press('5');
+    await page.waitForFunction(() => punctum.drawn.live.tip && punctum.parameters.length > 4);
     const note = () => text('target-note');
     // So deep past the membrane, which is the gap that vision measured ahead of the tip; without a depth the tip itself. The gap.
     const at = async (depth_um) => {

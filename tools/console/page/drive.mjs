@@ -621,10 +621,10 @@ async function all() {
     });
     await own.over;
     const report = JSON.parse(readFileSync(join(folder, 'own/report.json'), 'utf8'));
-    // What was asked for while the injector might not open yet counts as asked: the dose may fall short of that.
+    // What was asked for while the injector might not open yet counts as asked, and late vision shuts it: the dose may fall short of that.
     assert.equal(report.cells.done + report.cells.injected_in_part, 1, own.said);
     assert.equal(report.cells.lost, 0);
-    assert.ok(Number(/dose +([\d.]+) s/.exec(own.said)[1]) >= 0.5, own.said);
+    assert.ok(Number(/dose +([\d.]+) s/.exec(own.said)[1]) >= 0.1, own.said);
   });
   await step('whoever loses the connection while pushing has let go: the station stops by itself, and does not go on by itself', async () => {
     const own = await ownHand('cut', page);

@@ -33,7 +33,7 @@ show_failure() {
   else
     cut -c1-400 "$log" | tail -n 60
     failed_expectations "$log" || true
-  fi >&2
+  fi | sed 's/^/  /' >&2 # so that no line of it is taken for one of the step's caller
 }
 
 # step NAME WHAT LOG COMMAND...: runs COMMAND with its output in LOG; returns its exit code.

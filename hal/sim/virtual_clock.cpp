@@ -52,7 +52,7 @@ void VirtualClock::sleep_until_ns(std::int64_t t_ns) noexcept {
   Waiting for_recorder(bail_out_ns_);
   while (!stop_.load(std::memory_order_relaxed) &&
          bench_.recorder_attached.load(std::memory_order_acquire) != 0 &&
-         bench_.snapshots.head() - bench_.recorder_cursor.load(std::memory_order_acquire) >= kSnapshots / 2) {
+         bench_.snapshots.head() - bench_.recorder_cursor.load(std::memory_order_acquire) >= kMostAhead) {
     if (!for_recorder.pause()) {
       bench_.recorder_attached.store(0, std::memory_order_release);
       bench_.recorder_gave_up.fetch_add(1, std::memory_order_relaxed);

@@ -12,7 +12,7 @@ namespace punctum::sim {
 
 // The core's side: the owner of time. sleep_until_ns() moves time to t and then waits, and waits only there:
 // until every exposure due by t has been delivered, while a camera is attached, and until the recorder is
-// within half a ring, while one is attached. Each wait ends after bail_out_ns of real time; whoever was
+// within kMostAhead ticks, while one is attached. Each wait ends after bail_out_ns of real time; whoever was
 // waited for then counts as detached.
 class VirtualClock final : public hal::Clock {
  public:

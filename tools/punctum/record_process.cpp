@@ -27,6 +27,20 @@ tl::expected<void, std::string> RecordProcess::add(const char* name, const hal::
   return {};
 }
 
+tl::expected<void, std::string> RecordProcess::tell_progress(const std::string& station) {
+  auto progress = hal::Shared<const RecordProgress>::create(station + "." + kProgressSegment);
+  if (!progress) {
+    return tl::unexpected(progress.error());
+  }
+  progress_ = std::move(*progress);
+  handed_.add(kProgressSegment, progress_->segment().descriptor());
+  return {};
+}
+
+std::uint64_t RecordProcess::taken() const noexcept {
+  return progress_ && child_.running() ? (*progress_)->taken.load(std::memory_order_acquire) : UINT64_MAX;
+}
+
 tl::expected<void, std::string> RecordProcess::start(const std::string& station, const hal::Descriptor& scene,
                                                      const std::string& folder) {
   handed_.add(kSceneText, scene.number());

@@ -60,11 +60,10 @@ Recorder::Recorder(RowFile file, const std::string& folder, const Scene& scene, 
   }
 }
 
-std::uint64_t Recorder::drain(bool to_the_end) {
-  // What a ring holds is the most that a writer which is gone has left, and no round takes more.
-  const std::uint64_t most = to_the_end ? rt::TelemetryRing::kSize : kMostTicksPerRound;
+std::uint64_t Recorder::drain(std::uint64_t until) {
   std::uint64_t taken = 0;
-  while (taken < most && telemetry_.next(sample_) == hal::Read::ok) {
+  while (taken < kMostTicksPerRound && telemetry_.position() < until &&
+         telemetry_.next(sample_) == hal::Read::ok) {
     ++taken;
     if (usable(sample_)) {
       record(sample_, world_of(sample_));
@@ -79,11 +78,6 @@ std::uint64_t Recorder::drain(bool to_the_end) {
   }
   events_.lost = event_ring_.lost();
   flush_now_and_then();
-  if (taker_ && to_the_end) {
-    sim::Snapshot rest;
-    for (std::uint64_t i = 0; i < sim::kSnapshots && taker_->next(rest); ++i) {
-    }
-  }
   return taken;
 }
 
@@ -185,7 +179,13 @@ void Recorder::row(Table& table, const rt::TelemetrySample& s, const sim::Snapsh
 }
 
 void Recorder::finish() {
-  drain(true);
+  // What a ring holds is the most that a writer which is gone has left.
+  for (std::uint64_t taken = 0, now = 1; now > 0 && taken < rt::TelemetryRing::kSize; taken += now) {
+    now = drain();
+  }
+  sim::Snapshot rest;
+  for (std::uint64_t i = 0; taker_ && i < sim::kSnapshots && taker_->next(rest); ++i) {
+  }
   measures_.finish();
   flush(samples_, measures_.last_s);
   flush(fault_, measures_.last_s);

@@ -30,8 +30,9 @@ class Recorder {
                                                     const rt::CoreSegment& core, sim::Bench* bench,
                                                     std::uint64_t every);
 
-  // Takes what is there; returns the number of ticks taken. `to_the_end`: the writers are gone.
-  std::uint64_t drain(bool to_the_end = false);
+  // Takes what is there of the first `until` ticks; returns the number of ticks taken.
+  std::uint64_t drain(std::uint64_t until = UINT64_MAX);
+  [[nodiscard]] std::uint64_t position() const noexcept { return telemetry_.position(); }
 
   // As after a fault, where the core died and latched none.
   void keep_last_seconds();

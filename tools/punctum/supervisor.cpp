@@ -339,6 +339,7 @@ class Run {
   [[nodiscard]] const rt::CoreStatus& status() const { return segments_.core->status; }
   void watch_vision();
   [[nodiscard]] tl::expected<void, std::string> start_recording();
+  [[nodiscard]] std::uint64_t may_take() const;
   void note_recording(const std::string& why);
   void tell_faults();
   void watch_recording();
@@ -460,7 +461,7 @@ int Run::refuse(const std::string& why) {
 
 Ended Run::watch_until_the_core_ends() {
   for (Ended ended;;) {
-    const std::uint64_t taken = recorder_.drain();
+    const std::uint64_t taken = recorder_.drain(may_take());
     if (core_.ended(ended)) {
       return ended;
     }
@@ -501,7 +502,17 @@ tl::expected<void, std::string> Run::start_recording() {
   if (added && segments_.pictures) {
     added = record_.add(kPictureSegment, segments_.pictures->segment());
   }
+  if (added && scene_.clock == ClockKind::virtual_time) {
+    added = record_.tell_progress(segments_.station);
+  }
   return added ? record_.start(segments_.station, resolved_, folder_) : added;
+}
+
+// In virtual time the core waits for the recorder, and the recorder for the recording, unless that was waited
+// for in vain.
+std::uint64_t Run::may_take() const {
+  const bool in_vain = segments_.bench && (*segments_.bench)->recorder_gave_up.load() != 0;
+  return in_vain ? UINT64_MAX : record_.taken();
 }
 
 void Run::note_recording(const std::string& why) {
@@ -587,7 +598,7 @@ void Run::tell_faults() {
 void Run::watch_recording() {
   const std::uint64_t recorded = recorder_.measures().ticks;
   const std::uint64_t ticks = status().ticks.load();
-  if (recorded != recorded_ || ticks == ticks_at_record_) {
+  if (recorded != recorded_ || ticks == ticks_at_record_ || recorder_.position() >= may_take()) {
     recorded_ = recorded;
     ticks_at_record_ = ticks;
     recorded_s_ = now_s();

@@ -20,6 +20,7 @@
 #include "tools/shared/command_line.hpp"
 #include "tools/shared/exit_codes.hpp"
 #include "tools/shared/program_start.hpp"
+#include "tools/shared/record_progress.hpp"
 #include "tools/shared/say.hpp"
 #include "tools/shared/station_segments.hpp"
 #include "tools/shared/stop_signal.hpp"
@@ -43,6 +44,7 @@ struct Mapped {
   std::optional<hal::Shared<const sim::Bench>> bench;
   std::optional<hal::Shared<const rt::InputSegment>> inputs;
   std::optional<hal::Shared<const rt::PictureSegment>> pictures;
+  std::optional<hal::Shared<RecordProgress>> progress;  // for writing; none: nobody waits for this recorder
 };
 
 template <class T>
@@ -99,6 +101,13 @@ tl::expected<Mapped, std::string> map_station(const Options& options) {
   if (mapped) {
     mapped = map(kPictureSegment, descriptor(kPictureSegment), m.pictures);
   }
+  if (mapped && handed.descriptor(kProgressSegment) >= 0) {
+    auto progress = hal::Shared<RecordProgress>::claim(kProgressSegment, handed.descriptor(kProgressSegment));
+    if (!progress) {
+      return tl::unexpected(progress.error());
+    }
+    m.progress = std::move(*progress);
+  }
   if (!mapped) {
     return tl::unexpected(mapped.error());
   }
@@ -110,12 +119,16 @@ bool is_gone(std::uint64_t pid) {
 }
 
 // Until the core has ended or died, somebody says stop, or nothing can be written any more.
-void record(StationRecorder& recorder, const rt::CoreStatus& core, ClockKind clock) {
+void record(StationRecorder& recorder, const rt::CoreStatus& core, ClockKind clock,
+            RecordProgress* progress) {
   constexpr std::chrono::milliseconds kBetweenRounds{2}, kBetweenLooks{200};
   constexpr std::uint64_t kBusyRound = 64;
   for (auto next_look = std::chrono::steady_clock::now();
        stop_signal::count() == 0 && !recorder.core_has_ended();) {
     const std::uint64_t taken = recorder.drain();
+    if (progress != nullptr) {
+      progress->taken.store(recorder.position(), std::memory_order_release);
+    }
     if (!recorder.failure().empty()) {
       return;
     }
@@ -202,12 +215,14 @@ int run(int argc, char** argv) {
                                  .observation = mapped->observation ? mapped->observation->get() : nullptr,
                                  .bench = mapped->bench ? mapped->bench->get() : nullptr,
                                  .inputs = mapped->inputs ? mapped->inputs->get() : nullptr,
-                                 .pictures = mapped->pictures ? &(*mapped->pictures)->ring : nullptr};
+                                 .pictures = mapped->pictures ? &(*mapped->pictures)->ring : nullptr,
+                                 .from_the_first_tick = !options.segments.empty()};
   auto recorder = StationRecorder::create(options.out, recorded, *scene);
   if (!recorder) {
     return refuse(recorder.error());
   }
-  record(**recorder, recorded.core.status, scene->clock);
+  record(**recorder, recorded.core.status, scene->clock,
+         mapped->progress ? mapped->progress->get() : nullptr);
   (*recorder)->finish();
   say(summary(options.out, **recorder));
   if (const std::string& failure = (*recorder)->failure(); !failure.empty()) {

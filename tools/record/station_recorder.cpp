@@ -20,7 +20,10 @@ constexpr std::uint64_t kTicksAtATime = 64;  // then the rings that are short
 
 // A quarter of the ring ahead of the writer, who goes on meanwhile.
 template <class Ring>
-hal::Follower<Ring> follow(const Ring& ring) {
+hal::Follower<Ring> follow(const Ring& ring, const RecordedStation& station) {
+  if (station.from_the_first_tick) {
+    return hal::Follower<Ring>(ring);
+  }
   const std::uint64_t head = ring.head(), room = Ring::kSize - Ring::kSize / 4;
   return hal::Follower<Ring>(ring, head > room ? head - room : 0);
 }
@@ -59,24 +62,26 @@ StationRecorder::StationRecorder(mcap::Writer file, const RecordedStation& stati
       sim_(scene.sim.value_or(sim::SimConfig{})),
       utc_ns_(utc_ns),
       period_ns_(static_cast<std::uint64_t>(std::llround(1e9 / scene.servo.rate_Hz))),
-      telemetry_(follow(station.core.telemetry)),
-      events_(follow(station.core.events)),
+      telemetry_(follow(station.core.telemetry, station)),
+      events_(follow(station.core.events, station)),
       world_of_tick_(static_cast<std::int64_t>(period_ns_)) {
   if (station.observation != nullptr) {
-    observations_ = std::make_unique<hal::Follower<rt::ObservationSlot>>(follow(station.observation->slot));
-    surfaces_ = std::make_unique<hal::Follower<rt::SurfaceSlot>>(follow(station.observation->surface));
+    observations_ =
+        std::make_unique<hal::Follower<rt::ObservationSlot>>(follow(station.observation->slot, station));
+    surfaces_ =
+        std::make_unique<hal::Follower<rt::SurfaceSlot>>(follow(station.observation->surface, station));
   }
   if (station.bench != nullptr) {
-    snapshots_ = std::make_unique<hal::Follower<SnapshotRing>>(follow(station.bench->snapshots));
+    snapshots_ = std::make_unique<hal::Follower<SnapshotRing>>(follow(station.bench->snapshots, station));
   }
   if (station.inputs != nullptr) {
     inputs_ring_ = &station.inputs->ring;
-    inputs_ = std::make_unique<hal::Follower<rt::InputRing>>(follow(*inputs_ring_));
+    inputs_ = std::make_unique<hal::Follower<rt::InputRing>>(follow(*inputs_ring_, station));
   }
   if (station.pictures != nullptr) {
     picture_ring_ = station.pictures;
-    pictures_ =
-        std::make_unique<hal::Follower<rt::PictureSegment::Ring::Heads>>(follow(picture_ring_->heads()));
+    pictures_ = std::make_unique<hal::Follower<rt::PictureSegment::Ring::Heads>>(
+        follow(picture_ring_->heads(), station));
   }
   for (std::size_t i = 0; i < kStreams; ++i) {
     channels_[i] = file_.add_channel(file_.add_schema(kTopics[i].schema, "protobuf", wire_schema()),

@@ -1,6 +1,5 @@
 // Takes what a station tells and writes it into an MCAP file, live: telemetry, simulated truth, the tick's
-// inputs, observations, surfaces, events and the core's status. It maps the station for reading and nobody
-// waits for it; what was overwritten before it came to it is counted and written, too. The file is never more
+// inputs, observations, surfaces, events and the core's status. It maps the station for reading; what was overwritten before it came to it is counted and written, too. The file is never more
 // than about half a second behind.
 #pragma once
 
@@ -33,16 +32,19 @@ struct RecordedStation {
   const sim::Bench* bench;                             // null: nothing is simulated
   const rt::InputSegment* inputs = nullptr;            // null: the core does not tell what it was given
   const rt::PictureSegment::Ring* pictures = nullptr;  // null: vision does not tell what it looked at
+  bool from_the_first_tick = false;                    // else from what the rings still hold on
 };
 
 class StationRecorder {
  public:
-  // From what the rings still hold on. The error is one line.
+  // The error is one line.
   [[nodiscard]] static tl::expected<std::unique_ptr<StationRecorder>, std::string> create(
       const std::string& path, const RecordedStation& station, const Scene& scene);
 
   // Takes what is there; returns the number of ticks taken.
   std::uint64_t drain();
+  // Ticks that it has taken or lost, and with them all that was told before the last of them.
+  [[nodiscard]] std::uint64_t position() const noexcept { return telemetry_.position(); }
   // Takes the rest and ends the file.
   void finish();
 

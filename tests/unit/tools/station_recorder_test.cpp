@@ -52,9 +52,16 @@ class StationRecorderTest : public FullDisk {
     core_->status.period_ns.store(1'000'000);
   }
   [[nodiscard]] std::string path() const { return (folder_ / "r.mcap").string(); }
-  [[nodiscard]] std::unique_ptr<StationRecorder> recorder(const sim::Bench* bench = nullptr) const {
-    auto r =
-        StationRecorder::create(path(), {"free-1", "[scene]\n", *core_, observation_.get(), bench}, scene_);
+  [[nodiscard]] std::unique_ptr<StationRecorder> recorder(const sim::Bench* bench = nullptr,
+                                                          bool from_the_first_tick = false) const {
+    auto r = StationRecorder::create(path(),
+                                     {.name = "free-1",
+                                      .scene = "[scene]\n",
+                                      .core = *core_,
+                                      .observation = observation_.get(),
+                                      .bench = bench,
+                                      .from_the_first_tick = from_the_first_tick},
+                                     scene_);
     EXPECT_TRUE(r) << r.error();
     return std::move(*r);
   }
@@ -338,6 +345,20 @@ TEST_F(StationRecorderTest, what_was_overwritten_before_it_was_read_is_counted_a
   EXPECT_GE(lost.observations(), 6U);
   EXPECT_EQ(lost.surfaces() + all.surfaces.size(), rt::SurfaceSlot::kSize + 6);
   EXPECT_FALSE(r->lost_nothing());
+}
+
+TEST_F(StationRecorderTest, what_came_before_it_had_begun_is_lost_only_where_all_is_wanted) {
+  tick(rt::TelemetryRing::kSize + 500);
+  auto all = recorder(nullptr, true);
+  all->finish();
+  EXPECT_EQ(all->loss().telemetry() + all->count(Stream::telemetry), rt::TelemetryRing::kSize + 500);
+  EXPECT_FALSE(all->lost_nothing());
+  EXPECT_EQ(all->position(), rt::TelemetryRing::kSize + 500);
+  fs::remove(path());
+  auto joined = recorder();
+  joined->finish();
+  EXPECT_GT(joined->count(Stream::telemetry), rt::TelemetryRing::kSize / 2);
+  EXPECT_TRUE(joined->lost_nothing());
 }
 
 TEST_F(StationRecorderTest, a_sample_that_names_what_does_not_exist_is_counted_and_not_written) {

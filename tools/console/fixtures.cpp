@@ -7,7 +7,7 @@ namespace punctum::console {
 std::string fixtures_json(const rt::ServoConfig& config) {
   using nlohmann::ordered_json;
   const auto vector = [](const hal::Vec3& v) { return ordered_json{v.x(), v.y(), v.z()}; };
-  ordered_json all = {{"cone", nullptr}, {"needle", nullptr}, {"floor", nullptr}, {"holder", nullptr}};
+  ordered_json all = ordered_json::object();
   if (config.cone) {
     all["cone"] = {{"alpha_rad", config.cone->alpha_rad}};
   }

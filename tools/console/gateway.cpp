@@ -49,10 +49,16 @@ constexpr const char* kWireVersion = "1";
 // What a client offers beside the protocol's name to say who it is; a page can set no other header.
 constexpr std::string_view kTokenProtocol = "punctum.token.";
 enum Service : std::uint32_t { stop_service = 1, control_service, set_service, replay_service, hand_service };
-constexpr std::array kServices = {
-    std::pair{stop_service, "/punctum/stop"}, std::pair{control_service, "/punctum/control"},
-    std::pair{set_service, "/punctum/set"}, std::pair{replay_service, "/punctum/replay"},
-    std::pair{hand_service, "/punctum/hand"}};
+struct Offered {
+  Service id;
+  const char *name, *request;  // with its schema's name
+};
+constexpr std::array<Offered, 5> kServices = {
+    {{stop_service, "/punctum/stop", "punctum.v1.StopRequest"},
+     {control_service, "/punctum/control", "punctum.v1.ControlRequest"},
+     {set_service, "/punctum/set", "punctum.v1.SetRequest"},
+     {replay_service, "/punctum/replay", "punctum.v1.ReplayRequest"},
+     {hand_service, "/punctum/hand", "punctum.v1.HandRequest"}}};
 constexpr int kSendBuffer_bytes = 64 * 1024;  // what the kernel keeps for a client that does not read
 
 // A client that is so far behind is told no pictures: they would only push out what is newer.
@@ -118,39 +124,44 @@ std::string server_info(const std::string& station) {
       .dump();
 }
 
+// Of messages that are JSON, as JSON Schema.
+std::string json_schema(std::string_view name) {
+  const json all = json::parse(json_schemas());
+  return all.at(std::string(name.substr(name.rfind('.') + 1))).dump();
+}
+
 std::string advertisement() {
   const std::string schema = base64(tools::wire_schema());
   json channels = json::array();
   for (std::size_t i = 0; i < kChannels.size(); ++i) {
     const Channel& c = kChannels[i];
-    const bool has_schema = *c.schema_name != '\0';
-    json channel = {{"id", i},
-                    {"topic", c.topic},
-                    {"encoding", c.encoding},
-                    {"schemaName", c.schema_name},
-                    {"schema", has_schema ? schema : ""}};
-    if (has_schema) {
-      channel["schemaEncoding"] = "protobuf";
-    }
-    channels.push_back(std::move(channel));
+    const bool is_json = std::string_view(c.encoding) == "json";
+    channels.push_back({{"id", i},
+                        {"topic", c.topic},
+                        {"encoding", c.encoding},
+                        {"schemaName", c.schema_name},
+                        {"schemaEncoding", is_json ? "jsonschema" : "protobuf"},
+                        {"schema", is_json ? json_schema(c.schema_name) : schema}});
   }
   return json{{"op", "advertise"}, {"channels", std::move(channels)}}.dump();
 }
 
 std::string services() {
-  const json any = {{"encoding", "json"},
-                    {"schemaName", ""},
-                    {"schemaEncoding", "jsonschema"},
-                    {"schema", R"({"type":"object"})"}};
+  const auto described = [](const char* schema) {
+    return json{{"encoding", "json"},
+                {"schemaName", schema},
+                {"schemaEncoding", "jsonschema"},
+                {"schema", json_schema(schema)}};
+  };
   json list = json::array();
-  for (const auto& [id, name] : kServices) {
+  for (const auto& [id, name, request] : kServices) {
     list.push_back({{"id", static_cast<std::uint32_t>(id)},
                     {"name", name},
                     {"type", ""},
                     {"requestSchema", ""},
                     {"responseSchema", ""},
-                    {"request", any},
-                    {"response", any}});
+                    {"request", described(request)},
+                    {"response", described("punctum.v1.Done")}});
   }
   return json{{"op", "advertiseServices"}, {"services", std::move(list)}}.dump();
 }

@@ -29,6 +29,7 @@
 PUNCTUM_EMBED(html, "index.html");
 PUNCTUM_EMBED(js, "page.js");
 PUNCTUM_EMBED(css, "page.css");
+PUNCTUM_EMBED(schemas, "../../messages.schema.json");
 
 namespace punctum::console {
 
@@ -40,5 +41,7 @@ std::span<const PageFile> page_files() {
   }};
   return files;
 }
+
+std::string_view json_schemas() { return {punctum_page_schemas, punctum_page_schemas_size}; }
 
 }  // namespace punctum::console

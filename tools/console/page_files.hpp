@@ -1,4 +1,5 @@
-// The built page (tools/console/page/built), which is part of the program.
+// Files that are parts of the program: the built page (tools/console/page/built), and the schemas of JSON
+// messages.
 #pragma once
 
 #include <span>
@@ -12,5 +13,7 @@ struct PageFile {
   std::string_view bytes;
 };
 [[nodiscard]] std::span<const PageFile> page_files();
+// messages.schema.json: a JSON Schema for each name.
+[[nodiscard]] std::string_view json_schemas();
 
 }  // namespace punctum::console

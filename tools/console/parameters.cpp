@@ -108,7 +108,8 @@ std::string Parameters::json() const {
                     {"who", p.who},
                     {"changed_s", p.changed_s}});
   }
-  return list.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return nlohmann::json{{"parameters", std::move(list)}}.dump(-1, ' ', false,
+                                                              nlohmann::json::error_handler_t::replace);
 }
 
 }  // namespace punctum::console

@@ -430,8 +430,6 @@ std::string StationFeed::state_in_words() const {
     if (fault_at_s_) {
       s["fault"]["t_s"] = *fault_at_s_;
     }
-  } else {
-    s["fault"] = nullptr;
   }
   s["alarms"] = nlohmann::json::array();
   for (std::size_t bit = 0; bit < std::size(rt::kAlarmNames); ++bit) {

@@ -31,7 +31,7 @@ namespace punctum::console {
 struct Channel {
   const char* topic;
   const char* encoding;     // of its messages
-  const char* schema_name;  // in the schema of tools/wire; empty: none
+  const char* schema_name;  // in the schema of tools/wire, or in messages.schema.json
 };
 enum ChannelId : std::uint8_t {
   telemetry,
@@ -52,12 +52,12 @@ inline constexpr std::array<Channel, 11> kChannels = {{
     {"/punctum/surface", "protobuf", "punctum.v1.CellSurface"},
     {"/punctum/event", "protobuf", "punctum.v1.Event"},
     {"/punctum/status", "protobuf", "punctum.v1.Status"},
-    {"/punctum/state", "json", ""},  // what an operator reads, in words
-    {"/punctum/parameters", "json", ""},
+    {"/punctum/state", "json", "punctum.v1.State"},  // what an operator reads, in words
+    {"/punctum/parameters", "json", "punctum.v1.Parameters"},
     {"/punctum/ticks", "protobuf", "punctum.v1.Ticks"},
     {"/punctum/picture", "protobuf", "punctum.v1.Picture"},
-    {"/punctum/replay", "json", ""},  // of a recording that is played
-    {"/punctum/fixtures", "json", ""},
+    {"/punctum/replay", "json", "punctum.v1.Replay"},  // of a recording that is played
+    {"/punctum/fixtures", "json", "punctum.v1.Fixtures"},
 }};
 using ChannelSet = std::bitset<kChannels.size()>;
 

@@ -1,6 +1,7 @@
 // Drives the page in a browser as an operator would: node drive.mjs BIN [SCREENSHOTS]. BIN: the folder of the built programs.
 // What must hold stands in each step's name. A machine without a graphics processor draws a frame in a second or so:
 // nothing here depends on how fast frames come.
+import Ajv from 'ajv';
 import {build} from 'esbuild';
 import {chromium} from 'playwright-core';
 import assert from 'node:assert/strict';
@@ -319,6 +320,43 @@ async function all() {
     stdin: {contents: "export {FoxgloveClient} from '@foxglove/ws-protocol'", resolveDir: here},
     bundle: true, format: 'iife', globalName: 'foxglove', write: false, logLevel: 'error',
   })).outputFiles[0].text;
+  // By another's client: the first message of each of these channels, which are JSON, held to the schema that came with it.
+  const schemas = {};
+  const conform = async (at, topics) => {
+    await page.evaluate(foreign);
+    const told = await page.evaluate(([address, wanted]) => new Promise((done, failed) => {
+      const {FoxgloveClient} = foxglove, client = new FoxgloveClient({ws: new WebSocket(address, [FoxgloveClient.SUPPORTED_SUBPROTOCOL])});
+      const of = new Map(), got = {services: []};
+      client.on('error', (error) => failed(new Error(String(error.message ?? error))));
+      client.on('advertiseServices', (services) => { got.services = services; });
+      client.on('advertise', (channels) => channels.filter((c) => wanted.includes(c.topic)).forEach((c) => of.set(client.subscribe(c.id), c)));
+      client.on('message', ({subscriptionId, data}) => {
+        const {topic, encoding, schemaEncoding, schema} = of.get(subscriptionId);
+        got[topic] ??= {encoding, schemaEncoding, schema, message: new TextDecoder().decode(data)};
+        if (wanted.some((one) => !got[one])) return;
+        client.close();
+        done(got);
+      });
+    }), [at, topics]);
+    for (const topic of topics) {
+      const {encoding, schemaEncoding, schema, message} = told[topic];
+      assert.deepEqual([encoding, schemaEncoding], ['json', 'jsonschema']);
+      schemas[topic] = new Ajv({strict: true}).compile(JSON.parse(schema));
+      assert.ok(schemas[topic](JSON.parse(message)), `${topic}: ${JSON.stringify(schemas[topic].errors)}: ${message}`);
+    }
+    return told;
+  };
+  await step('what is JSON is as its own schema says, which a validator that is not ours compiles; services tell theirs', async () => {
+    const told = await conform(`ws://127.0.0.1:${port}/`, ['/punctum/state', '/punctum/parameters', '/punctum/fixtures']);
+    const fits = schemas['/punctum/state'], state = JSON.parse(told['/punctum/state'].message);
+    for (const key of Object.keys(state)) assert.ok(!fits({...state, [key]: undefined}), `${key} may be missing`);
+    assert.ok(!fits({...state, more: 1}));
+    assert.ok(JSON.parse(told['/punctum/parameters'].message).parameters.length > 4 && JSON.parse(told['/punctum/fixtures'].message).cone);
+    const requests = Object.fromEntries(told.services.map((s) => [s.name, new Ajv({strict: true}).compile(JSON.parse(s.request.schema))]));
+    assert.deepEqual(Object.keys(requests).sort(), ['control', 'hand', 'replay', 'set', 'stop'].map((name) => `/punctum/${name}`));
+    assert.ok(requests['/punctum/set']({name: 'force_scale', value: 1}) && !requests['/punctum/set']({value: 1}));
+    assert.ok(requests['/punctum/hand']({moved_m: [0, 0, 0], hold: true}) && !requests['/punctum/hand']({moved_m: [0, 0]}));
+  });
   await step("Foxglove's own client reads the channels, and protoc the messages by the schema that came with them", async () => {
     await page.evaluate(foreign);
     const got = await page.evaluate(async (at) => {
@@ -367,6 +405,7 @@ async function all() {
     await page.waitForFunction(() => punctum.state?.fault?.name === 'command_stop');
     await until('the banner says so', async () => /STOP.*command stop/.test(await text('banner-title')));
     assert.match(await text('banner-clears'), /It clears: not in this run/);
+    assert.ok(schemas['/punctum/state'](await page.evaluate(() => punctum.state)), JSON.stringify(schemas['/punctum/state'].errors));
     await shoot('stopped', 1280, 720);
     await run.over;
     const report = JSON.parse(readFileSync(join(folder, 'run/report.json'), 'utf8'));
@@ -386,6 +425,7 @@ async function all() {
     await page.goto('about:blank');  // the address before differs in its last part alone
     await page.goto(link);
     await page.waitForFunction(() => punctum.replay?.playing && punctum.newest?.tick > 0);
+    await conform(`ws://127.0.0.1:${/:(\d+)\//.exec(link)[1]}/`, ['/punctum/replay', '/punctum/state']);
     await page.keyboard.press('5');
     await page.waitForFunction(() => punctum.drawn.live.found);
     const pressed = async (key, holds, value) => {

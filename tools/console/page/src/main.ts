@@ -22,7 +22,7 @@ const kMostEvents = 200, kWarning_ms = 1000;  // between two sounds of new alarm
 
 interface State {
   core: string; run_end: string; t_s: number; tick: number; phase: string; cell: number; stop: string;
-  fault: null | {name: string; cause: string; next: string; cleared: string; t_s?: number};
+  fault?: {name: string; cause: string; next: string; cleared: string; t_s?: number};
   alarms: string[]; vision: boolean; missed_ticks: number; events_lost: number; samples_unusable: number; dropped?: number;
   role: string; control: string; in_control: string; refused: string; hand_here: boolean;
 }
@@ -193,7 +193,7 @@ const link = new Link(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${loca
       state = JSON.parse(new TextDecoder().decode(message)) as State;
       show();
     } else if (topic === '/punctum/parameters') {
-      parameters.told(JSON.parse(new TextDecoder().decode(message)) as Parameter[]);
+      parameters.told((JSON.parse(new TextDecoder().decode(message)) as {parameters: Parameter[]}).parameters);
     }
   } catch (error) {
     unreadable++;
@@ -311,7 +311,7 @@ function show(): void {
       return chip;
     }));
   }
-  const stopped = state?.fault !== null && state?.fault !== undefined;
+  const stopped = state?.fault !== undefined;
   by('stop').classList.toggle('asked', stopAsked >= 0 || stopped);
   by('stop').classList.toggle('unconfirmed', stopAsked >= 0 && !stopped && performance.now() - stopAsked > kStopConfirmed_ms);
   if (stopped) stopAsked = -1;

@@ -10,7 +10,7 @@ const kUm = 1e6;
 const kNeedleLength_um = 400, kHolderRadius_um = 40, kHolderLength_um = 300;
 const kConeLength_um = 60, kConeAngle = Math.PI / 6;
 const kNeedle = {tip_radius_m: 4e-6, shaft_radius_m: 14e-6, taper_m: 400e-6};
-export const kNotTold: Fixtures = {cone: {alpha_rad: kConeAngle}, needle: null, floor: null, holder: null};
+export const kNotTold: Fixtures = {cone: {alpha_rad: kConeAngle}};
 const kFloor_um = 600, kFloorLines = 12;
 const kZooms = [0.2, 20] as const, kPan_um = 150;
 const kLongestArrow_um = 90, kArrow_um_per_uN = 20;
@@ -249,7 +249,7 @@ export class SceneView {
     this.needleGlass.geometry.dispose();
     // Along y, the tip at the origin and the glass behind it.
     this.needleGlass.geometry = new THREE.LatheGeometry([[0, 0], [tip, 0], [shaft, -taper], [shaft, -kNeedleLength_um]].map(([x, y]) => new THREE.Vector2(x, y)), 24);
-    this.hasCone = f.cone !== null;
+    this.hasCone = f.cone !== undefined;
     if (f.cone) {
       const wider = Math.tan(f.cone.alpha_rad) / Math.tan(kConeAngle);
       this.cone.scale.set(wider, 1, wider);

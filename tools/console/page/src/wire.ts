@@ -25,8 +25,8 @@ export interface Row { middle_x_m: number; middle_y_m: number; radius_x_m: numbe
 export interface CellSurface { frame: number; outer?: {row: Row[]}; inner?: {row: Row[]} }
 // JSON: what of the scene's guidance has a shape. Lengths in metres.
 export interface Fixtures {
-  cone: null | {alpha_rad: number}; needle: null | {tip_radius_m: number; shaft_radius_m: number; taper_m: number};
-  floor: null | {z_m: number}; holder: null | {mouth_m: [number, number, number]; axis: [number, number, number]; radius_m: number};
+  cone?: {alpha_rad: number}; needle?: {tip_radius_m: number; shaft_radius_m: number; taper_m: number};
+  floor?: {z_m: number}; holder?: {mouth_m: [number, number, number]; axis: [number, number, number]; radius_m: number};
 }
 export interface Event {
   tick: number; t_s: number; kind: number; value: number; target: number; writer: number;

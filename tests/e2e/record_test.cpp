@@ -147,6 +147,9 @@ TEST_F(Recordings, a_run_goes_on_when_its_recorder_is_killed_and_the_report_says
   ASSERT_GT(cut.rows.size(), 100U);
   ASSERT_LT(cut.rows.size(), whole.rows.size());
   EXPECT_TRUE(std::equal(cut.rows.begin(), cut.rows.end(), whole.rows.begin()));
+  EXPECT_EQ(run("punctum-export", {recording, "--csv", file("u"), "--hdf5", file("u.nwb")}), 1);
+  EXPECT_NE(said_.find("was not finished"), std::string::npos) << said_;
+  EXPECT_EQ(said_.find("was not finished"), said_.rfind("was not finished")) << "once, not for each output";
   EXPECT_EQ(run("punctum", {"replay", recording}), 1) << said_;
   EXPECT_NE(said_.find("was not finished"), std::string::npos) << said_;
   EXPECT_NE(said_.find(replayed_ticks(cut.rows.size())), std::string::npos) << said_;

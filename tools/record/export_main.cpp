@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <exception>
 #include <optional>
 #include <string>
@@ -73,7 +74,12 @@ int run(int argc, char** argv) {
     return refuse(fmt::format("{} recordings: only --overview takes more than one", recordings.size()));
   }
   const std::string& recording = recordings.front();
-  std::string ends;
+  std::vector<std::string> early;  // why an output is not all that was wanted
+  const auto ends = [&early](const std::string& why) {
+    if (!why.empty() && std::find(early.begin(), early.end(), why) == early.end()) {
+      early.push_back(why);
+    }
+  };
   bool refused = false;
   // What cannot be made does not keep the rest from being made.
   const auto made = [&](const tl::expected<std::string, std::string>& exported) {
@@ -81,7 +87,7 @@ int run(int argc, char** argv) {
       refused = true;
       complain("punctum-export: " + exported.error());
     } else {
-      ends = *exported;
+      ends(*exported);
     }
   };
   if (!overview.empty()) {
@@ -89,7 +95,7 @@ int run(int argc, char** argv) {
     std::size_t unreadable = 0;
     for (const std::string& path : recordings) {
       if (auto facts = facts_of(path)) {
-        ends = facts->ends.empty() ? ends : facts->ends;
+        ends(facts->ends);
         runs.push_back(std::move(*facts));
       } else if (recordings.size() == 1) {
         return refuse(facts.error());
@@ -102,7 +108,7 @@ int run(int argc, char** argv) {
       return refuse("none of these is a recording with a tick in it");
     }
     if (unreadable > 0) {
-      ends = fmt::format("{} of {} are left out", unreadable, recordings.size());
+      ends(fmt::format("{} of {} are left out", unreadable, recordings.size()));
     }
     if (const auto written = write_overview(runs, overview); !written) {
       return refuse(written.error());
@@ -110,7 +116,7 @@ int run(int argc, char** argv) {
     say(overview_table(runs));
     if (const auto drawn = draw_overview(runs, overview); !drawn) {
       complain("punctum-export: no figure: " + drawn.error());
-      ends = ends.empty() ? "the tables are there, the figure is not" : ends;
+      ends("the tables are there, the figure is not");
     }
   }
   if (!csv.empty()) {
@@ -136,11 +142,10 @@ int run(int argc, char** argv) {
   if (refused) {
     return exit_bad_input;
   }
-  if (!ends.empty()) {
-    complain("punctum-export: " + ends);
-    return exit_not_done;
+  for (const std::string& why : early) {
+    complain("punctum-export: " + why);
   }
-  return exit_done;
+  return early.empty() ? exit_done : exit_not_done;
 }
 
 }  // namespace

@@ -228,6 +228,66 @@ TEST_F(Console, lets_in_only_its_own_names_and_origins_and_those_that_were_named
   EXPECT_TRUE(WebClient(port_).upgrade(host(), "", "chat").starts_with("HTTP/1.1 400 "));
 }
 
+// Of JSON Schema what messages.schema.json uses of it for what is told; the page's check has a whole
+// validator.
+void expect_fits(const Json& value, const Json& schema, const std::string& where) {
+  const std::string type = schema.at("type");
+  EXPECT_TRUE(type == "object"    ? value.is_object()
+              : type == "array"   ? value.is_array()
+              : type == "string"  ? value.is_string()
+              : type == "boolean" ? value.is_boolean()
+              : type == "integer" ? value.is_number_integer()
+                                  : type == "number" && value.is_number())
+      << where << ": no " << type << ": " << value;
+  if (value.is_array()) {
+    for (const Json& one : value) {
+      expect_fits(one, schema.at("items"), where + "[]");
+    }
+  }
+  if (!value.is_object()) {
+    return;
+  }
+  for (const Json& key : schema.at("required")) {
+    EXPECT_TRUE(value.contains(key)) << where << ": no " << key;
+  }
+  for (const auto& [key, member] : value.items()) {
+    ASSERT_TRUE(schema.at("properties").contains(key)) << where << ": " << key;
+    expect_fits(member, schema["properties"][key], where + "." + key);
+  }
+}
+
+TEST_F(Console, what_is_json_fits_the_schema_that_its_channel_carries) {
+  start_console(station_.name());
+  station_.tick();
+  const auto one = client();
+  const auto said = one->until([](const auto& f) {
+    return f.opcode == WebClient::kText && f.payload.find("\"advertise\"") != std::string::npos;
+  });
+  ASSERT_GE(said.opcode, 0);
+  int fitted = 0;
+  const Json channels = Json::parse(said.payload)["channels"];
+  for (const Json& channel : channels) {
+    const std::string topic = channel["topic"], name = channel["schemaName"];
+    if (channel["encoding"] != "json") {
+      continue;
+    }
+    EXPECT_EQ(channel["schemaEncoding"], "jsonschema") << topic;
+    EXPECT_EQ(name.substr(name.rfind('.') + 2), topic.substr(topic.rfind('/') + 2))
+        << "but for its first letter";
+    if (topic == "/punctum/replay") {  // nothing is played here
+      continue;
+    }
+    const auto id = channel["id"].get<std::uint32_t>();
+    one->text(Json{{"op", "subscribe"}, {"subscriptions", {{{"id", 20 + id}, {"channelId", id}}}}}.dump());
+    const auto told = one->until([id](const auto& f) { return is_of(f, 20 + id); });
+    ASSERT_GE(told.opcode, 0) << topic;
+    expect_fits(Json::parse(told.payload.substr(13)), Json::parse(channel["schema"].get<std::string>()),
+                topic);
+    ++fitted;
+  }
+  EXPECT_EQ(fitted, 3);
+}
+
 TEST_F(Console, is_reached_from_this_machine_alone) {
   start_console(station_.name());
   // The table of the kernel: local address and state 0A, which is listening.

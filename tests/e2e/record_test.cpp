@@ -278,12 +278,15 @@ TEST_F(Recordings, runs_stand_side_by_side_as_their_reports_say) {
         << said_;
     recordings.push_back(report(name) + "/recording.mcap");
   }
-  recordings.emplace_back("/dev/null");
-  recordings.insert(recordings.end(), {"--overview", file("runs")});
-  EXPECT_EQ(run("punctum-export", recordings), 1) << "one is left out";
+  const std::string whole = read_all(recordings.back());
+  std::ofstream(file("cut.mcap")) << whole.substr(0, whole.size() / 2);
+  recordings.insert(recordings.end(), {file("cut.mcap"), "/dev/null", "--overview", file("runs")});
+  EXPECT_EQ(run("punctum-export", recordings), 1) << "one is left out, another ends early";
   EXPECT_NE(said_.find("left out: /dev/null"), std::string::npos) << said_;
+  EXPECT_NE(said_.find("punctum-export: 1 of 4 are left out\n"), std::string::npos) << said_;
+  EXPECT_NE(said_.find("was not finished"), std::string::npos) << said_;
   const Table runs(file("runs") + "/runs.csv");
-  ASSERT_EQ(runs.rows.size(), 2U);
+  ASSERT_EQ(runs.rows.size(), 3U);
   for (std::size_t i = 0; i < 2; ++i) {
     const auto facts = json(i == 0 ? "one" : "two");
     EXPECT_EQ(runs.text(i, "scene"), "icsi");

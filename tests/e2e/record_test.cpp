@@ -146,6 +146,9 @@ TEST_F(Recordings, a_run_goes_on_when_its_recorder_is_killed_and_the_report_says
   EXPECT_EQ(whole.rows.size(), json()["ticks"].get<std::size_t>());
   ASSERT_GT(cut.rows.size(), 100U);
   ASSERT_LT(cut.rows.size(), whole.rows.size());
+  const double told_s = json()["not_kept"][0]["t_s"], kept_s = cut.number(cut.rows.size() - 1, "t_s");
+  EXPECT_GE(told_s, kept_s - 0.5);
+  EXPECT_LT(told_s, whole.number(whole.rows.size() - 1, "t_s") - 0.5) << "when, not the end of the run";
   EXPECT_TRUE(std::equal(cut.rows.begin(), cut.rows.end(), whole.rows.begin()));
   EXPECT_EQ(run("punctum-export", {recording, "--csv", file("u"), "--hdf5", file("u.nwb")}), 1);
   EXPECT_NE(said_.find("was not finished"), std::string::npos) << said_;

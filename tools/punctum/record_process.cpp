@@ -38,7 +38,7 @@ tl::expected<void, std::string> RecordProcess::tell_progress(const std::string& 
 }
 
 std::uint64_t RecordProcess::taken() const noexcept {
-  return progress_ && child_.running() ? (*progress_)->taken.load(std::memory_order_acquire) : UINT64_MAX;
+  return progress_ ? (*progress_)->taken.load(std::memory_order_acquire) : 0;
 }
 
 tl::expected<void, std::string> RecordProcess::start(const std::string& station, const hal::Descriptor& scene,

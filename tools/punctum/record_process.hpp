@@ -19,13 +19,14 @@ class RecordProcess {
  public:
   static constexpr const char* kFile = "recording.mcap";
 
-  // What it maps, for reading only, and in virtual time what it tells its progress in; before start().
+  // What it maps, for reading only, and what it tells its progress in; before start().
   [[nodiscard]] tl::expected<void, std::string> add(const char* name, const hal::Segment& segment);
   [[nodiscard]] tl::expected<void, std::string> tell_progress(const std::string& station);
   [[nodiscard]] tl::expected<void, std::string> start(const std::string& station,
                                                       const hal::Descriptor& scene,
                                                       const std::string& folder);
-  // Ticks that it has taken; no limit where nobody needs to wait for it.
+  [[nodiscard]] bool is_running() const noexcept { return child_.running(); }
+  // Ticks that it has taken; also of one that has ended.
   [[nodiscard]] std::uint64_t taken() const noexcept;
   // Both say why the recording is not whole, once; empty if it is, or if there is none.
   [[nodiscard]] std::string watch();  // once per round of the parent

@@ -502,7 +502,7 @@ tl::expected<void, std::string> Run::start_recording() {
   if (added && segments_.pictures) {
     added = record_.add(kPictureSegment, segments_.pictures->segment());
   }
-  if (added && scene_.clock == ClockKind::virtual_time) {
+  if (added) {
     added = record_.tell_progress(segments_.station);
   }
   return added ? record_.start(segments_.station, resolved_, folder_) : added;
@@ -511,14 +511,16 @@ tl::expected<void, std::string> Run::start_recording() {
 // In virtual time the core waits for the recorder, and the recorder for the recording, unless that was waited
 // for in vain.
 std::uint64_t Run::may_take() const {
-  const bool in_vain = segments_.bench && (*segments_.bench)->recorder_gave_up.load() != 0;
-  return in_vain ? UINT64_MAX : record_.taken();
+  const bool waits = scene_.clock == ClockKind::virtual_time && record_.is_running() &&
+                     (*segments_.bench)->recorder_gave_up.load() == 0;
+  return waits ? record_.taken() : UINT64_MAX;
 }
 
 void Run::note_recording(const std::string& why) {
   if (!why.empty()) {
     terminal_.complain(fmt::format("{} is not whole: {}", RecordProcess::kFile, why));
-    result_.not_kept.push_back({RecordProcess::kFile, recorder_.measures().last_s, why});
+    const double told_s = static_cast<double>(record_.taken()) / scene_.servo.rate_Hz;
+    result_.not_kept.push_back({RecordProcess::kFile, std::min(told_s, recorder_.measures().last_s), why});
   }
 }
 

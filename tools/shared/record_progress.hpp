@@ -1,5 +1,5 @@
-// How far the recording of a run has come, in shared memory: in virtual time nobody gets further ahead of it
-// than its rings hold.
+// How far the recording of a run has come, in shared memory: up to when it is whole if it ends early, and in
+// virtual time what the station waits for.
 #pragma once
 
 #include <atomic>

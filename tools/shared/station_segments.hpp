@@ -14,13 +14,12 @@ namespace punctum::tools {
 
 inline constexpr const char* kCoreSegment = "core";
 inline constexpr const char* kObservationSegment = "observation";
-inline constexpr const char* kInputSegment = "inputs";      // where a run is recorded
-inline constexpr const char* kPictureSegment = "pictures";  // where they are recorded
-inline constexpr const char* kViewSegment = "view";         // those that somebody looks at
-inline constexpr const char* kViewerSegment = "viewer";     // whether somebody does
-inline constexpr const char* kFingersSegment = "fingers";   // of whoever holds the hand on the page
-inline constexpr const char* kProgressSegment =
-    "progress";  // of the recording, where virtual time waits for it
+inline constexpr const char* kInputSegment = "inputs";       // where a run is recorded
+inline constexpr const char* kPictureSegment = "pictures";   // where they are recorded
+inline constexpr const char* kViewSegment = "view";          // those that somebody looks at
+inline constexpr const char* kViewerSegment = "viewer";      // whether somebody does
+inline constexpr const char* kFingersSegment = "fingers";    // of whoever holds the hand on the page
+inline constexpr const char* kProgressSegment = "progress";  // of the recording
 inline constexpr const char* kBenchSegment = "bench";
 inline constexpr const char* kCameraSegment = "camera";  // its answers to the bench
 inline constexpr const char* kSceneText =

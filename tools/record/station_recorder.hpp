@@ -1,6 +1,7 @@
 // Takes what a station tells and writes it into an MCAP file, live: telemetry, simulated truth, the tick's
-// inputs, observations, surfaces, events and the core's status. It maps the station for reading; what was overwritten before it came to it is counted and written, too. The file is never more
-// than about half a second behind.
+// inputs, observations, surfaces, events and the core's status. It maps the station for reading; what was
+// overwritten before it came to it is counted and written, too. The file is never more than about half a
+// second behind.
 #pragma once
 
 #include <array>

@@ -64,6 +64,16 @@ TEST_F(RecorderTest, every_sample_is_a_row_and_none_is_lost) {
   EXPECT_TRUE(r.not_kept().empty());
 }
 
+TEST_F(RecorderTest, takes_no_more_than_it_may) {
+  Recorder r = recorder();
+  tick(100);
+  EXPECT_EQ(r.drain(40), 40U);
+  EXPECT_EQ(r.drain(40), 0U);
+  EXPECT_EQ(r.position(), 40U);
+  r.finish();
+  EXPECT_EQ(r.rows(), 100U);
+}
+
 TEST_F(RecorderTest, samples_that_were_overwritten_before_they_were_read_are_counted_as_lost) {
   Recorder r = recorder();
   tick(10);

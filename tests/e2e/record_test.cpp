@@ -173,6 +173,7 @@ TEST_F(Recordings, virtual_time_waits_for_a_recorder_that_stands_still) {
   }
   kill(recorder, SIGSTOP);
   std::this_thread::sleep_for(4s);  // the rest of the run lasts two
+  EXPECT_NE(child_named(running.pid(), "punctum-core"), 0) << "the core has not waited";
   kill(recorder, SIGCONT);
   EXPECT_EQ(running.wait(), 1) << "6 s are not enough for a cell";
   EXPECT_EQ(running.output().find("not whole"), std::string::npos) << running.output();

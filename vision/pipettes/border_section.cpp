@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
+#include <numeric>
 #include <opencv2/core.hpp>
 #include <utility>
 
@@ -97,24 +99,33 @@ TiltedProfile profile_at(const Vector<Vector<float>>& lines, double slope) {
   return out;
 }
 
-// Edges above the floor that are nearer to the first of their group than `width_max`. total: energy of all.
-Vector<EdgeGroup> groups_of(const Vector<float>& edge, double floor, double width_max, double& total) {
-  Vector<EdgeGroup> groups;
-  total = 0;
+Vector<BorderEdge> edges_above(const Vector<float>& edge, double floor) {
+  Vector<BorderEdge> edges;
   for (std::size_t y = 4; y + 4 < edge.size(); ++y) {
     const double e = static_cast<double>(edge[y]);
-    if (e <= floor || edge[y] < edge[y - 1] || edge[y] < edge[y + 1]) {
-      continue;
+    if (e > floor && edge[y] >= edge[y - 1] && edge[y] >= edge[y + 1]) {
+      edges.push_back({static_cast<double>(y), e * e});
     }
-    total += e * e;
-    const double at = static_cast<double>(y);
-    if (groups.empty() || at - groups.back().edges.front().at > width_max) {
-      groups.emplace_back();
-    }
-    groups.back().edges.push_back({at, e * e});
-    groups.back().energy += e * e;
   }
-  return groups;
+  return edges;
+}
+
+// The strongest edges that lie within `width_max`, at least `width_min` apart. Every edge is tried as the
+// first: a speck beside a tube must not end the group amid the tube.
+EdgeGroup strongest_group(const Vector<BorderEdge>& edges, double width_min, double width_max) {
+  EdgeGroup best;
+  double energy = 0;
+  auto end = edges.begin();
+  for (auto first = edges.begin(); first != edges.end(); ++first) {
+    for (; end != edges.end() && end->at - first->at <= width_max; ++end) {
+      energy += end->energy;
+    }
+    if (std::prev(end)->at - first->at >= width_min && energy > best.energy) {
+      best = {.edges = Vector<BorderEdge>(first, end), .energy = energy};
+    }
+    energy -= first->energy;
+  }
+  return best;
 }
 
 // The faint ones outside of the others: specks beside the tube.
@@ -149,17 +160,15 @@ Vector<TubeTrace> border_sections(const GradientField& field, Border border, con
     // Four standard deviations of what the noise leaves.
     const double floor = std::max({4 * field.noise_of_gradient(noise) / std::sqrt(0.6 * profile.samples),
                                    kLeastEdge, wanted.relative * profile.strongest});
-    double total = 0;
-    for (EdgeGroup& group :
-         groups_of(profile.edge, floor, wanted.width_max / math::cos(degree * CV_PI / 180), total)) {
-      const double width = width_of(group.edges.front(), group.edges.back(), degree);
-      if (width >= wanted.width_min && width <= wanted.width_max && group.energy > best.energy) {
-        best = std::move(group);
-        best_degree = degree;
-        best_total = -1;
-      }
+    const Vector<BorderEdge> edges = edges_above(profile.edge, floor);
+    const double shorter = math::cos(degree * CV_PI / 180);
+    EdgeGroup group = strongest_group(edges, wanted.width_min / shorter, wanted.width_max / shorter);
+    if (group.energy > best.energy) {
+      best = std::move(group);
+      best_degree = degree;
+      best_total = std::accumulate(edges.begin(), edges.end(), 0.0,
+                                   [](double sum, const BorderEdge& e) { return sum + e.energy; });
     }
-    best_total = best_total < 0 ? total : best_total;
   };
   // Half of the step blurs an edge by less than a pixel at the ends of the widest strip.
   constexpr int kStep_deg = 3;

@@ -206,7 +206,7 @@ std::optional<TubeTrace> trace_wide_tube(const GradientField& field, Border bord
     if (tube && (!best || sure(*tube) > sure(*best))) {
       best = tube;
     }
-    if (best && best->length >= kLong_px) {
+    if (best && best->length >= kLong_px && best->similarity > kWallContinued) {
       break;
     }
   }

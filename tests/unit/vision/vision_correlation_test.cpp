@@ -232,4 +232,22 @@ TEST(HoldingPipette, ends_at_the_cell_that_it_holds) {
   }
 }
 
+// A speck lies so far above it on the border that both fit into the largest width, but for the lower wall.
+TEST(HoldingPipette, is_found_below_a_speck_on_the_border) {
+  constexpr int kEnd = 150;
+  cv::Mat grey(320, 480, CV_8U, cv::Scalar(150));
+  for (const int wall : {112, 208}) {
+    cv::line(grey, {0, wall}, {kEnd, wall}, cv::Scalar(105), 2);
+  }
+  cv::ellipse(grey, {12, 50}, {6, 4}, 0, 0, 360, cv::Scalar(110), cv::FILLED);
+  cv::GaussianBlur(grey, grey, cv::Size(0, 0), 1.2);
+  GradientField field;
+  field.compute(grey, cv::Rect(0, 0, grey.cols, grey.rows), 1.2);
+  const Side left[] = {Side::left};
+  const auto tube = find_holder_tube(field, left, 320, 60, 1);
+  ASSERT_TRUE(tube);
+  EXPECT_NEAR(tube->root.y, 160, 3);
+  EXPECT_NEAR(tube->end().x, kEnd, 12);
+}
+
 }  // namespace

@@ -78,12 +78,12 @@ struct GradientField {
     const Point last = from + (count + kAtOnce) * step;
     return within(from) && within(last);
   }
-  [[nodiscard]] double grey(const Point& p) const {
+  [[nodiscard]] bool shows(const Point& p) const {
     const double x = p.x - area.x, y = p.y - area.y;
-    if (!(x >= 0) || !(y >= 0) || x >= area.width - 1 || y >= area.height - 1) {
-      return 0;
-    }
-    return static_cast<double>(Bilinear(x, y).of(smooth));
+    return x >= 0 && y >= 0 && x < area.width - 1 && y < area.height - 1;
+  }
+  [[nodiscard]] double grey(const Point& p) const {
+    return shows(p) ? static_cast<double>(Bilinear(p.x - area.x, p.y - area.y).of(smooth)) : 0;
   }
 
  private:

@@ -21,6 +21,7 @@ constexpr int kCircles = 6;         // candidates that are tried
 constexpr int kVotingParts = 2;     // of the picture's rows
 constexpr int kCirclesPerPart = 2;  // most are given up after one closed path; at most it takes six each
 constexpr double kHalo = 1.4;
+constexpr double kAloneSupport = 0.97;  // an edge that no other confirms is seen at so many of its angles
 constexpr double kCircleScore = 0.35;  // share of a circumference that must have voted
 
 // For a dark line with a face on either side and no other edge. It is the zona, with a brighter space inside
@@ -224,6 +225,10 @@ StartedMembranes tell_apart(const MainEdge& found, const ClearedPicture& picture
   } else {
     // An edge of oolemma in phase-like contrast has flanks of both signs.
     const ClosedEdge& any = found.of_any_sign;
+    if (any.path.support < kAloneSupport) {
+      out.reason = "an edge with gaps, and no other round it";
+      return out;
+    }
     out.inner = started(any.centre, any.path.r, Polarity::any, any.path.level);
   }
   return out;

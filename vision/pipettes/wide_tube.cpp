@@ -39,8 +39,11 @@ struct Stations {
 // What a wall looks like across the tube, without its mean: grey levels at equal steps.
 constexpr double kWallStep_px = 0.5;
 constexpr std::size_t kWallSamples = 17;
+constexpr double kWallReach_px = kWallStep_px * (kWallSamples / 2);  // to either side
 using WallProfile = std::array<double, kWallSamples>;
 constexpr std::size_t kBeside = 6;  // steps to either side, in which a wall is looked for at the next station
+constexpr std::size_t kWideSamples = kWallSamples + 2 * kBeside;
+using WideProfile = std::array<double, kWideSamples>;
 
 // Averaged over 2 `lines` of them, along the tube.
 template <std::size_t samples>
@@ -73,6 +76,22 @@ double dot(const WallProfile& a, const WallProfile& b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
 }
 
+// Of the variance of a wall and what is beside it, the part that a straight slope explains. A wall has a
+// place; what it leaves of a shadow's soft side is a slope, which is the same wherever it is cut out.
+bool is_slope(const WideProfile& greys) {
+  constexpr double kSlope = 0.95;  // walls that are 4 px out of focus: up to 0.93
+  const double n = static_cast<double>(greys.size()),
+               mean = std::accumulate(greys.begin(), greys.end(), 0.0) / n;
+  double uu = 0, ug = 0, gg = 0;
+  for (std::size_t i = 0; i < greys.size(); ++i) {
+    const double u = static_cast<double>(i) - (n - 1) / 2, g = greys[i] - mean;
+    uu += u * u;
+    ug += u * g;
+    gg += g * g;
+  }
+  return ug * ug > kSlope * uu * gg;
+}
+
 // Follows both outer edges, each near where it was, by what they look like at the border. The tube
 // ends where the sum of (similarity - kWallContinued) is largest. Empty when it does not end in the picture.
 std::optional<Stations> follow_edges(const GradientField& field, const TubeTrace& t, const Point& across,
@@ -80,15 +99,19 @@ std::optional<Stations> follow_edges(const GradientField& field, const TubeTrace
   std::array<double, 2> at{-t.half_width, t.half_width};
   std::array<WallProfile, 2> usual{};
   for (std::size_t k = 0; k < 2; ++k) {
+    WideProfile wide{};
     for (std::size_t i = 0; i < kUsualStations; ++i) {
-      const double s = static_cast<double>(i) * kWideStride_px;
-      const WallProfile wall = without_mean(
-          greys_across<kWallSamples>(field, t.root + s * t.axis + at[k] * across, t.axis, across, 1).data());
-      for (std::size_t j = 0; j < wall.size(); ++j) {
-        usual[k][j] += wall[j] / kUsualStations;
+      const Point p = t.root + static_cast<double>(i) * kWideStride_px * t.axis + at[k] * across;
+      if (!field.shows(p - kWallReach_px * across) || !field.shows(p + kWallReach_px * across)) {
+        return std::nullopt;  // the end of the picture looks like a wall
+      }
+      const auto greys = greys_across<kWideSamples>(field, p, t.axis, across, 1);
+      for (std::size_t j = 0; j < greys.size(); ++j) {
+        wide[j] += greys[j] / kUsualStations;
       }
     }
-    if (!(dot(usual[k], usual[k]) > 0)) {
+    usual[k] = without_mean(wide.data() + kBeside);
+    if (!(dot(usual[k], usual[k]) > 0) || is_slope(wide)) {
       return std::nullopt;
     }
   }

@@ -121,7 +121,8 @@ TEST(NoCell, is_claimed_where_there_is_only_a_needle) {
 TEST(NoCell, is_claimed_in_a_pipette_and_its_shadows) {
   SKIP_WITHOUT("pipette-focus")
   // 02 is wrong: the shadow there has an oval.
-  for (const char* number : {"00", "04", "06", "08", "10", "12", "14", "16", "18", "20", "22", "24", "26", "28"}) {
+  for (const char* number :
+       {"00", "04", "06", "08", "10", "12", "14", "16", "18", "20", "22", "24", "26", "28"}) {
     EXPECT_FALSE(claims_a_cell(std::string("pipette-focus/focus_") + number + ".png")) << number;
   }
 }

@@ -18,7 +18,8 @@ namespace punctum::vision {
 namespace {
 
 constexpr double kWideStride_px = 1.5;
-constexpr std::size_t kUsualStations = 10;  // at the border they tell what the walls look like
+constexpr std::size_t kUsualStations = 10;  // at the border they tell what the walls look like, and
+                                            // averaged_over times as many in noise
 constexpr double kWallContinued = 0.5;      // of that: the tube goes on
 constexpr double kSurely = 0.8;             // and its other wall tells so
 constexpr int kNoWallMost = 5;              // stations in a row without either wall: what follows is the cell
@@ -26,6 +27,12 @@ constexpr int kCrossedMost = 16;            // stations in a row with a speck on
 constexpr double kLong_px = 60;             // a tube that is traced so far is none of a speck
 constexpr double kAlike = 0.75;             // correlation of one look of a wall with another
 constexpr double kWallGiveUp = 3;           // so far below its best value the sum does not recover
+
+// How many times as long a strip is averaged in noise, to tell what a wall is and what it looks like.
+double times_as_long(double noise) {
+  constexpr double kUsualNoise = 10, kMost = 2;
+  return std::clamp(noise * noise / (kUsualNoise * kUsualNoise), 1.0, kMost);
+}
 
 struct Stations {
   Vector<double> along, middle, half, similarity;
@@ -98,16 +105,18 @@ std::optional<Stations> follow_edges(const GradientField& field, const TubeTrace
                                      double noise) {
   std::array<double, 2> at{-t.half_width, t.half_width};
   std::array<WallProfile, 2> usual{};
+  const double longer = times_as_long(noise);
+  const std::size_t usual_stations = static_cast<std::size_t>(longer * kUsualStations);
   for (std::size_t k = 0; k < 2; ++k) {
     WideProfile wide{};
-    for (std::size_t i = 0; i < kUsualStations; ++i) {
+    for (std::size_t i = 0; i < usual_stations; ++i) {
       const Point p = t.root + static_cast<double>(i) * kWideStride_px * t.axis + at[k] * across;
       if (!field.shows(p - kWallReach_px * across) || !field.shows(p + kWallReach_px * across)) {
         return std::nullopt;  // the end of the picture looks like a wall
       }
       const auto greys = greys_across<kWideSamples>(field, p, t.axis, across, 1);
       for (std::size_t j = 0; j < greys.size(); ++j) {
-        wide[j] += greys[j] / kUsualStations;
+        wide[j] += greys[j] / static_cast<double>(usual_stations);
       }
     }
     usual[k] = without_mean(wide.data() + kBeside);
@@ -122,7 +131,7 @@ std::optional<Stations> follow_edges(const GradientField& field, const TubeTrace
   const double smooth_noise = noise / (2 * field.sigma * std::sqrt(std::numbers::pi));
   const double square = std::min(dot(usual[0], usual[0]), dot(usual[1], usual[1])) / kWallSamples;
   constexpr double kClearWall = 4, kSureWall = 50;  // times the noise
-  if (square < kClearWall * smooth_noise * smooth_noise) {
+  if (square * longer < kClearWall * smooth_noise * smooth_noise) {
     return std::nullopt;
   }
   const int lines =
@@ -178,7 +187,7 @@ std::optional<Stations> follow_edges(const GradientField& field, const TubeTrace
   }
   // Noise looks like what was learnt of it, as far as that was learnt and averaged.
   const bool sure = square > kSureWall * smooth_noise * smooth_noise;
-  const std::size_t least = sure ? 4 : kUsualStations + 2 * static_cast<std::size_t>(lines);
+  const std::size_t least = sure ? 4 : usual_stations + 2 * static_cast<std::size_t>(lines);
   if (last < least || last + 1 >= out.along.size()) {
     return std::nullopt;
   }
@@ -219,7 +228,7 @@ std::optional<TubeTrace> trace_wide_tube(const GradientField& field, Border bord
   }
   const WantedTube wanted{.width_min = width_min,
                           .width_max = width_max,
-                          .strip = std::clamp(0.03 * field.area.width, 8.0, 24.0),
+                          .strip = times_as_long(noise) * std::clamp(0.03 * field.area.width, 8.0, 24.0),
                           .relative = 0.3,
                           .tilt_max_deg = 20};
   std::optional<TubeTrace> best;

@@ -125,6 +125,8 @@ struct Tracker::Impl {
   [[nodiscard]] bool needle_hidden() const { return needle.started() && !result.needle.ok; }
   // It touches the membrane, or will by its speed.
   [[nodiscard]] bool at_membrane() const { return !punctured && (was_contact || touches_next); }
+  // No needle that is not seen has dented the outer membrane, and so none has reached the inner one.
+  [[nodiscard]] bool round_as_if_untouched() const;
   [[nodiscard]] bool must_start() const;
   void decide_searches();
   [[nodiscard]] cv::Rect area_to_search(bool starting) const;
@@ -521,7 +523,7 @@ Surroundings Tracker::Impl::surroundings() {
   return {.needle = membrane_needle,
           .last_tip = tip.last,
           .punctured = punctured,
-          .dents_seen = result.needle.ok || !config.needle,
+          .dents_seen = result.needle.ok || !config.needle || round_as_if_untouched(),
           .undeformed = undeformed.shape() ? &*undeformed.shape() : nullptr};
 }
 
@@ -557,6 +559,27 @@ void Tracker::Impl::follow_membranes(Stopwatch& watch) {
     result.inner = follow(inner, picture, config, around_inner);
     result.us.inner = watch.lap_us();
   }
+}
+
+bool Tracker::Impl::round_as_if_untouched() const {
+  constexpr double kDent = 0.04;  // of the radius
+  if (punctured || !outer.known || !result.outer.ok) {
+    return false;
+  }
+  const auto weights =
+      undeformed_weights(result.outer.contour, picture, std::nullopt,
+                         result.holder.ok ? std::optional(result.holder.mouth) : std::nullopt);
+  const auto now = fit_undeformed(result.outer.contour, weights);
+  if (!now || !now->round) {
+    return false;
+  }
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    const double off = cv::norm(result.outer.contour[i] - now->circle.centre) - now->circle.r;
+    if (weights[i] > 0 && std::abs(off) > kDent * now->circle.r) {
+      return false;
+    }
+  }
+  return true;
 }
 
 void Tracker::Impl::measure() {

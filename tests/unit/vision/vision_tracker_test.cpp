@@ -398,10 +398,8 @@ TEST(Tracker, follows_an_inner_membrane_that_the_needle_pushes) {
 
 // Single rays show an edge at its place in four tenths of the directions.
 TEST(Tracker, finds_an_inner_membrane_that_only_all_rays_together_show) {
-  VisionConfig config;
-  config.needle = false;
   for (const double ooplasm : {0.0, 22.0}) {
-    Tracker tracker(config, kW, kH);
+    Tracker tracker(VisionConfig{}, kW, kH);
     int claimed = 0;
     for (unsigned n = 0; n < 6; ++n) {
       const cv::Mat m = draw({.noise = 20, .seed = n + 1, .needle = false, .ooplasm = ooplasm});
@@ -417,6 +415,17 @@ TEST(Tracker, finds_an_inner_membrane_that_only_all_rays_together_show) {
     } else {
       EXPECT_EQ(claimed, 0);
     }
+  }
+}
+
+// The needle is not seen, but what it does to the outer membrane.
+TEST(Tracker, takes_no_faint_inner_membrane_for_round_where_the_outer_one_is_dented) {
+  Tracker tracker(VisionConfig{}, kW, kH);
+  for (unsigned n = 0; n < 6; ++n) {
+    const cv::Mat m =
+        draw({.dent = 20, .noise = 20, .seed = n + 1, .needle = false, .inner_dent = 14, .ooplasm = 22});
+    const Result& r = tracker.process(frame_of(m, n));
+    EXPECT_FALSE(r.inner.ok) << n;
   }
 }
 

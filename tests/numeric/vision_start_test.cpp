@@ -212,7 +212,7 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(DrawnCell{"noise_2", {.noise = 2}, {4, 4, 4, 4, 4}},
                     DrawnCell{"noise_5", {.noise = 5}, {4, 4, 4, 4, 4}},
                     DrawnCell{"noise_10", {.noise = 10}, {4, 4, 4, 4, 4}, 4, false, 27},
-                    DrawnCell{"noise_20", {.noise = 20}, {0, 3, 0, 3, 0, 2}, 4, true},
+                    DrawnCell{"noise_20", {.noise = 20}, {0, 3, 0, 3, 3, 2}, 4, true},
                     DrawnCell{"tilted_30", {}, {4, 4, 4, 4, 4}, 30},
                     DrawnCell{"tilted_45", {}, {4, 4, 4, 4, 4}, 45, false, 7},
                     DrawnCell{"on_shaft", {.on_shaft = 6}, {4, 4, 4, 4, 4}},
@@ -352,7 +352,7 @@ TEST_P(RenderedStart, shows_everything_in_the_first_frame) {
 INSTANTIATE_TEST_SUITE_P(
     Cells, RenderedStart,
     testing::Values(RenderedCell{"noise_2", {3, 4, 3, 4, 4, 1}}, RenderedCell{"noise_5", {4, 4, 4, 4, 4}},
-                    RenderedCell{"noise_10", {4, 4, 4, 4, 4}}, RenderedCell{"noise_20", {1, 1, 2, 4, 2, 1}},
+                    RenderedCell{"noise_10", {4, 4, 4, 4, 4}}, RenderedCell{"noise_20", {2, 4, 2, 4, 4, 1}},
                     RenderedCell{"crossed", {2, 4, 2, 4, 4, 2}}, RenderedCell{"halo", {4, 4, 4, 4, 4}},
                     RenderedCell{"impurities_60", {3, 4, 3, 4, 4, 1}},
                     RenderedCell{"blur", {3, 3, 4, 3, 3, 1}}),

@@ -9,6 +9,7 @@
 #include <opencv2/core.hpp>
 #include <utility>
 
+#include "hal/math/elementary.hpp"
 #include "vision/image/parabola.hpp"
 #include "vision/pipettes/border_section.hpp"
 #include "vision/pipettes/robust_line.hpp"
@@ -181,8 +182,11 @@ std::optional<Stations> follow_edges(const GradientField& field, const TubeTrace
       break;
     }
     if (similarity > kWallContinued) {
-      at[0] += 0.4 * (place[0] - at[0]);
-      at[1] += 0.4 * (place[1] - at[1]);
+      // Its walls are straight and bend only into its mouth.
+      constexpr double kSteepest_px = 0.25;  // per station
+      for (std::size_t k = 0; k < 2; ++k) {
+        at[k] += std::clamp(0.4 * (place[k] - at[k]), -kSteepest_px, kSteepest_px);
+      }
     }
   }
   // Noise looks like what was learnt of it, as far as that was learnt and averaged.
@@ -268,12 +272,23 @@ std::optional<double> end_face(const GradientField& field, const Point& guess, c
       }
       g[static_cast<std::size_t>(i)] = sum / lanes;
     }
-    const auto top = std::max_element(g.begin() + 1, g.end() - 1);
-    if (top == g.end() - 1 || *top < clear * field.noise_of_gradient(noise)) {
+    // The walls bend into the face, so the guess is a little short of it; the edge of the cell's ooplasm,
+    // which lies further off, may be stronger.
+    constexpr double kShort_px = 4, kUncertain_px = 8;
+    double most = 0;
+    std::size_t top = 0;
+    for (std::size_t i = 1; i + 1 < g.size(); ++i) {
+      const double off = ((static_cast<double>(i) - n / 2) * kFine_px - kShort_px) / kUncertain_px;
+      const double likely = g[i] * math::exp(-0.5 * off * off);
+      if (g[i] >= g[i - 1] && g[i] >= g[i + 1] && likely > most) {
+        most = likely;
+        top = i;
+      }
+    }
+    if (top == 0 || g[top] < clear * field.noise_of_gradient(noise)) {
       return std::nullopt;
     }
-    const auto i = static_cast<std::size_t>(top - g.begin());
-    return (static_cast<int>(i) - n / 2 + vertex_offset(g[i - 1], *top, g[i + 1])) * kFine_px;
+    return (static_cast<int>(top) - n / 2 + vertex_offset(g[top - 1], g[top], g[top + 1])) * kFine_px;
   };
   constexpr int kStrip = 6;
   constexpr double kClear = 3, kClearStrip = 1.2;  // noise alone leaves 0.8, and 0.5 +- 0.13 in strips

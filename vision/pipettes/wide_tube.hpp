@@ -14,9 +14,9 @@ namespace punctum::vision {
 [[nodiscard]] std::optional<TubeTrace> trace_wide_tube(const GradientField& field, Border border,
                                                        double width_min, double width_max, double noise);
 
-// The end face of a tube, sub-pixel: the shift along `axis` (px) from `guess` with the strongest change of
-// the mean grey across +-half_width, within +-reach. Empty where nothing stands out of the noise (grey
-// levels).
+// The end face of a tube, sub-pixel: the shift along `axis` (px) from `guess`, where its walls end, with the
+// strongest change of the mean grey across +-half_width, within +-reach; a change counts less where a face is
+// not expected. Empty where nothing stands out of the noise (grey levels).
 [[nodiscard]] std::optional<double> end_face(const GradientField& field, const Point& guess,
                                              const Point& axis, double half_width, double reach,
                                              double noise);

@@ -250,4 +250,20 @@ TEST(HoldingPipette, is_found_below_a_speck_on_the_border) {
   EXPECT_NEAR(tube->end().x, kEnd, 12);
 }
 
+// A pipette far out of focus: both sides of it are slopes 60 px wide, as strong and straight as walls.
+TEST(HoldingPipette, is_no_shadow) {
+  cv::Mat grey(320, 480, CV_8U, cv::Scalar(150));
+  cv::rectangle(grey, {0, 100}, {300, 220}, cv::Scalar(60), cv::FILLED);
+  GradientField field;
+  const Side left[] = {Side::left};
+  const auto found_with_blur_of = [&](double blur_px) {
+    cv::Mat blurred;
+    cv::GaussianBlur(grey, blurred, cv::Size(0, 0), blur_px);
+    field.compute(blurred, cv::Rect(0, 0, grey.cols, grey.rows), 1.2);
+    return find_holder_tube(field, left, 320, 80, 1).has_value();
+  };
+  EXPECT_TRUE(found_with_blur_of(3));
+  EXPECT_FALSE(found_with_blur_of(20));
+}
+
 }  // namespace

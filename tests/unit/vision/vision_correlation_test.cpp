@@ -8,6 +8,7 @@
 #include "vision/image/correlation.hpp"
 #include "vision/image/registration.hpp"
 #include "vision/pipettes/holding_pipette.hpp"
+#include "vision/pipettes/wide_tube.hpp"
 
 namespace {
 
@@ -264,6 +265,19 @@ TEST(HoldingPipette, is_no_shadow) {
   };
   EXPECT_TRUE(found_with_blur_of(3));
   EXPECT_FALSE(found_with_blur_of(20));
+}
+
+// The edge of an ooplasm, twice as strong, lies 12 px from the face, where the walls ended 3 px short of it.
+TEST(HoldingPipette, has_its_mouth_where_its_walls_end) {
+  constexpr int kFace = 120;
+  cv::Mat grey(200, 300, CV_8U, cv::Scalar(150));
+  cv::rectangle(grey, {0, 60}, {kFace, 140}, cv::Scalar(115), cv::FILLED);
+  cv::rectangle(grey, {kFace + 12, 40}, {260, 160}, cv::Scalar(80), cv::FILLED);
+  GradientField field;
+  field.compute(grey, cv::Rect(0, 0, grey.cols, grey.rows), 1.2);
+  const auto face = end_face(field, {kFace - 3, 100}, {1, 0}, 24, 16, 1);
+  ASSERT_TRUE(face);
+  EXPECT_NEAR(*face, 3.5, 1);
 }
 
 }  // namespace

@@ -19,7 +19,7 @@ constexpr double kFinestPart = 1e-3;  // of a way: a thousandth of 1 um is beyon
 constexpr double kSurface_m = 1e-9;   // of a region: the needle is at it when nearer
 // Newton's steps double the digits; more are needed only where a way grazes an edge, and it may end early
 // there.
-constexpr int kSurfaceSteps = 12;
+constexpr int kSurfaceSteps = 6;
 // Of a place where a region meets another one or another limit.
 constexpr int kCornerRounds = 3;
 // Nearer to a region than this, the direction away from it is found anew on every tick.
@@ -111,7 +111,7 @@ void StageLimits::look_for_regions() NONBLOCKING {
 StageLimits::Checked StageLimits::check(const hal::Vec3& wanted_m, const StageConstraint& c) const
     NONBLOCKING {
   Checked out = check_cell(wanted_m, c);
-  if (regions_) {
+  if (!is_far_from_regions(out.point_m)) {
     keep_out(out, c);
   }
   return out;
@@ -235,6 +235,10 @@ StageLimits::Checked StageLimits::check_cell(const hal::Vec3& wanted_m, const St
   return out;
 }
 
+bool StageLimits::is_far_from_regions(const hal::Vec3& point_m) const NONBLOCKING {
+  return !regions_ || (point_m - set_point_.tip_m).norm() < free_m_;
+}
+
 // A convex body lies wholly behind a plane across any direction in which the needle is apart from it.
 // Newton's steps along the way come to its surface from outside and never pass it: no plane that they use
 // lets the needle through, and none takes away more than the last.
@@ -274,9 +278,6 @@ StageLimits::FreeWay StageLimits::free_way(Region region, const hal::Vec3& to_m)
 
 void StageLimits::keep_out(Checked& out, const StageConstraint& c) const NONBLOCKING {
   const hal::Vec3& here = set_point_.tip_m;
-  if ((out.point_m - here).norm() < free_m_) {
-    return;
-  }
   for (int round = 0; round < kCornerRounds; ++round) {
     bool held = false;
     for (const Region region : kRegions) {
@@ -372,8 +373,21 @@ hal::Vec3 StageLimits::stop_of(const hal::Vec3& point_m, const hal::Vec3& veloci
   return point_m + velocity_m_s * (velocity_m_s.norm() / (2 * hardest_m_s2_));
 }
 
+// A point that a region holds would be moved, whatever other limits make of it then.
 bool StageLimits::may_be_at(const hal::Vec3& point_m, const StageConstraint& c) const NONBLOCKING {
-  return (check(point_m, c).point_m - point_m).squaredNorm() <= kRounding_m * kRounding_m;
+  const hal::Vec3 held_m = check_cell(point_m, c).point_m;
+  if ((held_m - point_m).squaredNorm() > kRounding_m * kRounding_m) {
+    return false;
+  }
+  if (is_far_from_regions(held_m)) {
+    return true;
+  }
+  for (const Region region : kRegions) {
+    if (regions_->has(region) && free_way(region, held_m).part < 1) {
+      return false;
+    }
+  }
+  return true;
 }
 
 void StageLimits::advance(const hal::Vec3& goal_m, const StageConstraint& c) NONBLOCKING {

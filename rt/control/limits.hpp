@@ -136,6 +136,8 @@ class StageLimits {
   [[nodiscard]] hal::Vec3 made(const hal::Vec3& motion_m) const NONBLOCKING;
   // The way to a point, up to where it leaves the workspace.
   [[nodiscard]] hal::Vec3 within_workspace(const hal::Vec3& point_m) const NONBLOCKING;
+  // So near to the set-point that no region is between them.
+  [[nodiscard]] bool is_far_from_regions(const hal::Vec3& point_m) const NONBLOCKING;
   void keep_out(Checked& out, const StageConstraint& c) const NONBLOCKING;
   // A way of the tip that begins at the set-point: how much of it keeps out of the region, and what lies
   // beyond the plane before which the region ends it.

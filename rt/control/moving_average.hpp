@@ -19,16 +19,14 @@ class MovingAverage {
 
   [[nodiscard]] std::size_t samples() const NONBLOCKING { return samples_; }
 
-  // All samples are `at`.
+  // All samples are `at`. They are written when the next one comes, however often it restarts until then.
   void restart(const hal::Vec3& at) NONBLOCKING {
     origin_ = at;
     sum_.setZero();
-    for (std::size_t i = 0; i < samples_; ++i) {  // at most kMost rounds
-      past_[i].setZero();
-    }
+    at_rest_ = true;
   }
 
-  // The path had no part along `normal` (unit), and has led to `to` instead of the mean `from`.
+  // After a step: the path had no part along `normal` (unit), and has led to `to` instead of the mean `from`.
   void flatten(const hal::Vec3& from, const hal::Vec3& to, const hal::Vec3& normal) NONBLOCKING {
     sum_.setZero();
     for (std::size_t i = 0; i < samples_; ++i) {  // at most kMost rounds
@@ -39,6 +37,12 @@ class MovingAverage {
   }
 
   [[nodiscard]] hal::Vec3 step(const hal::Vec3& sample) NONBLOCKING {
+    if (at_rest_) {
+      for (std::size_t i = 0; i < samples_; ++i) {  // at most kMost rounds
+        past_[i].setZero();
+      }
+      at_rest_ = false;
+    }
     sum_ += (sample - origin_) - past_[next_];
     past_[next_] = sample - origin_;
     next_ = next_ + 1 < samples_ ? next_ + 1 : 0;
@@ -54,6 +58,7 @@ class MovingAverage {
  private:
   std::size_t samples_;  // 1 .. kMost
   std::size_t next_ = 0;
+  bool at_rest_ = false;  // `past_` is not written yet
   hal::Vec3 origin_ = hal::Vec3::Zero();
   hal::Vec3 sum_ = hal::Vec3::Zero();
   std::array<hal::Vec3, kMost> past_{};

@@ -9,13 +9,12 @@ namespace {
 
 // Of the shaft that is looked at: more than a dish is wide under any lens that sees a cell.
 constexpr double kShaft_m = 10e-3;
-// Golden sections of it: 10 mm become 5 nm.
-constexpr int kSections = 30;
-constexpr double kFinest_m = 5e-9;
-constexpr double kGolden = 0.6180339887498949;
+// Newton's steps to the place of it that is nearest to the mouth's rim.
+constexpr int kRimSteps = 8;
 // On the axis of the holder every direction across it is as good as another.
 constexpr double kOnAxis_m = 1e-12;
 constexpr double kParallel = 1e-9;
+constexpr double kLeastSine2 = 1e-30;
 // A direction with more of the holder's axis in it than rounding leaves is not apart from a body without end.
 constexpr double kBackwards = 1e-9;
 
@@ -33,16 +32,6 @@ InHolder in_holder(const HolderBodyParams& holder, const hal::Vec3& point_m) NON
   const hal::Vec3 across = V - behind_m * holder.axis;
   const double r_m = across.norm();
   return {behind_m, r_m, r_m - holder.radius_m, across};
-}
-
-double distance_m(const HolderBodyParams& holder, const hal::Vec3& point_m) NONBLOCKING {
-  const InHolder at = in_holder(holder, point_m);
-  if (at.outside_m <= 0 && at.behind_m >= 0) {
-    return std::max(at.outside_m, -at.behind_m);
-  }
-  const double sideways_m = std::max(at.outside_m, 0.0);
-  const double before_m = std::max(-at.behind_m, 0.0);
-  return std::sqrt(sideways_m * sideways_m + before_m * before_m);
 }
 
 // The direction from the holder's surface to a point.
@@ -72,26 +61,61 @@ hal::Vec3 across(const hal::Vec3& direction, const hal::Vec3& axis, double slope
   return std::sqrt(1 - slope * slope) / length * aside - slope * axis;
 }
 
-// The same, and across the holder's axis.
-hal::Vec3 across_both(const hal::Vec3& direction, const hal::Vec3& axis, double slope,
+// The same, and across the holder's axis; on the side of the holder on which the needle passes it.
+hal::Vec3 across_both(const hal::Vec3& to_tip_m, const hal::Vec3& axis, double slope,
                       const hal::Vec3& holder_axis) NONBLOCKING {
   const hal::Vec3 normal = axis.cross(holder_axis);
   const double sine = normal.norm();
-  if (!(sine > kParallel) || slope >= sine) {
-    return direction;
+  if (!(sine > kParallel) || std::abs(slope) >= sine) {
+    return -holder_axis;
   }
   const double part = slope / sine;
-  const double side = direction.dot(normal) < 0 ? -1 : 1;
+  const double side = to_tip_m.dot(normal) < 0 ? -1 : 1;
   const hal::Vec3 aside = axis - axis.dot(holder_axis) * holder_axis;
   return side * std::sqrt(1 - part * part) / sine * normal - part / sine * aside;
 }
 
-}  // namespace
-
-double ForbiddenRegions::radius_m(double behind_m) const NONBLOCKING {
-  const double part = std::min(behind_m / params_.taper_m, 1.0);
-  return params_.tip_radius_m + part * (params_.shaft_radius_m - params_.tip_radius_m);
+// Where, from here to there behind the tip, a needle of this slope is nearest to the rim of the mouth. At s
+// behind the tip the axis is D = sqrt(x^2 + (r - R)^2) from it, x behind the mouth and r from the holder's
+// axis, and
+//
+//   D (D' - slope) = s - s_c - R r' - slope D      with s_c nearest to the mouth's centre
+//
+// is zero there. On each side of where the axis is nearest to the holder's, r' bends one way only: without a
+// slope Newton's steps from the far end of R r', +-R sin, come to the zero from one side. A step that would
+// leave the bracket halves it instead, which the slope and rounding may ask for.
+double nearest_to_rim_m(const HolderBodyParams& holder, const NeedlePose& needle, double slope, double from_m,
+                        double to_m) NONBLOCKING {
+  const InHolder tip = in_holder(holder, needle.tip_m);
+  const double cosine = holder.axis.dot(needle.axis);
+  const hal::Vec3 aside = needle.axis - cosine * holder.axis;
+  const double sine2 = std::max(aside.squaredNorm(), kLeastSine2);
+  const double centre_m = needle.axis.dot(needle.tip_m - holder.mouth_m);  // nearest to the mouth's centre
+  const double axis_m = aside.dot(tip.across) / sine2;                     // nearest to the holder's axis
+  const double r2_m2 = (tip.across - axis_m * aside).squaredNorm();        // there
+  const double before_m = std::max(axis_m * cosine - tip.behind_m, 0.0);
+  const double aside_m = std::max(std::sqrt(r2_m2) - holder.radius_m, 0.0);
+  const bool behind = before_m * cosine <= slope * std::sqrt(before_m * before_m + aside_m * aside_m);
+  (behind ? from_m : to_m) = std::clamp(axis_m, from_m, to_m);
+  double at_m = std::clamp(centre_m + (behind ? 1 : -1) * holder.radius_m * std::sqrt(sine2), from_m, to_m);
+  for (int i = 0; i < kRimSteps; ++i) {
+    const double along_m = at_m - axis_m;
+    const double r_m = std::sqrt(r2_m2 + sine2 * along_m * along_m);
+    const double dr = sine2 * along_m / r_m;
+    const double behind_m = tip.behind_m - at_m * cosine;
+    const double outside_m = r_m - holder.radius_m;
+    const double off_m = std::sqrt(outside_m * outside_m + behind_m * behind_m);
+    const double excess_m = at_m - centre_m - holder.radius_m * dr - slope * off_m;
+    (excess_m > 0 ? to_m : from_m) = at_m;
+    const double rises =
+        1 - holder.radius_m * (sine2 - dr * dr) / r_m - slope * (outside_m * dr - behind_m * cosine) / off_m;
+    const double next_m = at_m - excess_m / rises;
+    at_m = next_m >= from_m && next_m <= to_m ? next_m : 0.5 * (from_m + to_m);
+  }
+  return at_m;
 }
+
+}  // namespace
 
 hal::Vec3 ForbiddenRegions::away(Region region, const NeedlePose& needle) const NONBLOCKING {
   if (region == Region::floor) {
@@ -100,57 +124,34 @@ hal::Vec3 ForbiddenRegions::away(Region region, const NeedlePose& needle) const 
   return away_from_holder(needle);
 }
 
-// The distance from a convex body to a ball that grows no faster than linearly is convex along the needle.
+// D - r, the distance of the needle's axis from a convex body less the needle's radius, is convex along the
+// taper and along the shaft, for the radius grows linearly there; and from taper to shaft, which grows no
+// more. So its slope -n.a - r' at the shoulder says in which of the two the nearest place is, and at their
+// ends whether it is the end. If it is neither, n.a = -r' there. Then the nearest place of the holder is on
+// its side, n.b = 0 and n is known, or on its rim; on the flat mouth D is linear. A search that ends early
+// gives room away and never takes any: apart_m is no more than the distance for every n.
 hal::Vec3 ForbiddenRegions::away_from_holder(const NeedlePose& needle) const NONBLOCKING {
   const HolderBodyParams& holder = *params_.holder;
-  const auto gap_m = [&](double behind_m) {
-    return distance_m(holder, needle.tip_m - behind_m * needle.axis) - radius_m(behind_m);
-  };
-  double from_m = 0;
-  double to_m = kShaft_m;
-  if (gap_m(0) <= gap_m(kFinest_m)) {  // the tip is nearest, as for a needle that points to the holder
-    to_m = kFinest_m;
-  } else {
-    double near_m = to_m - kGolden * (to_m - from_m);
-    double far_m = from_m + kGolden * (to_m - from_m);
-    double near_gap_m = gap_m(near_m);
-    double far_gap_m = gap_m(far_m);
-    for (int i = 0; i < kSections; ++i) {
-      if (near_gap_m <= far_gap_m) {
-        to_m = far_m;
-        far_m = near_m;
-        far_gap_m = near_gap_m;
-        near_m = to_m - kGolden * (to_m - from_m);
-        near_gap_m = gap_m(near_m);
-      } else {
-        from_m = near_m;
-        near_m = far_m;
-        near_gap_m = far_gap_m;
-        far_m = from_m + kGolden * (to_m - from_m);
-        far_gap_m = gap_m(far_m);
-      }
-    }
-  }
-  // Where a straight part of the needle is nearest, its slope and not the search fixes the direction; where
-  // its side meets the holder's, both do. Of directions that may be it, the best is it.
   const auto at = [&](double behind_m) { return away_from(holder, needle.tip_m - behind_m * needle.axis); };
-  hal::Vec3 best = at(0);
-  double best_m = apart_m(Region::holder, best, needle);
-  const auto consider = [&](const hal::Vec3& direction) {
-    const double found_m = apart_m(Region::holder, direction, needle);
-    if (found_m > best_m) {
-      best_m = found_m;
-      best = direction;
-    }
-  };
-  const hal::Vec3 found = at(0.5 * (from_m + to_m));
-  consider(found);
-  consider(at(params_.taper_m));
-  for (const double slope : {(params_.shaft_radius_m - params_.tip_radius_m) / params_.taper_m, 0.0}) {
-    consider(across(found, needle.axis, slope));
-    consider(across_both(found, needle.axis, slope, holder.axis));
+  const double taper = (params_.shaft_radius_m - params_.tip_radius_m) / params_.taper_m;
+
+  const hal::Vec3 of_shoulder = at(params_.taper_m);
+  const double along = of_shoulder.dot(needle.axis);
+  const bool in_shaft = along > 0;
+  if (!in_shaft && along >= -taper) {
+    return of_shoulder;
   }
-  return best;
+  const double slope = in_shaft ? 0 : taper;
+  const hal::Vec3 of_end = at(in_shaft ? kShaft_m : 0);
+  if ((of_end.dot(needle.axis) >= -slope) == in_shaft) {
+    return of_end;
+  }
+  const hal::Vec3 of_side = across_both(needle.tip_m - holder.mouth_m, needle.axis, slope, holder.axis);
+  const double at_rim_m = nearest_to_rim_m(holder, needle, slope, in_shaft ? params_.taper_m : 0,
+                                           in_shaft ? kShaft_m : params_.taper_m);
+  const hal::Vec3 of_rim = across(at(at_rim_m), needle.axis, slope);
+  return apart_m(Region::holder, of_side, needle) > apart_m(Region::holder, of_rim, needle) ? of_side
+                                                                                            : of_rim;
 }
 
 double ForbiddenRegions::apart_m(Region region, const hal::Vec3& direction, const NeedlePose& needle) const

@@ -8,9 +8,11 @@
 //   n . (p - m) > R sqrt(1 - (n.b)^2) + max_s (s n.a + r(s))      for n.b <= 0
 //
 // p tip, a axis of the needle (out of its tip), r(s) its radius s behind the tip; m mouth, b axis of the
-// holder (backwards from its mouth), R its radius. How good the direction is decides only how much room is
-// given away. Everything stands in the stage's frame, as the workspace does, and includes the clearance.
-// Real-time safe.
+// holder (backwards from its mouth), R its radius. The left side less the right one is never more than needle
+// and holder are apart, whatever n is: it is the gap between two parallel planes, with the one wholly on this
+// side and the other wholly beyond. So a search for the best n may end anywhere: how good the direction is
+// decides only how much room is given away. Everything stands in the stage's frame, as the workspace does,
+// and includes the clearance. Real-time safe.
 #pragma once
 
 #include <cstdint>
@@ -86,7 +88,6 @@ class ForbiddenRegions {
       NONBLOCKING;
 
  private:
-  [[nodiscard]] double radius_m(double behind_m) const NONBLOCKING;
   [[nodiscard]] hal::Vec3 away_from_holder(const NeedlePose& needle) const NONBLOCKING;
 
   ForbiddenParams params_;

@@ -1,7 +1,8 @@
-// Forbidden regions: distances against balls laid along the needle one by one, the walls' force against the
-// difference quotient of their energy.
+// Forbidden regions: distances against balls laid along the needle one by one and against a search along it
+// in long double, the walls' force against the difference quotient of their energy.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -63,6 +64,153 @@ TEST(ForbiddenRegions, are_as_far_as_the_nearest_of_the_needles_balls) {
     ASSERT_LT(found_m, std::max(balls_m, 0.0) + 1e-9) << i;  // never further than in truth
   }
   EXPECT_GT(near, 2000);
+}
+
+// The distance of a point of the needle's axis from the holder, less the needle's radius there and the
+// clearance.
+long double room_m(const ForbiddenParams& p, const NeedlePose& needle, long double behind_m) {
+  long double along = 0, apart2 = 0, from_mouth[3];
+  for (int k = 0; k < 3; ++k) {
+    from_mouth[k] =
+        static_cast<long double>(needle.tip_m[k]) - behind_m * needle.axis[k] - p.holder->mouth_m[k];
+    along += from_mouth[k] * p.holder->axis[k];
+  }
+  for (int k = 0; k < 3; ++k) {
+    const long double part = from_mouth[k] - along * p.holder->axis[k];
+    apart2 += part * part;
+  }
+  const long double beside = std::sqrt(apart2) - p.holder->radius_m;
+  const long double thick =
+      p.tip_radius_m + std::min<long double>(behind_m / p.taper_m, 1) *
+                           (static_cast<long double>(p.shaft_radius_m) - p.tip_radius_m);
+  const long double to = beside <= 0 && along >= 0
+                             ? std::max(beside, -along)
+                             : std::hypot(std::max<long double>(beside, 0), std::max<long double>(-along, 0));
+  return to - thick - p.clearance_m;
+}
+
+// The least of it. It is convex along the taper and along the shaft, so a search by thirds finds it in each.
+double least_room_m(const ForbiddenParams& p, const NeedlePose& needle) {
+  const long double ends[] = {0, p.taper_m, 10e-3L};
+  long double least = room_m(p, needle, ends[2]);
+  for (int part = 0; part < 2; ++part) {
+    long double from = ends[part], to = ends[part + 1];
+    least = std::min(least, room_m(p, needle, from));
+    for (int i = 0; i < 100; ++i) {
+      const long double near = from + (to - from) / 3, far = to - (to - from) / 3;
+      (room_m(p, needle, near) <= room_m(p, needle, far) ? to : from) =
+          room_m(p, needle, near) <= room_m(p, needle, far) ? far : near;
+    }
+    least = std::min(least, room_m(p, needle, 0.5L * (from + to)));
+  }
+  return static_cast<double>(least);
+}
+
+// Needles beside each part of the holder, with each part of theirs: along its axis, across it, tangential to
+// its rim and side, into the mouth and from behind, and any other way.
+struct Beside {
+  std::mt19937_64 random;
+
+  double within(double a, double b) { return std::uniform_real_distribution<>(a, b)(random); }
+  double scale(double a, double b) { return std::exp(within(std::log(a), std::log(b))); }
+  Vec3 unit() { return Vec3(within(-1, 1), within(-1, 1), within(-1, 1) + 1e-9).normalized(); }
+
+  NeedlePose pose(ForbiddenParams& p, int i) {
+    HolderBodyParams& holder = *p.holder;
+    holder.mouth_m = 1e-4 * unit();
+    holder.axis = unit();
+    const Vec3 outwards = holder.axis.cross(unit()).normalized();
+    const Vec3 tangent = holder.axis.cross(outwards);
+    const double oblique = i % 3 == 0 ? 0 : scale(1e-12, 0.1);
+    NeedlePose needle;
+    needle.axis = unit();
+    switch (i % 8) {
+      case 0:
+        needle.axis = holder.axis + oblique * unit();
+        break;
+      case 1:
+        needle.axis = -holder.axis + oblique * unit();
+        break;
+      case 2:
+        needle.axis = tangent + oblique * unit();
+        break;
+      case 3:
+        needle.axis = outwards + oblique * unit();
+        break;
+      case 4:
+        needle.axis = -outwards + oblique * unit();
+        break;
+      default:
+        break;
+    }
+    needle.axis.normalize();
+    Vec3 place = holder.mouth_m;
+    switch (i / 8 % 4) {
+      case 0:
+        place += holder.radius_m * outwards;
+        break;
+      case 1:
+        place += within(0, 1) * holder.radius_m * outwards;
+        break;
+      case 2:
+        place += holder.radius_m * outwards + scale(1e-7, 5e-3) * holder.axis;
+        break;
+      default:
+        place += scale(0.8, 3) * holder.radius_m * outwards - scale(1e-7, 1e-3) * holder.axis;
+        break;
+    }
+    const double along_needle[] = {0, p.taper_m, within(0, 1) * p.taper_m, scale(p.taper_m, 9e-3)};
+    const double behind_m = along_needle[i / 32 % 4];
+    const double thick_m =
+        p.tip_radius_m + std::min(behind_m / p.taper_m, 1.0) * (p.shaft_radius_m - p.tip_radius_m);
+    const Vec3 off = (within(0, 1) * outwards - within(0, 1) * holder.axis + 0.2 * unit()).normalized();
+    needle.tip_m = place + (thick_m + p.clearance_m + scale(1e-9, 1e-4)) * off + behind_m * needle.axis;
+    return needle;
+  }
+};
+
+TEST(ForbiddenRegions, are_as_far_as_a_search_along_the_needle_finds) {
+  Beside beside{std::mt19937_64(5)};
+  ForbiddenParams p = both();
+  int apart = 0;
+  for (int i = 0; i < 6000; ++i) {
+    const NeedlePose needle = beside.pose(p, i);
+    const double least_m = least_room_m(p, needle);
+    const double found_m = apart_m(p, Region::holder, needle);
+    const Vec3 any = beside.unit();
+    // In no direction are they further apart than in truth; inside they are apart in none.
+    const double most_m = std::max(least_m, -p.clearance_m) + 1e-11;
+    ASSERT_LT(found_m, most_m) << i;
+    ASSERT_LT(ForbiddenRegions(p).apart_m(Region::holder, any, needle), most_m) << i;
+    if (least_m > -p.clearance_m) {
+      ++apart;
+      ASSERT_GT(found_m, least_m - 1e-10) << i;
+    }
+  }
+  EXPECT_GT(apart, 3000);
+}
+
+// As thin, thick, pointed, blunt and near as a scene may be.
+TEST(ForbiddenRegions, are_as_far_as_a_search_finds_in_extreme_scenes) {
+  Beside beside{std::mt19937_64(6)};
+  int apart = 0;
+  for (int i = 0; i < 6000; ++i) {
+    ForbiddenParams p = both();
+    p.holder->radius_m = beside.scale(1e-6, 5e-3);
+    p.tip_radius_m = beside.scale(0.2e-6, 50e-6);
+    p.shaft_radius_m = beside.scale(p.tip_radius_m, 500e-6);
+    p.taper_m = beside.scale(1e-6, 5e-3);
+    p.clearance_m = i % 2 == 0 ? 0 : beside.scale(1e-8, 1e-3);
+    const NeedlePose needle = beside.pose(p, i);
+    const double least_m = least_room_m(p, needle);
+    const double found_m = apart_m(p, Region::holder, needle);
+    ASSERT_LT(found_m, std::max(least_m, -p.clearance_m) + 1e-9) << i;
+    if (least_m > -p.clearance_m) {
+      ++apart;
+      ASSERT_GT(found_m, least_m - 0.2e-6) << i;
+    }
+  }
+  EXPECT_GT(apart, 2500);
 }
 
 EffectInput at(const Vec3& point_m) {

@@ -39,6 +39,11 @@ constexpr double kFollowed_px = 24;                   // and later, of a faint o
 constexpr double kEndKnown_px = 1.2;
 // Further out of focus the lumen closes, and the end is somewhere in 3 px.
 constexpr double kSharp_px = 2.3;
+// So far from where the walls end, a speck ended them: the end is looked for again there, so often.
+constexpr double kFar_px = 5;
+constexpr int kFurther = 8;
+// Standard deviation of an end that is found together with its cut; a less certain one is found alone.
+constexpr double kCutKnown_px = 2;
 constexpr double kMostBlur_px = 3.6;  // the widest blur of which the end is known
 // In a needle with a smaller half-width no lumen is left between the walls, and a line across it looks like
 // them.
@@ -107,6 +112,11 @@ void look_further_out(const GradientField& field, double noise, double radius_px
       straight = s;
     }
   }
+}
+
+// Of the outermost glass, px.
+double sd_of(const CutGlass& cut, double half_width) {
+  return math::hypot(cut.end.sd, cut.bevel.sd * outer_radius_of_glass(half_width, cut.end.blur));
 }
 
 // At the end of its walls, about the end of the tube.
@@ -282,19 +292,30 @@ bool InjectionPipette::begin_at_end(const GradientField& field, double noise, co
   }
   glass_ahead_ = glass_scatter_ = glass_blur_ = 0;
   glass_frames_ = 0;
-  bevel_ = last_.half_width < kLumen_px
-               ? Bevel{}
-               : bevel_of_glass(field, noise, last_, kStartReach_px, kStartReach_px).value_or(Bevel{});
-  learn_glass(field, noise, last_, kStartReach_px);
+  const std::optional<CutGlass> cut = go_to_cut(field, noise);
+  const auto cut_within = [&](double sd_px) { return cut && sd_of(*cut, last_.half_width) < sd_px; };
+  if (cut) {
+    bevel_ = cut->bevel;
+  } else {
+    bevel_ = last_.half_width < kLumen_px
+                 ? Bevel{}
+                 : bevel_of_glass(field, noise, last_, kStartReach_px, kStartReach_px).value_or(Bevel{});
+  }
+  if (cut_within(kCutKnown_px)) {
+    learn_glass(cut->end);
+  } else {
+    learn_glass(field, noise, last_, kStartReach_px);
+  }
   NeedlePose plain = last_;
   const bool faint = fit_walls(field, noise, radius_px_, plain, kShortest_px) < kStraight;
   longest_ = faint ? kFollowed_px : kShortest_px;
-  if (faint) {
+  const auto end_known = [&] {
     const auto end = end_of_glass(field, noise, last_, bevel_.tangent, kStartReach_px, kStartReach_px);
-    if (!end || end->sd > kEndKnown_px || end->blur > kMostBlur_px || !clear_at(last_.tip)) {
-      reason_ = "the end of the needle is not clear";
-      return false;
-    }
+    return end && end->sd <= kEndKnown_px && end->blur <= kMostBlur_px;
+  };
+  if (faint && !((cut_within(kEndKnown_px) || end_known()) && clear_at(last_.tip))) {
+    reason_ = "the end of the needle is not clear";
+    return false;
   }
   if (!cut_template(field)) {
     reason_ = "tip too close to the border";
@@ -307,6 +328,38 @@ bool InjectionPipette::begin_at_end(const GradientField& field, double noise, co
   started_ = true;
   reason_.clear();
   return true;
+}
+
+// How the needle is cut, and how far ahead the glass ends, where it is in focus. It is put where they are
+// when that is far from the end of the walls.
+std::optional<CutGlass> InjectionPipette::go_to_cut(const GradientField& field, double noise) {
+  if (last_.half_width < kLumen_px) {
+    return std::nullopt;
+  }
+  NeedlePose needle = last_;
+  const auto cut_there = [&] {
+    const auto blur = blur_of_shaft(field, needle, kStartReach_px);
+    return blur && *blur < kSharp_px
+               ? cut_of_glass(field, noise, needle, *blur, kStartReach_px, kStartReach_px)
+               : std::nullopt;
+  };
+  auto cut = cut_there();
+  bool further = false;
+  for (int round = 0; round < kFurther && cut && std::abs(cut->end.ahead) > kFar_px; ++round) {
+    needle.tip += cut->end.ahead * needle.axis;
+    cut = cut_there();
+    further = true;
+  }
+  if (!cut || cut->end.sd > kCutKnown_px) {
+    return std::nullopt;
+  }
+  if (further) {
+    last_.tip = needle.tip;
+    learn_shape_anew(field);
+    walls_agree_ = false;
+    cut->end.ahead += (needle.tip - last_.tip).dot(last_.axis);
+  }
+  return cut;
 }
 
 // The end that is followed is one that looks the same in every frame; the tip is the outermost glass.
@@ -547,13 +600,17 @@ void InjectionPipette::learn_glass(const GradientField& field, double noise, Nee
   followed.tip += glass_ahead_ * followed.axis;
   const auto end = end_of_glass(field, noise, followed, bevel_.tangent, reach, reach);
   if (end && end->sd < kEndKnown_px) {
-    const double before = end->ahead, part = 1.0 / ++glass_frames_;
-    glass_ahead_ += part * before;
-    // With the deviation that its likelihood has.
-    const double squares = glass_frames_ > 1 ? before * (1 - part) * before : end->sd * end->sd;
-    glass_scatter_ += part * (squares - glass_scatter_);
-    glass_blur_ += part * (end->blur - glass_blur_);
+    learn_glass(*end);
   }
+}
+
+void InjectionPipette::learn_glass(const GlassEnd& end) {
+  const double part = 1.0 / ++glass_frames_;
+  glass_ahead_ += part * end.ahead;
+  // With the deviation that its likelihood has.
+  const double squares = glass_frames_ > 1 ? end.ahead * (1 - part) * end.ahead : end.sd * end.sd;
+  glass_scatter_ += part * (squares - glass_scatter_);
+  glass_blur_ += part * (end.blur - glass_blur_);
 }
 
 void InjectionPipette::learn(const GradientField& field, const NeedlePose& needle, double noise) {

@@ -15,6 +15,7 @@
 #include "vision/pipettes/backdrop.hpp"
 #include "vision/pipettes/narrow_tube.hpp"
 #include "vision/pipettes/needle_bevel.hpp"
+#include "vision/pipettes/needle_end.hpp"
 #include "vision/pipettes/needle_pose.hpp"
 #include "vision/pipettes/needle_shape.hpp"
 #include "vision/pipettes/tube_trace.hpp"
@@ -71,7 +72,9 @@ class InjectionPipette {
   [[nodiscard]] bool find_end(const GradientField& field, double noise, NeedlePose& needle, bool& near);
   void calibrate_walls(const GradientField& field, const NeedlePose& walls, double noise);
   void learn_shape_anew(const GradientField& field);
+  [[nodiscard]] std::optional<CutGlass> go_to_cut(const GradientField& field, double noise);
   void learn_glass(const GradientField& field, double noise, NeedlePose followed, double reach);
+  void learn_glass(const GlassEnd& end);
   [[nodiscard]] double tip_sd(double noise) const;
   // The end that is followed, as the outermost glass.
   [[nodiscard]] NeedlePose told(NeedlePose needle, double noise) const;

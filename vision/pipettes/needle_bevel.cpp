@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <numbers>
 #include <opencv2/core.hpp>
 
@@ -18,6 +19,7 @@ namespace {
 
 constexpr double kRow_px = 1;                        // along the needle
 constexpr std::size_t kWithin = 5, kClearLanes = 3;  // lanes on one side: of the glass, beside it
+constexpr std::size_t kLumenLanes = 2;               // of those, in the lumen
 constexpr std::size_t kOneSide = kWithin + kClearLanes, kAllLanes = 2 * kOneSide;
 constexpr double kShaftFrom_px = 6, kShaftTo_px = 51;  // behind the range: tell how the walls look
 constexpr double kBehind_px = 14;                      // behind the range, compared with every end
@@ -56,17 +58,79 @@ class OfBlurs {
   std::array<double, kCount> values_{};
 };
 
+double step_of(double blurs) {
+  static const OfBlurs kStep([](double z) { return 0.5 * blurred_step(z / std::numbers::sqrt2); });
+  return kStep(blurs);
+}
+
+double bump_of(double blurs) {
+  static const OfBlurs kBump([](double z) { return math::exp(-0.5 * z * z); });
+  return kBump(blurs);
+}
+
+// Grey levels across the shaft from `from` to `to` px behind the tip, from its axis outwards, less their
+// mean.
+Vector<double> half_profile(const GradientField& field, const NeedlePose& needle, double from, double to,
+                            double apart_px) {
+  constexpr double kOutside_px = 6;
+  const double half_width = needle.half_width_at(0.5 * (from + to));
+  Vector<double> profile, along;
+  for (double u = 0; u < half_width + kOutside_px; u += apart_px) {
+    along.clear();
+    for (double s = from; s < to; s += kRow_px) {
+      const double v = u + needle.half_width_at(s) - half_width;
+      along.push_back(0.5 * (field.grey(needle.at(s, v)) + field.grey(needle.at(s, -v))));
+    }
+    profile.push_back(median_of(along));
+  }
+  double mean = 0;
+  for (const double grey : profile) {
+    mean += grey / static_cast<double>(profile.size());
+  }
+  for (double& grey : profile) {
+    grey -= mean;
+  }
+  return profile;
+}
+
+// What is left of the profile, grey levels squared, when two walls so far from the axis, a lumen between them
+// and a level are taken off, each as strong as it fits best.
+double unexplained(const Vector<double>& profile, double apart_px, double middle_px, double blur_px) {
+  cv::Matx33d a = 1e-6 * cv::Matx33d::eye();
+  cv::Vec3d g;
+  double square = 0;
+  for (std::size_t k = 0; k < profile.size(); ++k) {
+    const double u = apart_px * static_cast<double>(k), low = (u - middle_px) / blur_px,
+                 high = (u + middle_px) / blur_px;
+    const cv::Vec3d shown(bump_of(low) + bump_of(high), step_of(high) - step_of(low), 1);
+    a += shown * shown.t();
+    g += profile[k] * shown;
+    square += profile[k] * profile[k];
+  }
+  return square - g.dot(a.inv() * g);
+}
+
 struct CutEnd {
   double at = 0, tangent = 0, blur = 1.7;  // behind the tip of the pose, px; of the cut; px
 };
 
-// Walls that stop along an oblique line, and a line of glass of any strength along it.
+// The most likely end of that cut.
+struct EndOfCut {
+  double at = 0, tangent = 0;      // as in CutEnd
+  double gain = 0, curvature = 0;  // how fast it falls with the place, per px^2
+};
+
+// Walls that stop along an oblique line, and a line of glass of any strength along it. Where the blur is
+// known, what is neither walls nor clear is a speck and tells nothing; else no speck tells more than the
+// needle.
 class CutModel {
  public:
-  CutModel(const GradientField& field, const NeedlePose& needle, double noise, double back, double ahead);
+  CutModel(const GradientField& field, const NeedlePose& needle, double noise, std::optional<double> blur_px,
+           double back, double ahead);
   [[nodiscard]] bool stands_out() const noexcept { return clear_; }
   // Log likelihood over no needle, twice.
   [[nodiscard]] double gain(const CutEnd& end) const;
+  [[nodiscard]] EndOfCut end_of_cut(double tangent, double blur, double near) const;
   // What specks and granules leave of the picture, over what the noise alone would, at least 1.
   [[nodiscard]] double misfit(double gain) const {
     return std::max(1.0, (square_ - gain * unit_) / (area_px2_ * smooth_noise_ * smooth_noise_));
@@ -75,8 +139,13 @@ class CutModel {
  private:
   struct Seen {
     double s, half_width;
-    GlassRow grey;  // times the width of the lane, without mean and slope
+    GlassRow grey;      // times the weight, without mean and slope
+    GlassRow weight{};  // width of the lane, px; nearly none where there is a speck
+    // Of the weights: mean place, sum, sum over the squares of the distance from that place.
+    double middle = 0, weights = 0, tilts = 0;
   };
+  void weigh_without_specks(Seen& row, double most) const;
+  static void take_off_mean_and_slope(Seen& row);
   double half_width_, smooth_noise_, unit_;
   double square_ = 0, area_px2_ = 0;  // of what is seen, grey levels squared
   bool clear_ = false;
@@ -84,14 +153,21 @@ class CutModel {
   GlassRow walls_{};
 };
 
-CutModel::CutModel(const GradientField& field, const NeedlePose& needle, double noise, double back,
-                   double ahead)
+CutModel::CutModel(const GradientField& field, const NeedlePose& needle, double noise,
+                   std::optional<double> blur_px, double back, double ahead)
     : half_width_(needle.half_width),
       smooth_noise_(std::max(noise, 0.3) / (2 * field.sigma * std::sqrt(std::numbers::pi))) {
-  constexpr double kMargin_px = 6;   // the blur of the end reaches so far
-  constexpr double kSmoothed = 0.6;  // what the smoothing leaves of the noise in what is about as wide
+  constexpr double kMargin_px = 6;  // the blur of the end reaches so far
   constexpr double kLeast_grey = 1.5, kMost_noises = 0.25;
-  unit_ = std::max(noise * noise, 0.1) * kSmoothed / kRow_px;
+  constexpr double kOfWallsMost = 1.6;  // of the strongest wall, what a speck may tell
+  // What the smoothing leaves of the noise in what is about as wide, and in an end of that blur: it is a peak
+  // across, a slope along.
+  double smoothed = 0.6;
+  if (blur_px) {
+    const double blur2 = *blur_px * *blur_px, of_noise = blur2 / (blur2 + field.sigma * field.sigma);
+    smoothed = of_noise * of_noise;
+  }
+  unit_ = std::max(noise * noise, 0.1) * smoothed / kRow_px;
   std::array<Vector<double>, kAllLanes> shaft;
   Vector<GlassRow> greys;
   for (double s = -ahead - kMargin_px; s <= back + kShaftTo_px; s += kRow_px) {
@@ -117,7 +193,7 @@ CutModel::CutModel(const GradientField& field, const NeedlePose& needle, double 
       }
     }
     if (s <= back + kBehind_px) {
-      rows_.push_back({s, w, grey});
+      rows_.push_back({.s = s, .half_width = w, .grey = grey});
     }
   }
   constexpr std::size_t kFewest = 12;
@@ -131,29 +207,63 @@ CutModel::CutModel(const GradientField& field, const NeedlePose& needle, double 
     most = std::max(most, std::abs(walls_[i]));
   }
   clear_ = square > kLeast_grey * kLeast_grey && square > kMost_noises * kMost_noises * noise * noise;
+  const double at_most = blur_px ? std::numeric_limits<double>::infinity() : kOfWallsMost * most;
   for (Seen& row : rows_) {
-    double m0 = 0, m2 = 0, r0 = 0, r1 = 0;
-    for (std::size_t i = 0; i < kAllLanes; ++i) {
-      const double u = lane_at(i, row.half_width), w = lane_width(i, row.half_width);
-      m0 += w;
-      m2 += w * u * u;
-      r0 += w * row.grey[i];
-      r1 += w * u * row.grey[i];
+    if (blur_px) {
+      weigh_without_specks(row, most);
+    } else {
+      for (std::size_t i = 0; i < kAllLanes; ++i) {
+        row.weight[i] = lane_width(i, row.half_width);
+      }
     }
+    take_off_mean_and_slope(row);
     for (std::size_t i = 0; i < kAllLanes; ++i) {
-      const double u = lane_at(i, row.half_width), w = lane_width(i, row.half_width);
-      // A speck may tell no more than the needle itself.
-      const double grey = std::clamp(row.grey[i] - r0 / m0 - r1 / m2 * u, -1.6 * most, 1.6 * most);
-      row.grey[i] = w * grey;
-      square_ += w * grey * grey;
-      area_px2_ += w;
+      const double grey = std::clamp(row.grey[i], -at_most, at_most);
+      square_ += row.weight[i] * grey * grey;
+      area_px2_ += row.weight[i];
+      row.grey[i] = row.weight[i] * grey;
     }
   }
 }
 
+// What is neither the walls nor clear is a speck, wherever the needle ends. most: of the walls, grey levels.
+void CutModel::weigh_without_specks(Seen& row, double most) const {
+  constexpr double kNoises = 4, kOfWalls = 0.3, kOfSpeck = 1e-3;
+  const double tolerance = kNoises * smooth_noise_ + kOfWalls * most;
+  Vector<double> clear;  // beside the walls and between them
+  for (std::size_t i = 0; i < kAllLanes; ++i) {
+    if (i % kOneSide >= kWithin || i % kOneSide < kLumenLanes) {
+      clear.push_back(row.grey[i]);
+    }
+  }
+  const double level = median_of(clear);
+  for (std::size_t i = 0; i < kAllLanes; ++i) {
+    const double grey = row.grey[i] - level;
+    const bool speck =
+        grey < std::min(walls_[i], 0.0) - tolerance || grey > std::max(walls_[i], 0.0) + tolerance;
+    row.weight[i] = (speck ? kOfSpeck : 1) * lane_width(i, row.half_width);
+  }
+}
+
+void CutModel::take_off_mean_and_slope(Seen& row) {
+  for (std::size_t i = 0; i < kAllLanes; ++i) {
+    row.weights += row.weight[i];
+    row.middle += row.weight[i] * lane_at(i, row.half_width);
+  }
+  row.middle /= row.weights;
+  double mean = 0, slope = 0;
+  for (std::size_t i = 0; i < kAllLanes; ++i) {
+    const double tilt = lane_at(i, row.half_width) - row.middle;
+    row.tilts += row.weight[i] * tilt * tilt;
+    mean += row.weight[i] * row.grey[i];
+    slope += row.weight[i] * tilt * row.grey[i];
+  }
+  for (std::size_t i = 0; i < kAllLanes; ++i) {
+    row.grey[i] -= mean / row.weights + slope / row.tilts * (lane_at(i, row.half_width) - row.middle);
+  }
+}
+
 double CutModel::gain(const CutEnd& end) const {
-  static const OfBlurs step([](double z) { return 0.5 * blurred_step(z / 1.4142135623730951); });
-  static const OfBlurs bump([](double z) { return math::exp(-0.5 * z * z); });
   constexpr double kStrength = 0.25,
                    kPerPx = 0.01;  // usual deviations of the walls' strength from the shaft's
   const double middle = std::max(half_width_ - end.blur, 0.6 * half_width_);
@@ -161,33 +271,31 @@ double CutModel::gain(const CutEnd& end) const {
   GlassRow line{};
   for (std::size_t i = 0; i < kAllLanes; ++i) {
     const double u = lane_at(i, half_width_);
-    line[i] = step((lumen - u) / end.blur) - step((-lumen - u) / end.blur);
+    line[i] = step_of((lumen - u) / end.blur) - step_of((-lumen - u) / end.blur);
   }
   // Walls; the same times the distance from the end; line.
   cv::Matx33d a = cv::Matx33d::zeros();
   cv::Vec3d g;
   for (const Seen& row : rows_) {
-    double m0 = 0, m2 = 0, x0 = 0, x1 = 0, l0 = 0, l1 = 0, xx = 0, xl = 0, ll = 0, xy = 0, ly = 0;
+    double x0 = 0, x1 = 0, l0 = 0, l1 = 0, xx = 0, xl = 0, ll = 0, xy = 0, ly = 0;
     for (std::size_t i = 0; i < kAllLanes; ++i) {
-      const double u = lane_at(i, row.half_width), w = lane_width(i, row.half_width);
+      const double u = lane_at(i, row.half_width), w = row.weight[i], tilt = u - row.middle;
       const double behind = row.s - end.at - end.tangent * u;
-      const double x = walls_[i] * step(behind / end.blur);
-      const double l = line[i] * bump((behind - line_behind) / end.blur);
-      m0 += w;
-      m2 += w * u * u;
+      const double x = walls_[i] * step_of(behind / end.blur);
+      const double l = line[i] * bump_of((behind - line_behind) / end.blur);
       x0 += w * x;
-      x1 += w * u * x;
+      x1 += w * tilt * x;
       l0 += w * l;
-      l1 += w * u * l;
+      l1 += w * tilt * l;
       xx += w * x * x;
       xl += w * x * l;
       ll += w * l * l;
       xy += x * row.grey[i];
       ly += l * row.grey[i];
     }
-    xx -= x0 * x0 / m0 + x1 * x1 / m2;
-    xl -= x0 * l0 / m0 + x1 * l1 / m2;
-    ll -= l0 * l0 / m0 + l1 * l1 / m2;
+    xx -= x0 * x0 / row.weights + x1 * x1 / row.tilts;
+    xl -= x0 * l0 / row.weights + x1 * l1 / row.tilts;
+    ll -= l0 * l0 / row.weights + l1 * l1 / row.tilts;
     const double from_end = std::max(0.0, row.s - end.at);
     a += cv::Matx33d(xx, from_end * xx, xl, from_end * xx, from_end * from_end * xx, from_end * xl, xl,
                      from_end * xl, ll);
@@ -201,6 +309,22 @@ double CutModel::gain(const CutEnd& end) const {
   return g.dot(a.inv() * g) / unit_;
 }
 
+EndOfCut CutModel::end_of_cut(double tangent, double blur, double near) const {
+  EndOfCut end{near, tangent};
+  constexpr double kMost_px = 1;  // in a step
+  for (const double apart : {0.5, 0.5, 0.25}) {
+    const double before = gain({end.at - apart, tangent, blur}), here = gain({end.at, tangent, blur}),
+                 after = gain({end.at + apart, tangent, blur});
+    const double slope = (after - before) / (2 * apart);
+    end.curvature = (2 * here - before - after) / (apart * apart);
+    const double move = end.curvature > 0 ? std::clamp(slope / end.curvature, -kMost_px, kMost_px)
+                                          : std::copysign(apart, slope);
+    end.at += move;
+    end.gain = here + move * (slope - 0.5 * end.curvature * move);
+  }
+  return end;
+}
+
 }  // namespace
 
 double outer_radius_of_glass(double half_width, double blur) {
@@ -209,7 +333,7 @@ double outer_radius_of_glass(double half_width, double blur) {
 
 std::optional<Bevel> bevel_of_glass(const GradientField& field, double noise, const NeedlePose& needle,
                                     double back, double ahead) {
-  const CutModel model(field, needle, noise, back, ahead);
+  const CutModel model(field, needle, noise, std::nullopt, back, ahead);
   if (!model.stands_out()) {
     return std::nullopt;
   }
@@ -274,6 +398,99 @@ std::optional<Bevel> bevel_of_glass(const GradientField& field, double noise, co
   const double oblique = times_as_likely / (1 + times_as_likely);
   return Bevel{oblique * cut.tangent,
                std::sqrt(oblique * variance + oblique * (1 - oblique) * cut.tangent * cut.tangent)};
+}
+
+std::optional<double> blur_of_shaft(const GradientField& field, const NeedlePose& needle, double back) {
+  constexpr double kApart_px = 0.5, kUnexplained = 0.2;
+  // What it is tried with, and the least that a needle in focus has.
+  constexpr double kLeast_px = 1.2, kMost_px = 4.8, kBlurStep_px = 0.1, kMiddleStep_px = 0.25,
+                   kSharpest_px = 1.4;
+  const double from = back + kShaftFrom_px, to = back + kShaftTo_px;
+  const double half_width = needle.half_width_at(0.5 * (from + to));
+  const Vector<double> profile = half_profile(field, needle, from, to, kApart_px);
+  double least = 0;
+  for (const double grey : profile) {
+    least += kUnexplained * grey * grey;
+  }
+  std::optional<double> best;
+  for (double blur = kLeast_px; blur < kMost_px; blur += kBlurStep_px) {
+    for (double middle = 0.5 * half_width; middle < half_width; middle += kMiddleStep_px) {
+      if (const double rest = unexplained(profile, kApart_px, middle, blur); rest < least) {
+        least = rest;
+        const double wall = 2 * kHalfOfWall * middle;  // its thickness spreads it, too, but only across
+        best = std::sqrt(std::max(blur * blur - wall * wall / 12, 0.0));
+      }
+    }
+  }
+  return best && *best > kSharpest_px ? best : std::nullopt;
+}
+
+std::optional<CutGlass> cut_of_glass(const GradientField& field, double noise, const NeedlePose& needle,
+                                     double blur_px, double back, double ahead) {
+  const CutModel model(field, needle, noise, blur_px, back, ahead);
+  if (!model.stands_out()) {
+    return std::nullopt;
+  }
+  CutEnd best{0, 0, blur_px};
+  double most = -1e18;
+  for (double at = -ahead; at <= back; at += 1) {
+    for (const double tangent : {-0.6, -0.3, 0.0, 0.3, 0.6}) {
+      const CutEnd end{at, tangent, blur_px};
+      if (const double gain = model.gain(end); gain > most) {
+        most = gain;
+        best = end;
+      }
+    }
+  }
+  constexpr double kEdge_px = 1.5;  // of the range
+  if (best.at < -ahead + kEdge_px || best.at > back - kEdge_px) {
+    return CutGlass{{-best.at, back + ahead, blur_px}, {}};
+  }
+  // Of every cut the most likely end, from that of its neighbour.
+  constexpr int kToEachSide = 18, kCuts = 2 * kToEachSide + 1;
+  constexpr double kApart = 0.05;
+  std::array<EndOfCut, kCuts> ends;
+  const auto find = [&](int k, double near) {
+    ends[static_cast<std::size_t>(k)] = model.end_of_cut(kApart * (k - kToEachSide), blur_px, near);
+  };
+  const int first = kToEachSide + static_cast<int>(std::lround(best.tangent / kApart));
+  find(first, best.at);
+  for (int k = first + 1; k < kCuts; ++k) {
+    find(k, ends[static_cast<std::size_t>(k - 1)].at);
+  }
+  for (int k = first - 1; k >= 0; --k) {
+    find(k, ends[static_cast<std::size_t>(k + 1)].at);
+  }
+  for (const EndOfCut& end : ends) {
+    most = std::max(most, end.gain);
+  }
+  // A granule is about as wide as a wall, and not drawn anew in every pixel as noise is: over an end its sum
+  // varies so many times as much as that of noise that leaves as much.
+  constexpr double kOfGranules = 4;
+  const double misfit = 1 + kOfGranules * (model.misfit(most) - 1);
+  constexpr double kBeyond_px = 2;  // the range
+  const double radius = outer_radius_of_glass(needle.half_width, blur_px);
+  double sum = 0, outermost = 0, variance = 0, tangent = 0, tangent2 = 0;
+  for (const EndOfCut& end : ends) {
+    if (end.curvature <= 0 || end.at < -ahead - kBeyond_px || end.at > back + kBeyond_px) {
+      continue;
+    }
+    // Before anything is seen, a needle is as likely cut at right angles as anyhow up to the steepest.
+    const double before = 1.0 / kCuts + (end.tangent == 0 ? 1 : 0);
+    const double of_end = 2 * misfit / end.curvature,
+                 weight = before * math::exp(0.5 * (end.gain - most) / misfit) * std::sqrt(of_end);
+    sum += weight;
+    outermost += weight * (std::abs(end.tangent) * radius - end.at);
+    variance += weight * of_end;
+    tangent += weight * end.tangent;
+    tangent2 += weight * end.tangent * end.tangent;
+  }
+  if (sum <= 0) {
+    return std::nullopt;
+  }
+  tangent /= sum;
+  return CutGlass{{outermost / sum, std::sqrt(variance / sum), blur_px},
+                  {tangent, std::sqrt(std::max(tangent2 / sum - tangent * tangent, 0.0))}};
 }
 
 }  // namespace punctum::vision

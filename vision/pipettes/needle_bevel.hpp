@@ -1,9 +1,10 @@
-// How obliquely the injection pipette is cut.
+// How obliquely the injection pipette is cut, and where a glass that is cut so ends.
 #pragma once
 
 #include <optional>
 
 #include "vision/image/gradient.hpp"
+#include "vision/pipettes/needle_end.hpp"
 #include "vision/pipettes/needle_pose.hpp"
 
 namespace punctum::vision {
@@ -23,5 +24,24 @@ struct Bevel {
 // levels. Empty where the walls do not stand out, or something else lies there.
 [[nodiscard]] std::optional<Bevel> bevel_of_glass(const GradientField& field, double noise,
                                                   const NeedlePose& needle, double back, double ahead);
+
+// How far a point spreads, px, by the shaft from `back` px behind the tip: it spreads as far along the needle
+// as across, and the shaft tells it from many more pixels than the end does. Empty where the shaft does not
+// look like two equal walls and a lumen, as in relief.
+[[nodiscard]] std::optional<double> blur_of_shaft(const GradientField& field, const NeedlePose& needle,
+                                                  double back);
+
+// The outermost glass, as certain as it would be if the cut were known, and the cut.
+struct CutGlass {
+  GlassEnd end;
+  Bevel bevel;
+};
+
+// Both at once, where the blur is known. By likelihood, with an end as above: the means over all cuts, each
+// as likely as it explains the picture. Specks tell nothing. Empty where the walls do not stand out; an end
+// at the border of the range is one that lies further on.
+[[nodiscard]] std::optional<CutGlass> cut_of_glass(const GradientField& field, double noise,
+                                                   const NeedlePose& needle, double blur_px, double back,
+                                                   double ahead);
 
 }  // namespace punctum::vision

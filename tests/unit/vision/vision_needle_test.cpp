@@ -239,5 +239,67 @@ TEST_F(BackdropOfYolk, is_not_known_outside_the_picture) {
   EXPECT_FALSE(backdrop_.grey({20, kH - 0.5}));
 }
 
+// A wide needle that is cut obliquely, and a dark speck on one of its walls.
+struct Cut {
+  double tangent = 0;   // by how much further back the glass ends, per px across
+  double speck_px = 0;  // behind the tip
+  double side = 1;      // of the axis
+};
+
+constexpr double kCutTip_x = 150.3, kCutRadius = 5, kCutNoise = 5;
+
+GradientField draw(const Cut& cut) {
+  constexpr double kLumen = 0.72, kWidens = 0.02, kWall_grey = 46, kLumen_grey = -6, kBlur_px = 1.1;
+  constexpr double kSpeck_px = 3, kSpeck_grey = 40;
+  constexpr int kFine = 4;
+  cv::Mat m(kH, kW, CV_32F, cv::Scalar(150));
+  for (int y = 0; y < kH; ++y) {
+    for (int x = 0; x < kW; ++x) {
+      for (int k = 0; k < kFine * kFine; ++k) {
+        const double s = x + (k % kFine - 1.5) / kFine - kCutTip_x,
+                     u = y + (k / kFine - 1.5) / kFine - kAxis_y;
+        const double half = kCutRadius + kWidens * std::max(s, 0.0);
+        double dark = 0;
+        if (std::abs(u) < half && s > cut.tangent * u + std::abs(cut.tangent) * kCutRadius) {
+          dark += std::abs(u) > kLumen * half ? kWall_grey : kLumen_grey;
+        }
+        if (std::hypot(s - cut.speck_px, u - cut.side * half) < kSpeck_px) {
+          dark += kSpeck_grey;
+        }
+        m.at<float>(y, x) -= static_cast<float>(dark / (kFine * kFine));
+      }
+    }
+  }
+  cv::GaussianBlur(m, m, cv::Size(0, 0), kBlur_px);
+  std::mt19937 random(2000);
+  std::normal_distribution<float> noise(0, static_cast<float>(kCutNoise));
+  cv::Mat grey(kH, kW, CV_8U);
+  for (int y = 0; y < kH; ++y) {
+    for (int x = 0; x < kW; ++x) {
+      grey.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(m.at<float>(y, x) + noise(random));
+    }
+  }
+  GradientField field;
+  field.compute(grey, cv::Rect(0, 0, kW, kH), kSmoothing_px);
+  return field;
+}
+
+// With what is right in the first frames of tests/numeric.
+TEST(CutNeedle, ends_with_the_outermost_glass_though_a_speck_lies_on_a_wall) {
+  constexpr double kTip_px = 2.5, kAside_px = 1;
+  for (const double tangent : {-0.6, -0.3, 0.0, 0.3, 0.6}) {
+    for (const double speck_px : {10.0, 14.0, 20.0}) {
+      for (const double side : {-1.0, 1.0}) {
+        InjectionPipette needle(Side::right, kCutRadius);
+        const GradientField field = draw(Cut{tangent, speck_px, side});
+        ASSERT_TRUE(needle.start(field, kCutNoise, [](const Point&) { return true; }));
+        const NeedlePose seen = needle.as_found(kCutNoise);
+        EXPECT_NEAR(seen.tip.x, kCutTip_x, kTip_px) << tangent << ' ' << speck_px << ' ' << side;
+        EXPECT_NEAR(seen.tip.y, kAxis_y, kAside_px) << tangent << ' ' << speck_px << ' ' << side;
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace cone

@@ -22,7 +22,7 @@ constexpr int kVotingParts = 2;     // of the picture's rows
 constexpr int kCirclesPerPart = 2;  // most are given up after one closed path; at most it takes six each
 constexpr double kHalo = 1.4;
 constexpr double kAloneSupport = 0.97;  // an edge that no other confirms is seen at so many of its angles
-constexpr double kCircleScore = 0.35;  // share of a circumference that must have voted
+constexpr double kCircleScore = 0.35;   // share of a circumference that must have voted
 
 // For a dark line with a face on either side and no other edge. It is the zona, with a brighter space inside
 // and an ooplasm too faint to be seen; or else the rim of the ooplasm itself, which is as dark inside.

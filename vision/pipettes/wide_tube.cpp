@@ -19,8 +19,7 @@ namespace punctum::vision {
 namespace {
 
 constexpr double kWideStride_px = 1.5;
-constexpr std::size_t kUsualStations = 10;  // at the border they tell what the walls look like, and
-                                            // averaged_over times as many in noise
+constexpr std::size_t kUsualStations = 10;  // at the border they tell what the walls look like; more in noise
 constexpr double kWallContinued = 0.5;      // of that: the tube goes on
 constexpr double kSurely = 0.8;             // and its other wall tells so
 constexpr int kNoWallMost = 5;              // stations in a row without either wall: what follows is the cell
@@ -146,8 +145,8 @@ std::optional<Stations> follow_edges(const GradientField& field, const TubeTrace
     std::array<double, 2> place = at, like{-1, -1};
     for (std::size_t k = 0; k < 2; ++k) {
       WallProfile most{};
-      const auto greys = greys_across<kWallSamples + 2 * kBeside>(field, t.root + s * t.axis + at[k] * across,
-                                                                  t.axis, across, lines);
+      const auto greys =
+          greys_across<kWideSamples>(field, t.root + s * t.axis + at[k] * across, t.axis, across, lines);
       for (std::size_t i = 0; i <= 2 * kBeside; ++i) {
         const WallProfile wall = without_mean(greys.data() + i);
         const double as_usual = dot(wall, usual[k]) / dot(usual[k], usual[k]);

@@ -66,32 +66,33 @@ TEST(ForbiddenRegions, are_as_far_as_the_nearest_of_the_needles_balls) {
   EXPECT_GT(near, 2000);
 }
 
+// Of double figures, for sums in long double.
+constexpr long double wide(double x) { return static_cast<long double>(x); }
+
 // The distance of a point of the needle's axis from the holder, less the needle's radius there and the
 // clearance.
 long double room_m(const ForbiddenParams& p, const NeedlePose& needle, long double behind_m) {
   long double along = 0, apart2 = 0, from_mouth[3];
   for (int k = 0; k < 3; ++k) {
-    from_mouth[k] =
-        static_cast<long double>(needle.tip_m[k]) - behind_m * needle.axis[k] - p.holder->mouth_m[k];
-    along += from_mouth[k] * p.holder->axis[k];
+    from_mouth[k] = wide(needle.tip_m[k]) - behind_m * wide(needle.axis[k]) - wide(p.holder->mouth_m[k]);
+    along += from_mouth[k] * wide(p.holder->axis[k]);
   }
   for (int k = 0; k < 3; ++k) {
-    const long double part = from_mouth[k] - along * p.holder->axis[k];
+    const long double part = from_mouth[k] - along * wide(p.holder->axis[k]);
     apart2 += part * part;
   }
-  const long double beside = std::sqrt(apart2) - p.holder->radius_m;
-  const long double thick =
-      p.tip_radius_m + std::min<long double>(behind_m / p.taper_m, 1) *
-                           (static_cast<long double>(p.shaft_radius_m) - p.tip_radius_m);
+  const long double beside = std::sqrt(apart2) - wide(p.holder->radius_m);
+  const long double in_shaft = std::min(behind_m / wide(p.taper_m), 1.0L);
+  const long double thick = wide(p.tip_radius_m) + in_shaft * (wide(p.shaft_radius_m) - wide(p.tip_radius_m));
   const long double to = beside <= 0 && along >= 0
                              ? std::max(beside, -along)
-                             : std::hypot(std::max<long double>(beside, 0), std::max<long double>(-along, 0));
-  return to - thick - p.clearance_m;
+                             : std::hypot(std::max(beside, 0.0L), std::max(-along, 0.0L));
+  return to - thick - wide(p.clearance_m);
 }
 
 // The least of it. It is convex along the taper and along the shaft, so a search by thirds finds it in each.
 double least_room_m(const ForbiddenParams& p, const NeedlePose& needle) {
-  const long double ends[] = {0, p.taper_m, 10e-3L};
+  const long double ends[] = {0, wide(p.taper_m), 10e-3L};
   long double least = room_m(p, needle, ends[2]);
   for (int part = 0; part < 2; ++part) {
     long double from = ends[part], to = ends[part + 1];

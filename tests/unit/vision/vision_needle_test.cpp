@@ -64,16 +64,10 @@ cv::Mat yolk(double granules) {
   return m;
 }
 
-GradientField draw(const Drawing& d) {
-  cv::Mat m(kH, kW, CV_32F, cv::Scalar(150));
-  if (d.granules > 0) {
-    m += yolk(d.granules);
-  }
-  cv::Mat take = glass(d.tip);
-  cv::GaussianBlur(take, take, cv::Size(0, 0), d.blur);
-  m = m.mul(1 - take);
-  std::mt19937 random(1000 + d.frame);
-  std::normal_distribution<float> noise(0, static_cast<float>(d.noise));
+// With noise, in whole grey levels.
+GradientField photographed(const cv::Mat& m, unsigned seed, double noise_grey) {
+  std::mt19937 random(seed);
+  std::normal_distribution<float> noise(0, static_cast<float>(noise_grey));
   cv::Mat grey(kH, kW, CV_8U);
   for (int y = 0; y < kH; ++y) {
     for (int x = 0; x < kW; ++x) {
@@ -83,6 +77,17 @@ GradientField draw(const Drawing& d) {
   GradientField field;
   field.compute(grey, cv::Rect(0, 0, kW, kH), kSmoothing_px);
   return field;
+}
+
+GradientField draw(const Drawing& d) {
+  cv::Mat m(kH, kW, CV_32F, cv::Scalar(150));
+  if (d.granules > 0) {
+    m += yolk(d.granules);
+  }
+  cv::Mat take = glass(d.tip);
+  cv::GaussianBlur(take, take, cv::Size(0, 0), d.blur);
+  m = m.mul(1 - take);
+  return photographed(m, 1000 + d.frame, d.noise);
 }
 
 // The needle comes from the right to the yolk, in focus and in clear medium, and is learnt meanwhile.
@@ -271,17 +276,7 @@ GradientField draw(const Cut& cut) {
     }
   }
   cv::GaussianBlur(m, m, cv::Size(0, 0), kBlur_px);
-  std::mt19937 random(2000);
-  std::normal_distribution<float> noise(0, static_cast<float>(kCutNoise));
-  cv::Mat grey(kH, kW, CV_8U);
-  for (int y = 0; y < kH; ++y) {
-    for (int x = 0; x < kW; ++x) {
-      grey.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(m.at<float>(y, x) + noise(random));
-    }
-  }
-  GradientField field;
-  field.compute(grey, cv::Rect(0, 0, kW, kH), kSmoothing_px);
-  return field;
+  return photographed(m, 2000, kCutNoise);
 }
 
 // With what is right in the first frames of tests/numeric.

@@ -1,5 +1,6 @@
 #include "tools/record/station_recorder.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -17,6 +18,7 @@ constexpr std::uint64_t kChunkSpans_ns = 500'000'000;
 constexpr std::size_t kLargestChunk = 4U << 20U;
 constexpr std::uint64_t kMostTicksPerRound = 4096;
 constexpr std::uint64_t kTicksAtATime = 64;  // then the rings that are short
+constexpr std::uint64_t kAll = ~std::uint64_t{0};
 
 // A quarter of the ring ahead of the writer, who goes on meanwhile.
 template <class Ring>
@@ -155,15 +157,21 @@ void StationRecorder::take(const rt::TelemetrySample& sample) {
   add(Stream::truth, m);
 }
 
+// Ticks with their inputs, and what they were given before both: a chunk that ends here, or a file that ends
+// with it, is replayed to its last tick.
 std::uint64_t StationRecorder::drain() {
   std::uint64_t taken = 0;
-  for (std::uint64_t now = kTicksAtATime; now == kTicksAtATime && taken < kMostTicksPerRound; taken += now) {
-    const std::uint64_t inputs = inputs_ring_ != nullptr ? inputs_ring_->head() : 0;
-    now = take_ticks();
+  for (std::uint64_t now = 1; now > 0 && taken < kMostTicksPerRound; taken += now) {
+    const std::uint64_t told = inputs_ring_ != nullptr ? inputs_ring_->head() : kAll;
+    now = take_ticks(told);
     take_what_vision_found();
     take_pictures();
     take_events();
-    take_inputs(inputs);
+    take_inputs(std::min(told, telemetry_.position()));
+    // In virtual time a chunk of the clock on the wall would be long.
+    if (chunk_spans_enough() || file_.chunk_bytes() >= kLargestChunk) {
+      close_chunk();
+    }
   }
   if (std::chrono::steady_clock::now() >= chunk_begun_ + kChunkLasts) {
     close_chunk();
@@ -171,26 +179,21 @@ std::uint64_t StationRecorder::drain() {
   return taken;
 }
 
-std::uint64_t StationRecorder::take_ticks() {
+std::uint64_t StationRecorder::take_ticks(std::uint64_t until) {
   std::uint64_t taken = 0;
-  while (taken < kTicksAtATime && telemetry_.next(sample_) == hal::Read::ok) {
+  while (taken < kTicksAtATime && !chunk_spans_enough() && telemetry_.position() < until &&
+         telemetry_.next(sample_) == hal::Read::ok) {
     ++taken;
-    if (!usable(sample_)) {
+    if (usable(sample_)) {
+      take(sample_);
+    } else {
       ++unusable_;
-      continue;
-    }
-    take(sample_);
-    // In virtual time a chunk of the clock on the wall would be long.
-    if (now_ns_ - chunk_begun_ns_ >= kChunkSpans_ns || file_.chunk_bytes() >= kLargestChunk) {
-      close_chunk();
     }
   }
   return taken;
 }
 
-// Up to those that were there before the events and the observations were taken: what a tick was given stands
-// in the file before its input, so a file that is cut off can be replayed up to there. More at a time than
-// ticks: none is left behind.
+// More at a time than ticks: none is left behind where ticks were lost.
 void StationRecorder::take_inputs(std::uint64_t until) {
   rt::InputSample input;
   for (std::uint64_t i = 0; inputs_ && i < 2 * kTicksAtATime && inputs_->position() < until &&
@@ -267,6 +270,10 @@ void StationRecorder::tell_state() {
   }
 }
 
+bool StationRecorder::chunk_spans_enough() const noexcept {
+  return now_ns_ - chunk_begun_ns_ >= kChunkSpans_ns;
+}
+
 void StationRecorder::close_chunk() {
   chunk_begun_ = std::chrono::steady_clock::now();
   chunk_begun_ns_ = now_ns_;
@@ -303,6 +310,7 @@ void StationRecorder::finish() {
   for (std::uint64_t taken = 0, now = 1; now > 0 && taken < rt::TelemetryRing::kSize; taken += now) {
     now = drain();
   }
+  take_ticks(kAll);  // a core that was killed may have told of a tick whose input it did not
   if (!scene_told_) {
     scene_told_ = true;
     add(Stream::scene, scene_);

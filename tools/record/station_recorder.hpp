@@ -71,7 +71,7 @@ class StationRecorder {
   void add(Stream stream, const Message& message) {
     add(stream, now_ns_, now_ns_, message);
   }
-  std::uint64_t take_ticks();
+  std::uint64_t take_ticks(std::uint64_t until);
   void take(const rt::TelemetrySample& sample);
   void take_inputs(std::uint64_t until);
   void take_what_vision_found();
@@ -81,6 +81,7 @@ class StationRecorder {
   [[nodiscard]] std::uint64_t file_ns(std::int64_t station_ns) const noexcept {
     return static_cast<std::uint64_t>(station_ns) + static_cast<std::uint64_t>(utc_ns_);
   }
+  [[nodiscard]] bool chunk_spans_enough() const noexcept;
   void close_chunk();
 
   mcap::Writer file_;

@@ -85,7 +85,9 @@ void record_run(const std::string& path) {
     tape->begin(info, asked);
     servo->tick(info);
     tape->end();
-    (*recorder)->drain();
+    if (tick % 97 == 0) {  // more ticks at once than it takes between two looks at the observations
+      (*recorder)->drain();
+    }
   }
   (*recorder)->finish();
   ASSERT_TRUE((*recorder)->lost_nothing());
@@ -343,6 +345,12 @@ TEST_F(ReplayTest, a_recording_that_is_cut_anywhere_is_identical_up_to_there) {
     EXPECT_NE(replayed->ends, "") << i;
     EXPECT_GE(replayed->ticks, last) << i;
     last = replayed->ticks;
+    struct {
+      std::uint64_t ticks = 0;
+      void operator()(const v1::Telemetry&) { ++ticks; }
+    } kept;
+    EXPECT_NE(RecordingReader::open(cut)->read_all(kept), "");
+    EXPECT_EQ(replayed->ticks, kept.ticks) << "no tick without its input";
   }
   EXPECT_GE(last, kTicks - 600);
 }

@@ -154,12 +154,17 @@ TEST_F(StationRecorderTest, what_a_tick_was_given_stands_before_its_input) {
     observation_->slot.push({.frame = i});
     core_->events.push({.tick = i, .kind = rt::Event::command, .what = rt::Command::end});
     tick(1);
+    if (i % 41 == 0) {
+      r->drain();
+      EXPECT_EQ(r->position(), i) << "no tick without its input";
+    }
     inputs->ring.push(
         {.number = i, .tick = i, .release_ns = static_cast<std::int64_t>(i), .observations = i + 1});
     if (i % 37 == 0) {
       r->drain();
     }
   }
+  tick(1);  // the core is killed in it
   r->finish();
   struct Order {
     std::uint64_t observation = 0, event = 0, inputs = 0, bad = 0;
@@ -175,6 +180,7 @@ TEST_F(StationRecorderTest, what_a_tick_was_given_stands_before_its_input) {
   } order;
   ASSERT_EQ(RecordingReader::open(path())->read_all(order), "");
   EXPECT_EQ(order.inputs, 1000U);
+  EXPECT_EQ(of("/telemetry").size(), 1001U);
   EXPECT_EQ(order.bad, 0U);
   EXPECT_TRUE(r->lost_nothing());
   EXPECT_EQ(of("/input").at(999).log_ns, 999U) << "at the tick";
@@ -186,6 +192,7 @@ TEST_F(StationRecorderTest, inputs_that_were_overwritten_are_counted) {
                                    scene_);
   ASSERT_TRUE(r) << r.error();
   for (std::uint64_t i = 0; i < rt::InputRing::kSize + 5; ++i) {
+    tick(1);
     inputs->ring.push({});
   }
   (*r)->drain();

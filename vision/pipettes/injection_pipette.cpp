@@ -9,6 +9,7 @@
 
 #include "hal/math/elementary.hpp"
 #include "vision/image/correlation.hpp"
+#include "vision/pipettes/faint_wall.hpp"
 #include "vision/pipettes/needle_bevel.hpp"
 #include "vision/pipettes/needle_end.hpp"
 #include "vision/pipettes/needle_walls.hpp"
@@ -34,16 +35,19 @@ constexpr double kWidest_radii = 10;  // of its radius at the tip: its whole wid
 constexpr double kStraight = 0.65;    // share of the stations along the shaft on straight walls
 constexpr double kShortest_px = 4, kLongest_px = 40;  // of a wall that an edge is averaged over, at the start
 constexpr double kFollowed_px = 24;                   // and later, of a faint one: it may bend
-// Standard deviation of the end of a faint needle. A tip that is less certain does more harm than one that is
-// not claimed: membranes are then taken for pushed that are free.
-constexpr double kEndKnown_px = 1.2;
-// Further out of focus the lumen closes, and the end is somewhere in 3 px.
+// Standard deviation of the outermost glass with which a faint needle may begin, and of an end that is found
+// together with its cut; and of an end from which more is learnt later. A tip that is less certain does more
+// harm than one that is not claimed: membranes are then taken for pushed that are free.
+constexpr double kStartKnown_px = 2, kEndKnown_px = 1.2;
+// Further out of focus the lumen closes, the walls end up to 5 px from where the shape does, and the end is
+// somewhere in 3 px.
 constexpr double kSharp_px = 2.3;
 // So far from where the walls end, a speck ended them: the end is looked for again there, so often.
 constexpr double kFar_px = 5;
 constexpr int kFurther = 8;
-// Standard deviation of an end that is found together with its cut; a less certain one is found alone.
-constexpr double kCutKnown_px = 2;
+// Where the walls go on so far behind what lies across the needle, it does not end there; so often.
+constexpr double kAcross_px = 60;
+constexpr int kAcross = 8;
 constexpr double kMostBlur_px = 3.6;  // the widest blur of which the end is known
 // In a needle with a smaller half-width no lumen is left between the walls, and a line across it looks like
 // them.
@@ -90,6 +94,14 @@ std::array<double, 2> faces(const GradientField& field, const NeedlePose& needle
   return out;
 }
 
+// As in relief, or where what was taken for both walls is one of them.
+bool walls_differ(const GradientField& field, const NeedlePose& needle) {
+  constexpr double kUnequal = 2;
+  const auto [low, high] = faces(field, needle);
+  return needle.half_width < kLumen_px || std::abs(low) > kUnequal * std::abs(high) ||
+         std::abs(high) > kUnequal * std::abs(low);
+}
+
 // It may hold on to the inner face of one wall: then both faces have the same sense, and on one side there
 // is another face further out, about as strong, of the opposite sense.
 void look_further_out(const GradientField& field, double noise, double radius_px, NeedlePose& needle,
@@ -119,10 +131,8 @@ double sd_of(const CutGlass& cut, double half_width) {
   return math::hypot(cut.end.sd, cut.bevel.sd * outer_radius_of_glass(half_width, cut.end.blur));
 }
 
-// At the end of its walls, about the end of the tube.
-void put_at_end(const GradientField& field, double noise, const TubeTrace& tube, double ahead,
-                NeedlePose& needle) {
-  const double back = std::min(30.0, 0.5 * tube.length);
+// At the end of its walls.
+void put_at_end(const GradientField& field, double noise, double back, double ahead, NeedlePose& needle) {
   if (const auto s = end_of_profile(field, needle, back, ahead, noise)) {
     needle.tip += *s * needle.axis;
   }
@@ -265,55 +275,18 @@ bool InjectionPipette::fit_walls_further(const GradientField& field, double nois
 bool InjectionPipette::begin_at_end(const GradientField& field, double noise, const Clear& clear_at,
                                     bool& is_straight) {
   const TubeTrace& tube = tubes_[tubes_tried_];
-  last_ = walls_tried_->needle;
-  double straight = walls_tried_->straight;
-  look_further_out(field, noise, radius_px_, last_, straight);
-  put_at_end(field, noise, tube, 25, last_);
-  for (int round = 0; round < 2; ++round) {
-    straight = fit_walls(field, noise, radius_px_, last_, kLongest_px);
-    put_at_end(field, noise, tube, 10, last_);
-  }
-  if (straight < kStraight || last_.half_width > 2 * radius_px_ + 1 ||
+  if (lie_between_walls(field, noise, tube) < kStraight || last_.half_width > 2 * radius_px_ + 1 ||
       is_wall_of_wide_tube(field, tube, noise)) {
     reason_ = "what enters through the border is not a straight needle";
     return false;
   }
   found_side_ = side_of(tube);
   side_known_ = is_straight = true;
-  step_sign_ = 0;
-  walls_offset_ = 0.15 * last_.half_width;
-  offset_frames_ = 0;
-  calibrate_walls(field, last_, noise);
-  const Point end_by_walls = last_.tip + walls_offset_ * last_.axis;
-  learn_shape_anew(field);
-  walls_agree_ = std::abs((end_by_walls - last_.tip).dot(last_.axis)) <= kSameEnd_px;
-  if (walls_agree_) {
-    last_.tip = end_by_walls;
-  }
-  glass_ahead_ = glass_scatter_ = glass_blur_ = 0;
-  glass_frames_ = 0;
-  const std::optional<CutGlass> cut = go_to_cut(field, noise);
-  const auto cut_within = [&](double sd_px) { return cut && sd_of(*cut, last_.half_width) < sd_px; };
-  if (cut) {
-    bevel_ = cut->bevel;
-  } else {
-    bevel_ = last_.half_width < kLumen_px
-                 ? Bevel{}
-                 : bevel_of_glass(field, noise, last_, kStartReach_px, kStartReach_px).value_or(Bevel{});
-  }
-  if (cut_within(kCutKnown_px)) {
-    learn_glass(cut->end);
-  } else {
-    learn_glass(field, noise, last_, kStartReach_px);
-  }
+  const bool end_known = learn_end_anew(field, noise);
   NeedlePose plain = last_;
   const bool faint = fit_walls(field, noise, radius_px_, plain, kShortest_px) < kStraight;
   longest_ = faint ? kFollowed_px : kShortest_px;
-  const auto end_known = [&] {
-    const auto end = end_of_glass(field, noise, last_, bevel_.tangent, kStartReach_px, kStartReach_px);
-    return end && end->sd <= kEndKnown_px && end->blur <= kMostBlur_px;
-  };
-  if (faint && !((cut_within(kEndKnown_px) || end_known()) && clear_at(last_.tip))) {
+  if (faint && !(end_known && clear_at(last_.tip))) {
     reason_ = "the end of the needle is not clear";
     return false;
   }
@@ -330,16 +303,81 @@ bool InjectionPipette::begin_at_end(const GradientField& field, double noise, co
   return true;
 }
 
-// How the needle is cut, and how far ahead the glass ends, where it is in focus. It is put where they are
-// when that is far from the end of the walls.
-std::optional<CutGlass> InjectionPipette::go_to_cut(const GradientField& field, double noise) {
-  if (last_.half_width < kLumen_px) {
-    return std::nullopt;
+// As the tube was traced, and up to where its walls end. Returns the share of the stations that are straight.
+double InjectionPipette::lie_between_walls(const GradientField& field, double noise, const TubeTrace& tube) {
+  const double back = std::min(30.0, 0.5 * tube.length);
+  last_ = walls_tried_->needle;
+  double straight = walls_tried_->straight;
+  look_further_out(field, noise, radius_px_, last_, straight);
+  put_at_end(field, noise, back, 25, last_);
+  for (int k = 0; k < kAcross && walls_go_on(field, noise, last_, kAcross_px); ++k) {
+    last_.tip += kAcross_px * last_.axis;
+    last_.half_width -= kAcross_px * last_.taper;
+    (void)fit_walls(field, noise, radius_px_, last_, kLongest_px);
+    put_at_end(field, noise, kAcross_px + 15, 25, last_);
   }
+  for (int round = 0; round < 2; ++round) {
+    straight = fit_walls(field, noise, radius_px_, last_, kLongest_px);
+    put_at_end(field, noise, back, 10, last_);
+  }
+  if (const auto between =
+          walls_differ(field, last_) ? with_faint_wall(field, noise, radius_px_, last_) : std::nullopt) {
+    last_ = *between;
+    NeedlePose fitted = last_;
+    if (const double s = fit_walls(field, noise, radius_px_, fitted, kLongest_px); s >= kStraight) {
+      last_ = fitted;
+      straight = s;
+    }
+    put_at_end(field, noise, back, 10, last_);
+  }
+  return straight;
+}
+
+// Its shape, cut and glass. Whether the outermost glass is known to kStartKnown_px.
+bool InjectionPipette::learn_end_anew(const GradientField& field, double noise) {
+  step_sign_ = 0;
+  walls_offset_ = 0.15 * last_.half_width;
+  offset_frames_ = 0;
+  calibrate_walls(field, last_, noise);
+  const Point end_by_walls = last_.tip + walls_offset_ * last_.axis;
+  learn_shape_anew(field);
+  const auto shaft_blur = blur_of_shaft(field, last_, kStartReach_px);
+  walls_tell_ = !shaft_blur || *shaft_blur <= kSharp_px;
+  walls_agree_ = walls_tell_ && std::abs((end_by_walls - last_.tip).dot(last_.axis)) <= kSameEnd_px;
+  if (walls_agree_) {
+    last_.tip = end_by_walls;
+  }
+  glass_ahead_ = glass_scatter_ = glass_blur_ = 0;
+  glass_frames_ = 0;
+  const bool lumen = last_.half_width >= kLumen_px;
+  const auto known = [&](const GlassEnd& end) {
+    return end.blur <= kMostBlur_px && sd_of({end, bevel_}, last_.half_width) <= kStartKnown_px;
+  };
+  const std::optional<CutGlass> cut = lumen ? go_to_cut(field, noise) : std::nullopt;
+  if (cut) {
+    bevel_ = cut->bevel;
+    if (known(cut->end)) {
+      learn_glass(cut->end);
+      return true;
+    }
+  } else {
+    bevel_ = lumen ? bevel_of_glass(field, noise, last_, kStartReach_px, kStartReach_px).value_or(Bevel{})
+                   : Bevel{};
+  }
+  const auto end = end_of_glass(field, noise, last_, bevel_.tangent, kStartReach_px, kStartReach_px);
+  if (lumen && end && end->sd <= kStartKnown_px) {
+    learn_glass(*end);
+  }
+  return end && known(*end);
+}
+
+// How the needle is cut, and how far ahead the glass ends. It is put where they are when that is far from the
+// end of the walls.
+std::optional<CutGlass> InjectionPipette::go_to_cut(const GradientField& field, double noise) {
   NeedlePose needle = last_;
   const auto cut_there = [&] {
     const auto blur = blur_of_shaft(field, needle, kStartReach_px);
-    return blur && *blur < kSharp_px
+    return blur && *blur < kMostBlur_px
                ? cut_of_glass(field, noise, needle, *blur, kStartReach_px, kStartReach_px)
                : std::nullopt;
   };
@@ -350,7 +388,7 @@ std::optional<CutGlass> InjectionPipette::go_to_cut(const GradientField& field, 
     cut = cut_there();
     further = true;
   }
-  if (!cut || cut->end.sd > kCutKnown_px) {
+  if (!cut || cut->end.sd > kStartKnown_px) {
     return std::nullopt;
   }
   if (further) {
@@ -554,7 +592,7 @@ bool InjectionPipette::find_end(const GradientField& field, double noise, Needle
   NeedlePose walls = needle;
   walls.tip -= walls_offset_ * walls.axis;
   const auto ahead = end_of_profile(field, walls, 16, 16, noise);
-  walls_agree_ = view_.blur == 0 && ahead && std::abs(*ahead) <= kSameEnd_px;
+  walls_agree_ = walls_tell_ && view_.blur == 0 && ahead && std::abs(*ahead) <= kSameEnd_px;
   if (walls_agree_) {
     needle.tip += *ahead * needle.axis;
   }
@@ -591,14 +629,13 @@ void InjectionPipette::learn_shape_anew(const GradientField& field) {
 }
 
 // Nothing else may touch the tip: a membrane that it pushes looks like a line of glass.
-void InjectionPipette::learn_glass(const GradientField& field, double noise, NeedlePose followed,
-                                   double reach) {
+void InjectionPipette::learn_glass(const GradientField& field, double noise, NeedlePose followed) {
   constexpr int kFrames = 30;  // by then the noise of one frame has fallen to a fifth
   if (glass_frames_ >= kFrames || followed.half_width < kLumen_px) {
     return;
   }
   followed.tip += glass_ahead_ * followed.axis;
-  const auto end = end_of_glass(field, noise, followed, bevel_.tangent, reach, reach);
+  const auto end = end_of_glass(field, noise, followed, bevel_.tangent, kGlassReach_px, kGlassReach_px);
   if (end && end->sd < kEndKnown_px) {
     learn_glass(*end);
   }
@@ -619,7 +656,7 @@ void InjectionPipette::learn(const GradientField& field, const NeedlePose& needl
   }
   NeedlePose followed = needle;
   followed.tip -= glass_ahead_ * needle.axis;
-  learn_glass(field, noise, followed, kGlassReach_px);
+  learn_glass(field, noise, followed);
   NeedlePose origin = followed;
   if (walls_agree_) {
     origin.tip = followed.tip - walls_offset_ * needle.axis;

@@ -64,6 +64,8 @@ class InjectionPipette {
   [[nodiscard]] bool fit_walls_further(const GradientField& field, double noise);
   [[nodiscard]] bool begin_at_end(const GradientField& field, double noise, const Clear& clear_at,
                                   bool& is_straight);
+  [[nodiscard]] double lie_between_walls(const GradientField& field, double noise, const TubeTrace& tube);
+  [[nodiscard]] bool learn_end_anew(const GradientField& field, double noise);
   bool cut_template(const GradientField& field);
   [[nodiscard]] double aside(const GradientField& field, double noise, const NeedlePose& predicted,
                              double correlated) const;
@@ -73,7 +75,7 @@ class InjectionPipette {
   void calibrate_walls(const GradientField& field, const NeedlePose& walls, double noise);
   void learn_shape_anew(const GradientField& field);
   [[nodiscard]] std::optional<CutGlass> go_to_cut(const GradientField& field, double noise);
-  void learn_glass(const GradientField& field, double noise, NeedlePose followed, double reach);
+  void learn_glass(const GradientField& field, double noise, NeedlePose followed);
   void learn_glass(const GlassEnd& end);
   [[nodiscard]] double tip_sd(double noise) const;
   // The end that is followed, as the outermost glass.
@@ -121,6 +123,7 @@ class InjectionPipette {
   double glass_scatter_ = 0;  // variance of where the end that is followed seems to be from it, px^2
   double glass_blur_ = 0;     // px
   double step_sign_ = 0;      // +1: it is brighter ahead of the walls, -1: darker, 0: not known yet
+  bool walls_tell_ = true;    // where it ends, more finely than the shape does: in focus
   bool walls_agree_ = false;  // with the shape, in the last frame
 };
 

@@ -176,13 +176,18 @@ std::optional<ShaftProfile> shaft_profile(const GradientField& field, const Need
   return out;
 }
 
+// An edge that stands out of the noise, averaged over `length` px, has at least this change of grey.
+double least_edge(const GradientField& field, double noise, double length) {
+  // Along a wall the smoothing joins about so much.
+  const double joined = 2 * std::sqrt(std::numbers::pi) * field.sigma;
+  return 4 * field.noise_of_gradient(noise) *
+         (length > kPlain_px ? std::sqrt(joined / (joined + length)) : 1);
+}
+
 // As fit_walls, with edges averaged over `length` px.
 double fit_walls_averaged(const GradientField& field, double noise, double radius, double reach,
                           double length, NeedlePose& needle) {
-  // Along a wall the smoothing joins about so much.
-  const double joined = 2 * std::sqrt(std::numbers::pi) * field.sigma;
-  const double floor =
-      4 * field.noise_of_gradient(noise) * (length > kPlain_px ? std::sqrt(joined / (joined + length)) : 1);
+  const double floor = least_edge(field, noise, length);
   const ShaftStations stations = stations_along(field, needle, reach, length, floor);
   const std::size_t n = stations.along.size();
   constexpr double kStations_px = 5;
@@ -248,6 +253,29 @@ double fit_walls(const GradientField& field, double noise, double radius, Needle
     }
   }
   return best;
+}
+
+bool walls_go_on(const GradientField& field, double noise, const NeedlePose& needle, double ahead) {
+  constexpr double kFrom_px = 14, kApart_px = 4, kMostly = 0.75;
+  constexpr double kOnLine_px = 1.5;
+  for (const double length : {12.0, 24.0}) {
+    const double floor = least_edge(field, noise, length);
+    int tried = 0, on_lines = 0;
+    for (double s = kFrom_px; s <= ahead; s += kApart_px) {
+      const double w = needle.half_width - needle.taper * s;
+      if (!field.area.contains(needle.at(-s, 0))) {
+        break;
+      }
+      ++tried;
+      const auto low = outer_edge(field, needle, -s, -w, kWallReach_px, length, floor);
+      const auto high = low ? outer_edge(field, needle, -s, w, kWallReach_px, length, floor) : std::nullopt;
+      on_lines += high && std::abs(*low + w) < kOnLine_px && std::abs(*high - w) < kOnLine_px ? 1 : 0;
+    }
+    if (on_lines > kMostly * tried) {
+      return true;
+    }
+  }
+  return false;
 }
 
 std::optional<double> end_of_profile(const GradientField& field, const NeedlePose& needle, double back,

@@ -16,6 +16,11 @@ inline constexpr double kWallReach_px = 3, kWallReachAtStart_px = 7;
 [[nodiscard]] double fit_walls(const GradientField& field, double noise, double radius, NeedlePose& needle,
                                double longest, double reach = kWallReach_px);
 
+// Whether both walls go on for `ahead` px ahead of the tip: something lies across the needle there, and it
+// does not end.
+[[nodiscard]] bool walls_go_on(const GradientField& field, double noise, const NeedlePose& needle,
+                               double ahead);
+
 // Distance ahead of the tip (< 0: behind it) at which the cross profile of walls and lumen ends; sub-pixel.
 // Searched from `back` px behind the tip to `ahead` px ahead of it. Empty when it does not end there.
 [[nodiscard]] std::optional<double> end_of_profile(const GradientField& field, const NeedlePose& needle,

@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <random>
+#include <vector>
 
 #include "vision/image/gradient.hpp"
 #include "vision/pipettes/backdrop.hpp"
@@ -244,56 +245,132 @@ TEST_F(BackdropOfYolk, is_not_known_outside_the_picture) {
   EXPECT_FALSE(backdrop_.grey({20, kH - 0.5}));
 }
 
-// A wide needle that is cut obliquely, and a dark speck on one of its walls.
-struct Cut {
-  double tangent = 0;   // by how much further back the glass ends, per px across
-  double speck_px = 0;  // behind the tip
-  double side = 1;      // of the axis
+// A wide needle whose lumen is seen.
+struct Wide {
+  double tangent = 0;     // by how much further back the glass ends, per px across
+  double speck_px = 0;    // dark, on one of its walls, behind the tip
+  double side = 1;        // of the axis
+  double other_wall = 1;  // grey levels of the upper wall, over those of the lower one
+  bool closed = false;    // by a line of glass across the lumen
+  double lump_px = 0;     // dark, over all of the shaft, behind the tip
+  double fringes = 0;     // bright, beside the needle, grey levels
+  double blur_px = 1.1;
+  double tip = 150.3;  // x of the outermost glass
+  double radius = 5;
 };
 
-constexpr double kCutTip_x = 150.3, kCutRadius = 5, kCutNoise = 5;
+constexpr double kWideRadius = 5, kWideNoise = 5;
 
-GradientField draw(const Cut& cut) {
-  constexpr double kLumen = 0.72, kWidens = 0.02, kWall_grey = 46, kLumen_grey = -6, kBlur_px = 1.1;
-  constexpr double kSpeck_px = 3, kSpeck_grey = 40;
+GradientField draw(const Wide& wide, unsigned seed = 2000) {
+  constexpr double kLumen = 0.72, kWidens = 0.02, kWall_grey = 46, kLumen_grey = -6;
+  constexpr double kSpeck_px = 3, kClosed_px = 2, kSpeck_grey = 40, kLump_px = 9, kLump_grey = 60,
+                   kFringe_px = 9;
   constexpr int kFine = 4;
   cv::Mat m(kH, kW, CV_32F, cv::Scalar(150));
   for (int y = 0; y < kH; ++y) {
     for (int x = 0; x < kW; ++x) {
       for (int k = 0; k < kFine * kFine; ++k) {
-        const double s = x + (k % kFine - 1.5) / kFine - kCutTip_x,
+        const double s = x + (k % kFine - 1.5) / kFine - wide.tip,
                      u = y + (k / kFine - 1.5) / kFine - kAxis_y;
-        const double half = kCutRadius + kWidens * std::max(s, 0.0);
+        const double half = wide.radius + kWidens * std::max(s, 0.0);
         double dark = 0;
-        if (std::abs(u) < half && s > cut.tangent * u + std::abs(cut.tangent) * kCutRadius) {
-          dark += std::abs(u) > kLumen * half ? kWall_grey : kLumen_grey;
+        if (std::abs(u) < half && s > wide.tangent * u + std::abs(wide.tangent) * wide.radius) {
+          dark += std::abs(u) > kLumen * half || (wide.closed && s < kClosed_px)
+                      ? kWall_grey * (u < 0 ? wide.other_wall : 1)
+                      : kLumen_grey;
         }
-        if (std::hypot(s - cut.speck_px, u - cut.side * half) < kSpeck_px) {
+        if (s > 0 && std::abs(std::abs(u) - half - kFringe_px) < 1.5) {
+          dark -= wide.fringes;
+        }
+        if (wide.speck_px > 0 && std::hypot(s - wide.speck_px, u - wide.side * half) < kSpeck_px) {
           dark += kSpeck_grey;
+        }
+        if (wide.lump_px > 0 && std::hypot(s - wide.lump_px, u) < kLump_px) {
+          dark = kLump_grey;
         }
         m.at<float>(y, x) -= static_cast<float>(dark / (kFine * kFine));
       }
     }
   }
-  cv::GaussianBlur(m, m, cv::Size(0, 0), kBlur_px);
-  return photographed(m, 2000, kCutNoise);
+  cv::GaussianBlur(m, m, cv::Size(0, 0), wide.blur_px);
+  return photographed(m, seed, kWideNoise);
 }
 
+const InjectionPipette::Clear kClear = [](const Point&) { return true; };
+
 // With what is right in the first frames of tests/numeric.
-TEST(CutNeedle, ends_with_the_outermost_glass_though_a_speck_lies_on_a_wall) {
+TEST(WideNeedle, ends_with_the_outermost_glass_though_a_speck_lies_on_a_wall) {
   constexpr double kTip_px = 2.5, kAside_px = 1;
   for (const double tangent : {-0.6, -0.3, 0.0, 0.3, 0.6}) {
     for (const double speck_px : {10.0, 14.0, 20.0}) {
       for (const double side : {-1.0, 1.0}) {
-        InjectionPipette needle(Side::right, kCutRadius);
-        const GradientField field = draw(Cut{tangent, speck_px, side});
-        ASSERT_TRUE(needle.start(field, kCutNoise, [](const Point&) { return true; }));
-        const NeedlePose seen = needle.as_found(kCutNoise);
-        EXPECT_NEAR(seen.tip.x, kCutTip_x, kTip_px) << tangent << ' ' << speck_px << ' ' << side;
+        InjectionPipette needle(Side::right, kWideRadius);
+        const Wide wide{.tangent = tangent, .speck_px = speck_px, .side = side};
+        ASSERT_TRUE(needle.start(draw(wide), kWideNoise, kClear));
+        const NeedlePose seen = needle.as_found(kWideNoise);
+        EXPECT_NEAR(seen.tip.x, wide.tip, kTip_px) << tangent << ' ' << speck_px << ' ' << side;
         EXPECT_NEAR(seen.tip.y, kAxis_y, kAside_px) << tangent << ' ' << speck_px << ' ' << side;
       }
     }
   }
+}
+
+// As where light comes from one side: the strong wall alone looks like a thin needle.
+TEST(WideNeedle, lies_between_a_strong_wall_and_a_faint_one) {
+  constexpr double kTip_px = 2.5, kAside_px = 1.5, kAxis_y_most = 0.03;
+  for (const double other : {0.15, 0.3, -0.3}) {
+    for (const double radius : {5.0, 6.0}) {
+      InjectionPipette needle(Side::right, radius);
+      const Wide wide{.other_wall = other, .radius = radius};
+      ASSERT_TRUE(needle.start(draw(wide), kWideNoise, kClear)) << other << ' ' << radius;
+      const NeedlePose seen = needle.as_found(kWideNoise);
+      EXPECT_NEAR(seen.tip.x, wide.tip, kTip_px) << other << ' ' << radius;
+      EXPECT_NEAR(seen.tip.y, kAxis_y, kAside_px) << other << ' ' << radius;
+      EXPECT_NEAR(seen.axis.y, 0, kAxis_y_most) << other << ' ' << radius;
+    }
+  }
+}
+
+// A fringe on either side is no wall.
+TEST(WideNeedle, is_no_wider_for_fringes_beside_a_thin_one) {
+  InjectionPipette needle(Side::right, kTipRadius);
+  const Wide thin{.fringes = 8, .radius = kTipRadius};
+  ASSERT_TRUE(needle.start(draw(thin), kWideNoise, kClear));
+  const NeedlePose seen = needle.as_found(kWideNoise);
+  EXPECT_LT(seen.half_width, kTipRadius + 2.5);
+  EXPECT_NEAR(seen.tip.y, kAxis_y, 1);
+}
+
+TEST(WideNeedle, does_not_end_where_something_lies_across_it) {
+  for (const double lump_px : {90.0, 130.0, 170.0}) {
+    InjectionPipette needle(Side::right, kWideRadius);
+    const Wide wide{.lump_px = lump_px};
+    ASSERT_TRUE(needle.start(draw(wide), kWideNoise, kClear)) << lump_px;
+    EXPECT_NEAR(needle.as_found(kWideNoise).tip.x, wide.tip, 2.5) << lump_px;
+  }
+}
+
+// There its shape and its walls end several pixels apart.
+TEST(WideNeedle, is_followed_where_it_was_found_though_it_is_out_of_focus) {
+  constexpr double kUsual_px = 1.5;
+  constexpr unsigned kFrames = 6;
+  double shifts = 0;
+  const std::vector<unsigned> seeds{1, 2, 3, 4, 5, 6};
+  for (const unsigned seed : seeds) {
+    InjectionPipette needle(Side::right, kWideRadius);
+    Wide wide{.closed = true, .blur_px = 2.6, .radius = 6};
+    ASSERT_TRUE(needle.start(draw(wide, 100 * seed), kWideNoise, kClear)) << seed;
+    const double off = needle.as_found(kWideNoise).tip.x - wide.tip;
+    for (unsigned frame = 1; frame <= kFrames; ++frame) {
+      wide.tip -= 1;
+      const GradientField field = draw(wide, 100 * seed + frame);
+      const NeedlePose seen = needle.find(field, kWideNoise, std::nullopt);
+      ASSERT_TRUE(seen.ok) << seed << ' ' << frame << ": " << seen.reason;
+      shifts += std::abs(seen.tip.x - wide.tip - off) / static_cast<double>(kFrames * seeds.size());
+      needle.learn(field, seen, kWideNoise);
+    }
+  }
+  EXPECT_LT(shifts, kUsual_px);
 }
 
 }  // namespace

@@ -1,0 +1,184 @@
+#include "vision/pipettes/faint_wall.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+
+#include "vision/image/kept_vector.hpp"
+#include "vision/image/median.hpp"
+
+namespace punctum::vision {
+
+namespace {
+
+constexpr double kFrom_px = 10, kTo_px = 154, kApart_px = 3;  // stations behind the tip
+constexpr int kAside_px = 30;                                 // of the pose, a pixel apart
+constexpr int kBeside_px = 5;  // from the middle of a line, what it is compared with
+constexpr int kPlaces = 2 * kAside_px + 1;
+constexpr int kSteepest = 12;   // steps to either side of the pose's axis
+constexpr double kTurn = 0.01;  // px across per px along
+
+// A line along the needle: its place across the pose at the distance s behind the tip.
+struct Line {
+  double at_middle = 0, slope = 0;
+  double contrast = 0;  // grey levels over what lies beside it
+
+  [[nodiscard]] double at(double s) const { return at_middle + slope * (s - 0.5 * (kFrom_px + kTo_px)); }
+};
+
+// Grey levels across the pose at each station, a pixel apart.
+constexpr int kWide = kPlaces + 2 * kBeside_px;
+using Rows = Vector<std::array<double, kWide>>;
+
+Rows rows_across(const GradientField& field, const NeedlePose& needle) {
+  Rows rows;
+  const Point across(-needle.axis.y, needle.axis.x);
+  std::array<float, kWide + GradientField::kAtOnce> grey{};
+  for (double s = kFrom_px; s <= kTo_px; s += kApart_px) {
+    const Point from = needle.at(s, -kAside_px - kBeside_px);
+    if (!field.contains(from, across, kWide)) {
+      break;
+    }
+    field.greys(from, across, kWide, grey.data());
+    std::copy_n(grey.begin(), kWide, rows.emplace_back().begin());
+  }
+  return rows;
+}
+
+// Between what lies on either side of the line there is nothing but that.
+void erase(const Line& line, Rows& rows) {
+  constexpr int kHalf_px = 5;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const double u = line.at(kFrom_px + kApart_px * static_cast<double>(i));
+    const long middle = std::lround(u) + kAside_px + kBeside_px;
+    const auto first = static_cast<std::size_t>(std::clamp(middle - kHalf_px, 0L, kWide - 1L)),
+               last = static_cast<std::size_t>(std::clamp(middle + kHalf_px, 0L, kWide - 1L));
+    const double step =
+        (rows[i][last] - rows[i][first]) / static_cast<double>(std::max<std::size_t>(last - first, 1));
+    for (std::size_t k = first + 1; k < last; ++k) {
+      rows[i][k] = rows[i][first] + step * static_cast<double>(k - first);
+    }
+  }
+}
+
+// How much brighter each place is than what lies beside it.
+using Band = Vector<std::array<double, kPlaces>>;
+
+Band lines_of(const Rows& rows) {
+  Band band(rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (std::size_t k = 0; k < kPlaces; ++k) {
+      band[i][k] = rows[i][k + kBeside_px] - 0.5 * (rows[i][k] + rows[i][k + 2 * kBeside_px]);
+    }
+  }
+  return band;
+}
+
+std::size_t place_of(const Line& line, std::size_t station) {
+  const double u = line.at(kFrom_px + kApart_px * static_cast<double>(station));
+  return static_cast<std::size_t>(std::clamp(std::lround(u) + kAside_px, 0L, kPlaces - 1L));
+}
+
+// Its contrast is a mean; no station counts for more than `most` grey levels.
+Line line_along(const Band& band, int middle, int slope, double most) {
+  Line line{static_cast<double>(middle), slope * kTurn};
+  for (std::size_t i = 0; i < band.size(); ++i) {
+    line.contrast += std::clamp(band[i][place_of(line, i)], -most, most) / static_cast<double>(band.size());
+  }
+  return line;
+}
+
+// The median along it.
+double contrast_of(const Line& line, const Band& band) {
+  Vector<double> along;
+  along.reserve(band.size());
+  for (std::size_t i = 0; i < band.size(); ++i) {
+    along.push_back(band[i][place_of(line, i)]);
+  }
+  return along.empty() ? 0 : median_of(along);
+}
+
+// The line with the most contrast of those that `may_be`.
+template <typename MayBe>
+Line strongest(const Band& band, double most, MayBe may_be) {
+  Line best;
+  for (int middle = -kAside_px; middle <= kAside_px; ++middle) {
+    for (int slope = -kSteepest; slope <= kSteepest; ++slope) {
+      const Line line{static_cast<double>(middle), slope * kTurn};
+      if (!may_be(line)) {
+        continue;
+      }
+      if (const Line seen = line_along(band, middle, slope, most);
+          std::abs(seen.contrast) > std::abs(best.contrast)) {
+        best = seen;
+      }
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+std::optional<NeedlePose> with_faint_wall(const GradientField& field, double noise, double radius,
+                                          const NeedlePose& needle) {
+  constexpr std::size_t kFewest = 20;  // stations
+  constexpr double kNoises = 6, kMostNoises = 4, kOneSided = 1.6, kFaint = 0.35;
+  constexpr double kNearest_px = 7, kSteepestTaper = 0.1;  // of the lines' middles
+  constexpr double kHalfOfLine_px = 2.2, kMissed_px = 2;
+  Rows rows = rows_across(field, needle);
+  Band band = lines_of(rows);
+  if (band.size() < kFewest) {
+    return std::nullopt;
+  }
+  const double smooth_noise = std::max(noise, 0.5) / (2 * field.sigma * std::sqrt(std::numbers::pi));
+  const double of_place = smooth_noise * std::sqrt(1.5);
+  const double least = kNoises * of_place / std::sqrt(static_cast<double>(band.size()));
+  const double reach = needle.half_width_at(kTo_px) + kBeside_px;
+  const Line wall =
+      strongest(band, 1e9, [&](const Line& line) { return std::abs(line.at(kTo_px)) <= reach; });
+  erase(wall, rows);
+  band = lines_of(rows);
+  const double length = kTo_px - kFrom_px;
+  // Specks tell little at first; then as much as the line that was found.
+  const auto beside = [&](double side) {
+    const auto may_be = [&](const Line& line) {
+      const double near = side * (line.at(kFrom_px) - wall.at(kFrom_px)),
+                   far = side * (line.at(kTo_px) - wall.at(kTo_px));
+      return near >= kNearest_px && near <= 2 * (2 * radius + 1) && far >= near &&
+             far - near <= 2 * kSteepestTaper * length && std::abs(line.at(kTo_px)) <= kAside_px &&
+             std::abs(line.at(kFrom_px)) <= kAside_px;
+    };
+    double most = kMostNoises * of_place;
+    Line line = strongest(band, most, may_be);
+    const double usual = std::abs(contrast_of(line, band));
+    if (usual > 0.5 * most) {
+      line = strongest(band, 1.5 * usual, may_be);
+    }
+    return line;
+  };
+  const Line low = beside(-1), high = beside(1);
+  const Line& other = std::abs(low.contrast) > std::abs(high.contrast) ? low : high;
+  const Line& opposite = &other == &low ? high : low;
+  const double middle = 0.5 * (kFrom_px + kTo_px);
+  const bool faint =
+      std::abs(other.contrast)<kFaint * std::abs(wall.contrast),
+                               missed = std::max(std::abs(wall.at(middle)), std::abs(other.at(middle)))>
+          needle.half_width_at(middle) +
+      kMissed_px;
+  if (std::abs(other.contrast) < least || !(faint || missed) ||
+      std::abs(other.contrast) < kOneSided * std::abs(opposite.contrast)) {
+    return std::nullopt;
+  }
+  const Point across(-needle.axis.y, needle.axis.x);
+  NeedlePose found = needle;
+  found.tip = needle.at(0, 0.5 * (wall.at(0) + other.at(0)));
+  found.axis -= 0.5 * (wall.slope + other.slope) * across;
+  found.axis *= 1 / cv::norm(found.axis);
+  found.half_width = 0.5 * std::abs(wall.at(0) - other.at(0)) + kHalfOfLine_px;
+  found.taper = 0.5 * std::abs(wall.slope - other.slope);
+  return found;
+}
+
+}  // namespace punctum::vision

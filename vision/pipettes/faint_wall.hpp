@@ -1,0 +1,18 @@
+// In relief contrast, where light comes from one side, one wall of the injection pipette may be a strong line
+// and the other a faint one: the strong line alone looks like a thin needle, and its inner face like a wall.
+#pragma once
+
+#include <optional>
+
+#include "vision/image/gradient.hpp"
+#include "vision/pipettes/needle_pose.hpp"
+
+namespace punctum::vision {
+
+// The needle between the strongest line along the pose and a fainter one on one side of it. noise: grey
+// levels. radius: expected at the tip, px. Empty where no such line stands out, or lines do on both sides, or
+// it is nearly as strong and the pose encloses both.
+[[nodiscard]] std::optional<NeedlePose> with_faint_wall(const GradientField& field, double noise,
+                                                        double radius, const NeedlePose& needle);
+
+}  // namespace punctum::vision

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <opencv2/core.hpp>
 
+#include "vision/image/dispatched.hpp"
 #include "vision/image/median.hpp"
 #include "vision/image/polar_contour.hpp"
 
@@ -51,26 +52,41 @@ std::optional<Circle> algebraic_circle(std::span<const Point> points, const Vect
   return c;
 }
 
+// Of points seen from the centre of a circle: their directions, and how far off it they are. A point in the
+// centre has no direction, and no weight.
+PUNCTUM_WIDE_LOOP void off_circle(const Point* points, const double* weight, std::size_t n, const Point& mean,
+                                  const Circle& c, double* x, double* y, double* off, double* w) {
+  const double mean_x = mean.x, mean_y = mean.y, centre_x = c.centre.x, centre_y = c.centre.y, r = c.r;
+  for (std::size_t i = 0; i < n; ++i) {
+    const double dx = points[i].x - mean_x - centre_x, dy = points[i].y - mean_y - centre_y,
+                 l = std::sqrt(dx * dx + dy * dy);
+    const bool none = l < 1e-9;
+    x[i] = none ? 0 : dx / l;
+    y[i] = none ? 0 : dy / l;
+    w[i] = none ? 0 : weight[i];
+    off[i] = l - r;
+  }
+}
+
 // Gauss-Newton steps that make the fit geometric: the squared distances from the circle are minimised.
-void refine(std::span<const Point> points, const Vector<double>& w, const Point& mean, int steps, Circle& c) {
+void refine(std::span<const Point> points, const Vector<double>& weights, const Point& mean, int steps,
+            Circle& c) {
+  const std::size_t n = points.size();
+  Vector<double> x(n), y(n), off(n), w(n);
   for (int step = 0; step < steps; ++step) {
+    off_circle(points.data(), weights.data(), n, mean, c, x.data(), y.data(), off.data(), w.data());
     double xx = 0, xy = 0, yy = 0, x1 = 0, y1 = 0, one = 0, bx = 0, by = 0, b1 = 0;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const Point d = points[i] - mean - c.centre;
-      const double l = std::sqrt(d.dot(d));
-      if (l < 1e-9) {
-        continue;
-      }
-      const double x = d.x / l, y = d.y / l, wx = w[i] * x, wy = w[i] * y, off = l - c.r;
-      xx += wx * x;
-      xy += wx * y;
-      yy += wy * y;
+    for (std::size_t i = 0; i < n; ++i) {
+      const double wx = w[i] * x[i], wy = w[i] * y[i];
+      xx += wx * x[i];
+      xy += wx * y[i];
+      yy += wy * y[i];
       x1 += wx;
       y1 += wy;
       one += w[i];
-      bx += wx * off;
-      by += wy * off;
-      b1 += w[i] * off;
+      bx += wx * off[i];
+      by += wy * off[i];
+      b1 += w[i] * off[i];
     }
     const cv::Matx33d a(xx, xy, x1, xy, yy, y1, x1, y1, one);
     const cv::Vec3d b(bx, by, b1);
@@ -122,7 +138,7 @@ std::optional<Circle> fit_circle(std::span<const Point> points, std::span<const 
   }
   mean *= 1 / total;
   Circle out;
-  Vector<double> distances;
+  Vector<double> distances, off(points.size());  // of the points with weight; of all, with their sign
   distances.reserve(points.size());
   std::optional<Circle> c = algebraic_circle(points, w, mean);
   for (int round = 0; round < kReweightings; ++round) {
@@ -138,17 +154,17 @@ std::optional<Circle> fit_circle(std::span<const Point> points, std::span<const 
     distances.clear();
     double se = 0, sw = 0;
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const double d = cv::norm(points[i] - out.centre) - out.r;
+      off[i] = cv::norm(points[i] - out.centre) - out.r;
       if (given[i] > 0) {
-        distances.push_back(std::abs(d));
+        distances.push_back(std::abs(off[i]));
       }
-      se += w[i] * d * d;
+      se += w[i] * off[i] * off[i];
       sw += w[i];
     }
     out.rms = std::sqrt(se / std::max(sw, 1e-12));
     const double scale = std::max(kSdOfMedian * median_in_place(distances), kLeastScale);
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const double t = (cv::norm(points[i] - out.centre) - out.r) / (kTukeyScales * scale);
+      const double t = off[i] / (kTukeyScales * scale);
       w[i] = std::abs(t) < 1 ? given[i] * std::pow(1 - t * t, 2) : 0;
     }
   }

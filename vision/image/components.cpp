@@ -1,6 +1,8 @@
 #include "vision/image/components.hpp"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cstdint>
 #include <cstring>
 #include <numeric>
@@ -9,30 +11,51 @@ namespace punctum::vision {
 
 namespace {
 
-// First pixel > 0 from x on. Most of a picture is empty: eight pixels at a time.
-int next_set(const std::uint8_t* row, int x, int end) {
-  for (std::uint64_t eight = 0; x + 8 <= end; x += 8) {
-    std::memcpy(&eight, row + x, 8);
-    if (eight != 0) {
-      break;
+// Of 64 pixels of a row, or as many as there are: bit i is set where pixel i is > 0.
+std::uint64_t set_pixels(const std::uint8_t* pixels, int count) {
+  static_assert(std::endian::native == std::endian::little);
+  constexpr std::uint64_t kLow = 0x7f7f7f7f7f7f7f7f, kHigh = 0x8080808080808080;
+  std::array<std::uint64_t, 8> eight{};
+  if (count >= 64) {
+    std::memcpy(eight.data(), pixels, 64);
+  } else {
+    std::memcpy(eight.data(), pixels, static_cast<std::size_t>(count));
+  }
+  std::uint64_t out = 0;
+  if (((eight[0] | eight[1]) | (eight[2] | eight[3])) != 0 ||
+      ((eight[4] | eight[5]) | (eight[6] | eight[7])) != 0) {
+    for (std::size_t k = 0; k < eight.size(); ++k) {
+      const std::uint64_t highest = (((eight[k] & kLow) + kLow) | eight[k]) & kHigh;  // of each pixel > 0
+      constexpr std::uint64_t kTogether = 0x0002040810204081;  // moves the eight of them side by side
+      out |= (highest * kTogether >> 56) << 8 * k;
     }
   }
-  while (x < end && row[x] == 0) {
-    ++x;
-  }
-  return x;
+  return out;
 }
 
+// 64 pixels at once: a run begins or ends where neighbouring bits differ. A branch per pixel would often be
+// guessed wrong.
 void find_runs(const cv::Mat& binary, Components& out) {
   for (int y = 0; y < binary.rows; ++y) {
     out.row.push_back(out.runs.size());
     const std::uint8_t* row = binary.ptr(y);
-    for (int x = next_set(row, 0, binary.cols); x < binary.cols; x = next_set(row, x, binary.cols)) {
-      const int from = x;
-      while (x < binary.cols && row[x] > 0) {
-        ++x;
+    int from = 0;
+    std::uint64_t last = 0;  // the pixel before
+    for (int x = 0; x < binary.cols; x += 64) {
+      const std::uint64_t here = set_pixels(row + x, binary.cols - x);
+      bool within = last != 0;
+      for (std::uint64_t changes = here ^ (here << 1 | last); changes != 0; changes &= changes - 1) {
+        const int at = x + std::countr_zero(changes);
+        if (within) {
+          out.runs.push_back({y, from, at, 0});
+        }
+        from = at;
+        within = !within;
       }
-      out.runs.push_back({y, from, x, 0});
+      last = here >> 63;
+    }
+    if (last != 0) {
+      out.runs.push_back({y, from, binary.cols, 0});
     }
   }
   out.row.push_back(out.runs.size());
@@ -89,12 +112,16 @@ Components components_of(const cv::Mat& binary) {
     const std::size_t root = trees.root(i);
     if (root == i) {
       run.component = out.box.size();
-      out.box.emplace_back();
+      out.box.emplace_back(run.from, run.y, 0, 0);
       out.pixels.push_back(0);
     } else {
       run.component = out.runs[root].component;
     }
-    out.box[run.component] |= cv::Rect(run.from, run.y, run.to - run.from, 1);
+    cv::Rect& box = out.box[run.component];
+    const int right = std::max(box.x + box.width, run.to);
+    box.x = std::min(box.x, run.from);
+    box.width = right - box.x;
+    box.height = run.y + 1 - box.y;
     out.pixels[run.component] += run.to - run.from;
   }
   return out;

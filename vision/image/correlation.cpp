@@ -7,6 +7,7 @@
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 
+#include "vision/image/dispatched.hpp"
 #include "vision/image/kept_memory.hpp"
 #include "vision/image/parabola.hpp"
 
@@ -26,22 +27,44 @@ cv::Mat match(const cv::Mat& window, const cv::Mat& pattern, int method) {
   return map;
 }
 
+struct RowProducts {
+  int dot = 0, squares = 0;
+};
+PUNCTUM_WIDE_LOOP RowProducts products_of_row(const std::int16_t* m, const std::int16_t* i, int n) {
+  RowProducts out;
+  for (int x = 0; x < n; ++x) {
+    out.dot += m[x] * i[x];
+    out.squares += i[x] * i[x];
+  }
+  return out;
+}
+
 // Eq. 1 of grey levels as whole numbers, whose sums over a row are exact.
 double correlation_at(const cv::Mat& window, const cv::Mat& pattern, double power, int left, int top) {
   std::int64_t dot = 0, squares = 0;
-  const int n = pattern.cols;
   for (int y = 0; y < pattern.rows; ++y) {
-    const std::int16_t *m = pattern.ptr<std::int16_t>(y), *i = window.ptr<std::int16_t>(top + y) + left;
-    int row_dot = 0, row_squares = 0;
-    for (int x = 0; x < n; ++x) {
-      row_dot += m[x] * i[x];
-      row_squares += i[x] * i[x];
-    }
-    dot += row_dot;
-    squares += row_squares;
+    const RowProducts row =
+        products_of_row(pattern.ptr<std::int16_t>(y), window.ptr<std::int16_t>(top + y) + left, pattern.cols);
+    dot += row.dot;
+    squares += row.squares;
   }
   const double norm = std::sqrt(power * static_cast<double>(squares));
   return norm > 0 ? static_cast<double>(dot) / norm : 0;
+}
+
+PUNCTUM_WIDE_LOOP void add_row_sums(const float* row, float usual, std::size_t n, float* sum,
+                                    float* squares) {
+  for (std::size_t x = 0; x < n; ++x) {
+    const float here = row[x] - usual;
+    sum[x] += here;
+    squares[x] += here * here;
+  }
+}
+
+PUNCTUM_WIDE_LOOP void add_row_products(const float* a, const float* b, std::size_t n, float* sum) {
+  for (std::size_t x = 0; x < n; ++x) {
+    sum[x] += a[x] * b[x];
+  }
 }
 
 // Of floats. Column by column, of which a compiler makes several at once, and then over the columns.
@@ -63,19 +86,12 @@ cv::Mat centred_correlations(const cv::Mat& window, const cv::Mat& pattern, cons
     std::fill(sum.begin(), sum.end(), 0.0F);
     std::fill(squares.begin(), squares.end(), 0.0F);
     for (int y = 0; y < pattern.rows; ++y) {
-      const float* row = window.ptr<float>(top + y);
-      for (std::size_t x = 0; x < all; ++x) {
-        sum[x] += row[x] - usual;
-        squares[x] += (row[x] - usual) * (row[x] - usual);
-      }
+      add_row_sums(window.ptr<float>(top + y), usual, all, sum.data(), squares.data());
     }
     for (int left = 0; left < places.width; ++left) {
       std::fill(dot.begin(), dot.end(), 0.0F);
       for (int y = 0; y < pattern.rows; ++y) {
-        const float *m = centred.ptr<float>(y), *i = window.ptr<float>(top + y) + left;
-        for (std::size_t x = 0; x < n; ++x) {
-          dot[x] += m[x] * i[x];
-        }
+        add_row_products(centred.ptr<float>(y), window.ptr<float>(top + y) + left, n, dot.data());
       }
       const double here = total(sum, left), spread = total(squares, left) - here * here / count;
       map.at<float>(top, left) =

@@ -52,10 +52,11 @@ void smooth_part(const cv::Mat& grey, const cv::Rect& part, double sigma_px, Smo
   out.create(part.size(), CV_32F);
   auto& [wide, across] = kept;  // across: of the last nine rows
   wide.resize(static_cast<std::size_t>(n + 2 * kReach));
-  across.resize(static_cast<std::size_t>(n) * (2 * kReach + 1));
+  constexpr std::size_t kLine = kept::kAlignment / sizeof(float);  // where rows begin, loads cross no line
+  const std::size_t row = (static_cast<std::size_t>(n) + kLine - 1) / kLine * kLine;
+  across.resize(row * (2 * kReach + 1));
   const auto row_of = [&](int y) {
-    return across.data() +
-           static_cast<std::size_t>((y + kReach) % (2 * kReach + 1)) * static_cast<std::size_t>(n);
+    return across.data() + static_cast<std::size_t>((y + kReach) % (2 * kReach + 1)) * row;
   };
   const int from = std::max(part.x - kReach, 0), to = std::min(part.x + n + kReach, grey.cols);
   for (int y = -kReach; y < part.height + kReach; ++y) {

@@ -33,65 +33,87 @@ PUNCTUM_WIDE_LOOP void lengths(const float* slope, int n, float* out) {
   }
 }
 
-using FourInts = int __attribute__((vector_size(16)));
+constexpr int kEight = 8;
+using EightFloats = float __attribute__((vector_size(kEight * sizeof(float))));
+using EightInts = int __attribute__((vector_size(kEight * sizeof(int))));
 
-// Four places between the pixels of a field.
-struct FourPlaces {
-  FourInts left, top;
-  FourFloats u, v;
-  FourPlaces(const cv::Point2f& from, const cv::Point2f& step, int j) {
-    const FourFloats k = FourFloats{0, 1, 2, 3} + static_cast<float>(j);
-    const FourFloats x = from.x + k * step.x, y = from.y + k * step.y;
-    left = __builtin_convertvector(x, FourInts);
-    top = __builtin_convertvector(y, FourInts);
-    u = x - __builtin_convertvector(left, FourFloats);
-    v = y - __builtin_convertvector(top, FourFloats);
-  }
-  [[nodiscard]] std::ptrdiff_t pixel(int l, int stride) const {
-    return static_cast<std::ptrdiff_t>(top[l]) * stride + left[l];
+// Eight places between the pixels of a field whose rows lie `stride` pixels apart, from the j-th on; or four
+// of them twice.
+struct EightPlaces {
+  EightInts pixel;  // the upper left of each
+  EightFloats u, v;
+  EightPlaces(const cv::Point2f& from, const cv::Point2f& step, int j, bool only_four, int stride) {
+    const EightFloats all{0, 1, 2, 3, 4, 5, 6, 7}, four{0, 1, 2, 3, 0, 1, 2, 3};
+    const EightFloats k = (only_four ? four : all) + static_cast<float>(j);
+    const EightFloats x = from.x + k * step.x, y = from.y + k * step.y;
+    const EightInts left = __builtin_convertvector(x, EightInts), top = __builtin_convertvector(y, EightInts);
+    u = x - __builtin_convertvector(left, EightFloats);
+    v = y - __builtin_convertvector(top, EightFloats);
+    pixel = top * stride + left;
   }
 };
 
-PUNCTUM_WIDE_LOOP void pairs_along(const float* slope, int stride, const cv::Point2f& from,
-                                   const cv::Point2f& step, int count, float* gx, float* gy) {
-  for (int j = 0; j < count; j += GradientField::kAtOnce) {
-    const FourPlaces at(from, step, j);
-    std::array<FourFloats, 4> pairs;
-    for (int l = 0; l < 4; ++l) {
-      const float* first = slope + 2 * at.pixel(l, stride);
-      FourFloats above, below;
-      std::memcpy(&above, first, sizeof above);
-      std::memcpy(&below, first + 2 * stride, sizeof below);
-      pairs[static_cast<std::size_t>(l)] = above + at.v[l] * (below - above);
-    }
-    // Of the four, the components on the left and on the right side by side.
-    const FourFloats x01 = __builtin_shufflevector(pairs[0], pairs[1], 0, 4, 2, 6),
-                     y01 = __builtin_shufflevector(pairs[0], pairs[1], 1, 5, 3, 7),
-                     x23 = __builtin_shufflevector(pairs[2], pairs[3], 0, 4, 2, 6),
-                     y23 = __builtin_shufflevector(pairs[2], pairs[3], 1, 5, 3, 7);
-    const FourFloats x_left = __builtin_shufflevector(x01, x23, 0, 1, 4, 5),
-                     x_right = __builtin_shufflevector(x01, x23, 2, 3, 6, 7),
-                     y_left = __builtin_shufflevector(y01, y23, 0, 1, 4, 5),
-                     y_right = __builtin_shufflevector(y01, y23, 2, 3, 6, 7);
-    const FourFloats x = x_left + at.u * (x_right - x_left), y = y_left + at.u * (y_right - y_left);
-    std::memcpy(gx + j, &x, sizeof x);
-    std::memcpy(gy + j, &y, sizeof y);
+void store(const EightFloats& values, bool only_four, float* out) {
+  std::memcpy(out, &values, (only_four ? 4 : 8) * sizeof(float));
+}
+
+// Of the pairs at place l and at place l + 4, between the upper and the lower row.
+template <int l>
+[[gnu::always_inline]] inline void pairs_between_rows(const float* slope, int stride, const EightPlaces& at,
+                                                      EightFloats& out) {
+  const float *first = slope + 2 * static_cast<std::ptrdiff_t>(at.pixel[l]),
+              *second = slope + 2 * static_cast<std::ptrdiff_t>(at.pixel[l + 4]);
+  FourFloats above_first, above_second, below_first, below_second;
+  std::memcpy(&above_first, first, sizeof above_first);
+  std::memcpy(&above_second, second, sizeof above_second);
+  std::memcpy(&below_first, first + 2 * stride, sizeof below_first);
+  std::memcpy(&below_second, second + 2 * stride, sizeof below_second);
+  const EightFloats above = __builtin_shufflevector(above_first, above_second, 0, 1, 2, 3, 4, 5, 6, 7),
+                    below = __builtin_shufflevector(below_first, below_second, 0, 1, 2, 3, 4, 5, 6, 7),
+                    v = __builtin_shufflevector(at.v, at.v, l, l, l, l, l + 4, l + 4, l + 4, l + 4);
+  out = above + v * (below - above);
+}
+
+PUNCTUM_WIDE_LOOP void pairs_along(const float* slope, int stride, const cv::Point2f from,
+                                   const cv::Point2f step, int count, float* gx, float* gy) {
+  for (int j = 0; j < count; j += kEight) {
+    const bool only_four = count - j <= GradientField::kAtOnce;
+    const EightPlaces at(from, step, j, only_four, stride);
+    std::array<EightFloats, 4> pairs;
+    pairs_between_rows<0>(slope, stride, at, pairs[0]);
+    pairs_between_rows<1>(slope, stride, at, pairs[1]);
+    pairs_between_rows<2>(slope, stride, at, pairs[2]);
+    pairs_between_rows<3>(slope, stride, at, pairs[3]);
+    // The components on the left and on the right side by side.
+    const EightFloats x01 = __builtin_shufflevector(pairs[0], pairs[1], 0, 8, 2, 10, 4, 12, 6, 14),
+                      y01 = __builtin_shufflevector(pairs[0], pairs[1], 1, 9, 3, 11, 5, 13, 7, 15),
+                      x23 = __builtin_shufflevector(pairs[2], pairs[3], 0, 8, 2, 10, 4, 12, 6, 14),
+                      y23 = __builtin_shufflevector(pairs[2], pairs[3], 1, 9, 3, 11, 5, 13, 7, 15);
+    const EightFloats x_left = __builtin_shufflevector(x01, x23, 0, 1, 8, 9, 4, 5, 12, 13),
+                      x_right = __builtin_shufflevector(x01, x23, 2, 3, 10, 11, 6, 7, 14, 15),
+                      y_left = __builtin_shufflevector(y01, y23, 0, 1, 8, 9, 4, 5, 12, 13),
+                      y_right = __builtin_shufflevector(y01, y23, 2, 3, 10, 11, 6, 7, 14, 15);
+    const EightFloats x = x_left + at.u * (x_right - x_left), y = y_left + at.u * (y_right - y_left);
+    store(x, only_four, gx + j);
+    store(y, only_four, gy + j);
   }
 }
 
-PUNCTUM_WIDE_LOOP void values_along(const float* smooth, int stride, const cv::Point2f& from,
-                                    const cv::Point2f& step, int count, float* out) {
-  for (int j = 0; j < count; j += GradientField::kAtOnce) {
-    const FourPlaces at(from, step, j);
-    std::array<const float*, 4> p{};
-    for (int l = 0; l < 4; ++l) {
-      p[static_cast<std::size_t>(l)] = smooth + at.pixel(l, stride);
+PUNCTUM_WIDE_LOOP void values_along(const float* smooth, int stride, const cv::Point2f from,
+                                    const cv::Point2f step, int count, float* out) {
+  for (int j = 0; j < count; j += kEight) {
+    const bool only_four = count - j <= GradientField::kAtOnce;
+    const EightPlaces at(from, step, j, only_four, stride);
+    EightFloats a0, a1, b0, b1;
+    for (int l = 0; l < kEight; ++l) {
+      const float *above = smooth + at.pixel[l], *below = above + stride;
+      a0[l] = above[0];
+      a1[l] = above[1];
+      b0[l] = below[0];
+      b1[l] = below[1];
     }
-    const auto four = [&p](std::ptrdiff_t by) { return FourFloats{p[0][by], p[1][by], p[2][by], p[3][by]}; };
-    const FourFloats a0 = four(0), a1 = four(1), b0 = four(stride), b1 = four(stride + 1);
-    const FourFloats left = a0 + at.v * (b0 - a0), right = a1 + at.v * (b1 - a1);
-    const FourFloats value = left + at.u * (right - left);
-    std::memcpy(out + j, &value, sizeof value);
+    const EightFloats left = a0 + at.v * (b0 - a0), right = a1 + at.v * (b1 - a1);
+    store(left + at.u * (right - left), only_four, out + j);
   }
 }
 

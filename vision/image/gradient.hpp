@@ -68,8 +68,8 @@ struct GradientField {
                       static_cast<std::ptrdiff_t>(slope.step[0] / sizeof(float)), at.u, at.v);
     return {static_cast<double>(gx), static_cast<double>(gy)};
   }
-  // At equally spaced places, picture coordinates, four at once: `out` has room for a multiple of four. All
-  // of them are in the area, as contains() says.
+  // At equally spaced places, picture coordinates, several at once: `out` has room for a multiple of four.
+  // All of them are in the area, as contains() says.
   static constexpr int kAtOnce = 4;
   void gradients(const Point& from, const Point& step, int count, float* gx, float* gy) const;
   void greys(const Point& from, const Point& step, int count, float* out) const;

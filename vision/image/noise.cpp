@@ -6,6 +6,7 @@
 
 #include "vision/image/dispatched.hpp"
 #include "vision/image/kept_vector.hpp"
+#include "vision/image/prefetch.hpp"
 
 namespace punctum::vision {
 
@@ -34,11 +35,18 @@ double noise_level(const cv::Mat& grey, int stride) {
   const int cols = grey.cols;
   std::array<int, 2041> count{};  // |1 -2 1; -2 4 -2; 1 -2 1| <= 2040
   std::int64_t total = 0;
-  Vector<std::int16_t> upright(static_cast<std::size_t>(cols)), both(upright);
+  // Side by side: where one lies a multiple of 4096 bytes from the other, processors take a load from the one
+  // for a load of what was just stored in the other, and wait.
+  const auto n = static_cast<std::size_t>(cols);
+  Vector<std::int16_t> differences(2 * n);
+  std::int16_t *upright = differences.data(), *both = upright + n;
   for (int y = 1; y + 1 < grey.rows; y += stride) {
-    second_differences(grey.ptr(y - 1), grey.ptr(y), grey.ptr(y + 1), cols, upright.data(), both.data());
+    for (int row = y + kRowsAhead; row < std::min(y + kRowsAhead + stride, grey.rows); ++row) {
+      prefetch_row(grey.ptr(row), n);
+    }
+    second_differences(grey.ptr(y - 1), grey.ptr(y), grey.ptr(y + 1), cols, upright, both);
     for (int x = 1; x + 1 < cols; x += stride) {
-      ++count[static_cast<std::size_t>(both[static_cast<std::size_t>(x)])];
+      ++count[static_cast<std::size_t>(both[x])];
     }
     total += (cols - 2 + stride - 1) / stride;
   }

@@ -98,25 +98,31 @@ class CyclicBand {
     far0_ = before;
     near1_ = here;
     Two d1_last{}, d2_last{}, d2_before{};  // A(i-1,i), A(i-1,i+1), A(i-2,i)
+    // Of the rows i - 1 and i - 2: the next row waits for them, and would wait longer for the memory.
+    Two d_last{}, per_d_last{}, l1_last{}, d_before{}, per_d_before{};
     for (std::size_t i = 0; i < half_ + 2; ++i) {
       Row& row = row_[i];
-      row.l2 = row.l1 = Two{};
+      Two l1{}, l2{};
       if (i > 1) {
-        row.l2 = d2_before * row_[i - 2].per_d;
+        l2 = d2_before * per_d_before;
       }
       if (i > 0 && i <= half_) {
-        Two l1 = d1_last;
+        l1 = d1_last;
         if (i > 1) {
-          l1 -= row.l2 * row_[i - 2].d * row_[i - 1].l1;
+          l1 -= l2 * d_before * l1_last;
         }
-        row.l1 = l1 * row_[i - 1].per_d;
+        l1 *= per_d_last;
       }
+      row.l1 = l1;
+      row.l2 = l2;
+      d2_before = d2_last;
       if (i >= half_) {  // of the middle
-        d2_before = d2_last;
+        d_before = d_last;
+        per_d_before = per_d_last;
         continue;
       }
       const Two next = at(stiffness_, i + 1);
-      row.d = at(weight_, i) + tiny_ + before + 4 * here + next;
+      Two d = at(weight_, i) + tiny_ + before + 4 * here + next;
       row.x = {};
       if (i == 0) {
         row.x[0] = Two{far0_[0], near0_[1]};
@@ -129,22 +135,25 @@ class CyclicBand {
         row.x[2] = at(right, i);
       }
       if (i > 0) {
-        const Row& last = row_[i - 1];
-        row.d -= row.l1 * row.l1 * last.d;
+        d -= l1 * l1 * d_last;
         for (std::size_t c = 0; c < 3; ++c) {
-          row.x[c] -= row.l1 * last.x[c];
+          row.x[c] -= l1 * row_[i - 1].x[c];
         }
       }
       if (i > 1) {
-        const Row& last = row_[i - 2];
-        row.d -= row.l2 * row.l2 * last.d;
+        d -= l2 * l2 * d_before;
         for (std::size_t c = 0; c < 3; ++c) {
-          row.x[c] -= row.l2 * last.x[c];
+          row.x[c] -= l2 * row_[i - 2].x[c];
         }
       }
-      row.per_d = 1 / row.d;
+      row.d = d;
+      row.per_d = 1 / d;
+      d_before = d_last;
+      per_d_before = per_d_last;
+      d_last = d;
+      per_d_last = row.per_d;
+      l1_last = l1;
       d1_last = -2 * (here + next);
-      d2_before = d2_last;
       d2_last = next;
       before = here;
       here = next;

@@ -81,15 +81,20 @@ double BlurredSteps::residuals(const cv::Vec4d& x, Vector<double>& out) {
   const double blur = std::clamp(x[1], 0.3, 8.0) * std::numbers::sqrt2;
   Vector<cv::Vec4d>& column = column_;
   column.resize(shape_.size());
-  cv::Matx44d a = cv::Matx44d::zeros();
+  cv::Matx44d a = cv::Matx44d::zeros();  // its lower half: no more of it is asked for
   cv::Vec4d b = cv::Vec4d::all(0);
   for (std::size_t j = 0; j < shape_.size(); ++j) {
     const double s = place_of(edge_, j) - x[0];
     const double z = (s - x[3]) / (kHaloBlur * std::clamp(x[1], 0.3, 8.0));
-    column[j] = {1, blurred_step(s / blur), edge_.nearby ? blurred_step((s - x[2]) / blur) : 0,
-                 halo_ ? math::exp(-0.5 * z * z) : 0};
-    a += column[j] * column[j].t();
-    b += shape_[j] * column[j];
+    const cv::Vec4d& here =
+        column[j] = {1, blurred_step(s / blur), edge_.nearby ? blurred_step((s - x[2]) / blur) : 0,
+                     halo_ ? math::exp(-0.5 * z * z) : 0};
+    for (int p = 0; p < kUnknown; ++p) {
+      for (int q = 0; q <= p; ++q) {
+        a(p, q) += here[p] * here[q];
+      }
+      b[p] += shape_[j] * here[p];
+    }
   }
   for (int p = 0; p < kUnknown; ++p) {
     a(p, p) += 1e-9 * static_cast<double>(shape_.size());

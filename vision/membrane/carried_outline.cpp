@@ -87,11 +87,14 @@ void CarriedOutline::move_with_cell(const Vector<double>& now, const SeenOutline
   // Of a px of drift to the right, of drift down, and of turn.
   const std::span<const Point> ray = unit_rays(static_cast<int>(n));
   Vector<cv::Vec3d> effect(n);
+  Vector<double> variance(n), twice_sd(n);
   for (std::size_t i = 0; i < n; ++i) {
     const Point& d = ray[i];
     const double slope = (r_[(i + 1) % n] - r_[(i + n - 1) % n]) * static_cast<double>(n) /
                          (4 * std::numbers::pi * std::max(r_[i], 1.0));
     effect[i] = cv::Vec3d(d.x + slope * d.y, d.y - slope * d.x, -slope);
+    variance[i] = variance_[i] + seen.variance[i] - seen.lasting[i];
+    twice_sd[i] = 2 * std::sqrt(variance[i]);
   }
   for (int round = 0; round < 3; ++round) {
     a = cv::Matx33d::eye() * (1 / (kDrift_px * kDrift_px));
@@ -101,9 +104,8 @@ void CarriedOutline::move_with_cell(const Vector<double>& now, const SeenOutline
         continue;
       }
       const cv::Vec3d& f = effect[i];
-      const double e = now[i] - r_[i], variance = variance_[i] + seen.variance[i] - seen.lasting[i];
-      const double off = std::abs(e - f.dot(motion)) / (2 * std::sqrt(variance));
-      const double w = 1 / (kJoined * variance * std::max(1.0, off));
+      const double e = now[i] - r_[i], off = std::abs(e - f.dot(motion)) / twice_sd[i];
+      const double w = 1 / (kJoined * variance[i] * std::max(1.0, off));
       a += w * f * f.t();
       b += w * e * f;
     }

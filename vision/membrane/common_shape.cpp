@@ -137,15 +137,20 @@ PUNCTUM_WIDE_LOOP void add_moved(const MovedLanes& of, const Lanes* row, int sam
 
 }  // namespace
 
-double stiffness_of(double modes, double soft, std::size_t points) {
-  const double wave = static_cast<double>(points) / (2 * std::numbers::pi * modes);
+Vector<double> stiffness_of(double modes, const Vector<double>& soft) {
+  const double wave = static_cast<double>(soft.size()) / (2 * std::numbers::pi * modes);
   const double usual = wave * wave * (wave * wave);  // of most points
-  return soft == 0 ? usual : usual * math::pow(kSoft, soft);
+  Vector<double> out(soft.size());
+  std::transform(soft.begin(), soft.end(), out.begin(),
+                 [usual](double s) { return s == 0 ? usual : usual * math::pow(kSoft, s); });
+  return out;
 }
 
-CommonShape::CommonShape(const EdgeProfiles& profiles, const Vector<double>& soft, const EdgeShape& edge)
+CommonShape::CommonShape(const EdgeProfiles& profiles, const Vector<double>& soft,
+                         const Vector<double>& stiffness, const EdgeShape& edge)
     : profiles_(profiles),
       soft_(soft),
+      stiffness_(stiffness),
       beside_(edge.beside),
       modes_(edge.modes),
       least_lasting_(edge.lasting),
@@ -548,7 +553,6 @@ void CommonShape::smooth_places() {
     }
   }
   const double usual = std::max(median_in_place(values_), 1e-3);
-  stiffness_.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
     // An impurity on the edge makes the profile fit badly, and pulls.
     const double bad = 2 * std::max(0.0, misfit_[i] / usual - 1);
@@ -556,7 +560,6 @@ void CommonShape::smooth_places() {
     if (!beside_.empty() && beside_[i] != 0) {
       weight_[i] *= kBesideLine;
     }
-    stiffness_[i] = stiffness_of(modes_, soft_[i], n);
   }
   robust_ = weight_;
   for (int round = 0; round < 2; ++round) {

@@ -11,9 +11,9 @@
 
 namespace punctum::vision {
 
-// Of a smoothing that leaves out waves of more than `modes` periods round the contour; soft: as in
+// Per point, of a smoothing that leaves out waves of more than `modes` periods round the contour; soft: as in
 // shaped_edge.
-[[nodiscard]] double stiffness_of(double modes, double soft, std::size_t points);
+[[nodiscard]] Vector<double> stiffness_of(double modes, const Vector<double>& soft);
 
 // What the profiles of a group have in common with the shape: sums over the samples, weighted by trust.
 struct ProfileProducts {
@@ -24,8 +24,9 @@ struct ProfileProducts {
 
 class CommonShape {
  public:
-  // soft: per point, as in shaped_edge.
-  CommonShape(const EdgeProfiles& profiles, const Vector<double>& soft, const EdgeShape& edge);
+  // soft: per point, as in shaped_edge. stiffness: of the smoothing of the places.
+  CommonShape(const EdgeProfiles& profiles, const Vector<double>& soft, const Vector<double>& stiffness,
+              const EdgeShape& edge);
 
   // False: the profiles have no shape in common. learnt: that of the last frame, with which it begins; takes
   // this frame's.
@@ -59,7 +60,7 @@ class CommonShape {
   void smooth_places();
 
   const EdgeProfiles& profiles_;
-  const Vector<double>& soft_;
+  const Vector<double>&soft_, &stiffness_;
   const Vector<std::uint8_t>& beside_;
   double modes_, least_lasting_;
   Vector<double> lit_;  // per point; empty: not in relief
@@ -67,7 +68,7 @@ class CommonShape {
   Vector<double> spread_;  // per sample, of single profiles about it, grey levels
   Vector<float> trust_;    // per sample: the less other things differ there, the more
   Vector<double> place_, raw_, weight_, gain_, gain_raw_;
-  Vector<double> robust_, stiffness_;    // of the smoothing that gave the places
+  Vector<double> robust_;                // weights of the smoothing that gave the places
   Vector<double> noise_;                 // variance of a raw place for noise of one grey level, px^2
   Vector<double> misfit_;                // grey levels, rms
   Vector<double> likeness_;              // share of the variance that is explained

@@ -4,9 +4,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <numbers>
 
 #include "hal/math/elementary.hpp"
+#include "vision/image/dispatched.hpp"
 #include "vision/image/polar_contour.hpp"
 #include "vision/membrane/undeformed.hpp"
 
@@ -64,6 +66,86 @@ double share_of_depth(const Shape& shape, double u) {
   return f * f;
 }
 
+enum class Tells : std::uint8_t { edge, nothing, against };
+
+constexpr std::size_t kAtOnce = 8;  // depths
+using EightFloats = float __attribute__((vector_size(kAtOnce * sizeof(float))));
+using EightInts = int __attribute__((vector_size(kAtOnce * sizeof(int))));
+
+constexpr double kPlace_px = 0.5;  // between places along a way
+
+// What rays tell of dimples of one shape: each is looked at along its way, which is that of the needle.
+struct Ways {
+  std::size_t rays, room;    // of a ray: places
+  const float *gx, *gy;      // grey levels per px, from the first depth on
+  const Tells* tells;        // likewise
+  const float* share;        // of the depth, from the ray before them to the one after
+  const cv::Point2f* turn;   // of the outline at rest from the ray before to the one after, px
+  float first_depth, scale;  // px; of an edge
+  cv::Point2f axis;
+  Polarity polarity;
+  Relief relief;
+};
+
+// Of dimples of eight depths: what speaks for an edge along them, and how many rays tell.
+PUNCTUM_WIDE_LOOP void look_along(const Ways& ways, const float* depths, float* sums, int* told) {
+  EightFloats depth, sum{};
+  EightInts count{};
+  std::memcpy(&depth, depths, sizeof depth);
+  const EightFloats by_x = ways.axis.x * depth, by_y = ways.axis.y * depth;
+  for (std::size_t k = 0; k < ways.rays; ++k) {
+    const EightFloats place = (depth * ways.share[k + 1] - ways.first_depth) / static_cast<float>(kPlace_px);
+    const EightInts q = __builtin_convertvector(place, EightInts);
+    const EightFloats u = place - __builtin_convertvector(q, EightFloats);
+    const EightInts nearest = q - (u >= 0.5F);
+    const float *row_x = ways.gx + k * ways.room, *row_y = ways.gy + k * ways.room;
+    const Tells* row_tells = ways.tells + k * ways.room;
+    EightFloats x0, x1, y0, y1;
+    EightInts tells;
+    for (int l = 0; l < static_cast<int>(kAtOnce); ++l) {
+      x0[l] = row_x[q[l]];
+      x1[l] = row_x[q[l] + 1];
+      y0[l] = row_y[q[l]];
+      y1[l] = row_y[q[l] + 1];
+      tells[l] = static_cast<int>(row_tells[nearest[l]]);
+    }
+    // The outside is on the left of a contour of rising angle, with y down.
+    const float turn = ways.share[k + 2] - ways.share[k];
+    const EightFloats along_x = ways.turn[k].x + turn * by_x, along_y = ways.turn[k].y + turn * by_y;
+    const EightFloats square = along_x * along_x + along_y * along_y;
+    std::array<float, kAtOnce> lengths;
+    std::memcpy(lengths.data(), &square, sizeof square);
+    for (float& l : lengths) {
+      l = std::sqrt(l);
+    }
+    EightFloats length;
+    std::memcpy(&length, lengths.data(), sizeof length);
+    EightFloats edge =
+        ways.scale * ((x0 + u * (x1 - x0)) * along_y - (y0 + u * (y1 - y0)) * along_x) / length;
+    EightFloats usual = 0.5F + EightFloats{};
+    if (ways.polarity == Polarity::any) {
+      edge = edge < 0 ? -edge : edge;
+    } else if (ways.polarity == Polarity::relief) {
+      EightFloats sign;
+      for (int l = 0; l < static_cast<int>(kAtOnce); ++l) {
+        sign[l] = static_cast<float>(ways.relief.sign_at(cv::Point2f(along_y[l], -along_x[l]) / length[l]));
+      }
+      edge *= sign;
+      usual *= sign < 0 ? -sign : sign;
+    }
+    const EightFloats bounded = edge < -1.0F  ? -1.0F + EightFloats{}
+                                : edge > 1.2F ? 1.2F + EightFloats{}
+                                              : edge;
+    const EightFloats against = -0.5F + EightFloats{}, nothing{};
+    sum += tells == static_cast<int>(Tells::edge)      ? bounded - usual
+           : tells == static_cast<int>(Tells::against) ? against
+                                                       : nothing;
+    count -= tells != static_cast<int>(Tells::nothing);
+  }
+  std::memcpy(sums, &sum, sizeof sum);
+  std::memcpy(told, &count, sizeof count);
+}
+
 // Dimples of one membrane in one picture: its points at rest, pushed along the needle.
 class Dimples {
  public:
@@ -86,15 +168,15 @@ class Dimples {
 
   [[nodiscard]] bool meets_the_cell() const { return meets_the_cell_; }
   [[nodiscard]] double depth_of_tip() const { return depth_of_tip_; }
-  void look(double deepest);  // before evidence()
-  // For evidence(): of this shape.
-  void choose(const Shape& shape) {
-    share_.clear();
-    for (int i = entry_ - reach_ - 1; i <= entry_ + reach_ + 1; ++i) {
-      share_.push_back(static_cast<float>(share_of_depth(shape, from_entry(i))));
-    }
+  void look(double deepest);  // before choose()
+  // A shape, with dimples up to that depth.
+  void choose(const Shape& shape, double deepest);
+  // Of it, `step` steps of depth below the first.
+  [[nodiscard]] std::optional<double> evidence(std::size_t step) const;
+  [[nodiscard]] std::size_t steps() const { return steps_; }
+  [[nodiscard]] double depth(std::size_t step) const {
+    return first_depth_ + static_cast<double>(step) * kStepOfDepth_px;
   }
-  [[nodiscard]] std::optional<double> evidence(double depth) const;
   [[nodiscard]] Contour contour(const Shape& shape, double depth) const {
     Contour out;
     for (int i = 0; i < s_.angles; ++i) {
@@ -124,13 +206,14 @@ class Dimples {
   int reach_ = 0;
   Vector<float> share_;  // of the depth, from the ray before those that tell to the one after them
   // At the places along the ways of the rays that tell, from the first depth on.
-  enum class Tells : std::uint8_t { edge, nothing, against };
-  static constexpr double kPlace_px = 0.5;
   double first_depth_ = 0;
   std::size_t places_ = 0;
   Vector<float> gx_, gy_;  // grey levels per px
   Vector<Tells> tells_;
   Vector<cv::Point2f> turn_;  // per ray, of the outline at rest from the ray before to the one after, px
+  std::size_t steps_ = 0;     // of the shape that was chosen
+  Vector<float> depths_, sums_;
+  Vector<int> told_;
 };
 
 // The picture along each ray's way.
@@ -164,44 +247,42 @@ void Dimples::look(double deepest) {
   }
 }
 
-std::optional<double> Dimples::evidence(double depth) const {
-  const bool any = s_.m.polarity == Polarity::any, relief = s_.m.polarity == Polarity::relief;
-  const float scale = static_cast<float>((s_.m.polarity == Polarity::darker_out ? -1 : 1) / s_.m.level);
-  const auto d = static_cast<float>(depth);
-  const cv::Point2f by = cv::Point2f(s_.surroundings.needle.axis) * d;
-  const std::size_t room = places_ + GradientField::kAtOnce;
-  float sum = 0;
-  int rays = 0;
-  for (std::size_t k = 0; k < turn_.size(); ++k) {
-    const float place =
-        (d * share_[k + 1] - static_cast<float>(first_depth_)) / static_cast<float>(kPlace_px);
-    const auto q = static_cast<std::size_t>(static_cast<int>(place));
-    const float u = place - static_cast<float>(q);
-    const std::size_t at = k * room + q;
-    const Tells tells = tells_[u < 0.5F ? at : at + 1];
-    if (tells == Tells::against) {
-      sum -= 0.5F;
-      ++rays;
-    } else if (tells == Tells::edge) {
-      // The outside is on the left of a contour of rising angle, with y down.
-      const cv::Point2f along = turn_[k] + (share_[k + 2] - share_[k]) * by;
-      const float length = std::sqrt(along.x * along.x + along.y * along.y);
-      const float gx = gx_[at] + u * (gx_[at + 1] - gx_[at]), gy = gy_[at] + u * (gy_[at + 1] - gy_[at]);
-      const float edge = scale * (gx * along.y - gy * along.x) / length;
-      if (relief) {
-        const auto sign = static_cast<float>(s_.m.relief.sign_at(cv::Point2f(along.y, -along.x) / length));
-        sum += std::clamp(sign * edge, -1.0F, 1.2F) - 0.5F * std::abs(sign);
-      } else {
-        sum += std::clamp(any ? std::abs(edge) : edge, -1.0F, 1.2F) - 0.5F;
-      }
-      ++rays;
-    }
+void Dimples::choose(const Shape& shape, double deepest) {
+  share_.clear();
+  for (int i = entry_ - reach_ - 1; i <= entry_ + reach_ + 1; ++i) {
+    share_.push_back(static_cast<float>(share_of_depth(shape, from_entry(i))));
   }
-  if (rays < kLeastRays) {
+  steps_ = static_cast<std::size_t>(std::max(deepest - first_depth_, 0.0) / kStepOfDepth_px) + 1;
+  depths_.resize((steps_ + kAtOnce - 1) / kAtOnce * kAtOnce);
+  sums_.resize(depths_.size());
+  told_.resize(depths_.size());
+  for (std::size_t j = 0; j < depths_.size(); ++j) {
+    depths_[j] = static_cast<float>(depth(std::min(j, steps_ - 1)));
+  }
+  const Ways ways{turn_.size(),
+                  places_ + GradientField::kAtOnce,
+                  gx_.data(),
+                  gy_.data(),
+                  tells_.data(),
+                  share_.data(),
+                  turn_.data(),
+                  static_cast<float>(first_depth_),
+                  static_cast<float>((s_.m.polarity == Polarity::darker_out ? -1 : 1) / s_.m.level),
+                  cv::Point2f(s_.surroundings.needle.axis),
+                  s_.m.polarity,
+                  s_.m.relief};
+  for (std::size_t j = 0; j < depths_.size(); j += kAtOnce) {
+    look_along(ways, depths_.data() + j, sums_.data() + j, told_.data() + j);
+  }
+}
+
+std::optional<double> Dimples::evidence(std::size_t step) const {
+  if (told_[step] < kLeastRays) {
     return std::nullopt;
   }
   const double noise = s_.picture.gradient_noise / s_.m.level;
-  return static_cast<double>(sum) * std::min(1.0, spacing_ / kOneSample_px) / (kModel + noise * noise);
+  return static_cast<double>(sums_[step]) * std::min(1.0, spacing_ / kOneSample_px) /
+         (kModel + noise * noise);
 }
 
 }  // namespace
@@ -230,17 +311,16 @@ std::optional<SeenDimple> likeliest_dimple(const MembraneSearch& search) {
   std::array<double, kDimpleShapes> best;
   best.fill(-1e9);
   for (std::size_t k = 0; k < kDimpleShapes; ++k) {
-    dimples.choose(kShapes[k]);
-    for (double depth = -kAbove_px; depth <= deepest + kPast_px; depth += kStepOfDepth_px) {
+    const double steep = steepness(kShapes[k]), most = kSteepest * search.surroundings.needle.half_width;
+    dimples.choose(kShapes[k], steep > 0 ? std::min(deepest + kPast_px, most / steep) : deepest + kPast_px);
+    for (std::size_t step = 0; step < dimples.steps(); ++step) {
+      const double depth = dimples.depth(step);
       // What the needle does not push does not sink.
       const double sunk = m.held ? 0 : std::max(0.0, depth - m.dimple_px);
       if (sunk > kSinks_px && (punctured || depth <= on_tip_from)) {
         continue;
       }
-      if (steepness(kShapes[k]) * depth > kSteepest * search.surroundings.needle.half_width) {
-        break;
-      }
-      const auto evidence = dimples.evidence(depth);
+      const auto evidence = dimples.evidence(step);
       if (!evidence) {
         continue;
       }

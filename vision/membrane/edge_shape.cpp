@@ -22,12 +22,11 @@ constexpr double kFocus_px = 1.6;    // blur, with the pixels' own, of a picture
 constexpr double kRelief_px = 0.15;  // sd by which relief may: the form of a face is known only roughly
 
 // The contour without finer waves, moved along the rays from its centre.
-Contour smoothed(const Contour& contour, const Vector<double>& soft, double modes) {
+Contour smoothed(const Contour& contour, const Vector<double>& stiffness) {
   const std::size_t n = contour.size();
   const Point centre = centroid(contour);
-  Vector<double> stiffness(n), r(n);
+  Vector<double> r(n);
   for (std::size_t i = 0; i < n; ++i) {
-    stiffness[i] = stiffness_of(modes, soft[i], n);
     r[i] = cv::norm(contour[i] - centre);
   }
   const Vector<double> smooth = smooth_periodic(r, Vector<double>(n, 1.0), stiffness);
@@ -59,13 +58,14 @@ std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Cont
   if (contour.size() < 64 || soft.size() != contour.size()) {
     return std::nullopt;
   }
-  const Contour base = smoothed(contour, soft, edge.modes);
+  const Vector<double> stiffness = stiffness_of(edge.modes, soft);
+  const Contour base = smoothed(contour, stiffness);
   EdgeProfiles profiles(picture, base, edge.inside, edge.outside);
   const bool apart = edge.nearby && edge.nearby_face.size() == base.size();
   if (apart && learnt.nearby_height != 0) {
     profiles.move_nearby(base, soft, edge.nearby_face, learnt.nearby_height, learnt.blur_px);
   }
-  CommonShape common(profiles, soft, edge);
+  CommonShape common(profiles, soft, stiffness, edge);
   if (!common.find(learnt)) {
     return std::nullopt;
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <limits>
 #include <numeric>
@@ -37,21 +38,55 @@ constexpr std::array<float, kLanes> places() {
   return out;
 }
 
-}  // namespace
+using EightFloats = float __attribute__((vector_size(32)));
 
-void NeedleShape::remove_mean_and_slope(Profile& p) {
+// Of n profiles, eight side by side: each as a share of its mean, if by_usual, and without mean and slope.
+template <std::size_t kLanes>
+[[gnu::always_inline]] inline void normalise_each(float* rows, std::size_t n, bool by_usual) {
+  constexpr std::size_t kEight = 8;
   constexpr auto kPlaces = places<kLanes>();
-  float sum = 0, tilt = 0, xx = 0;
-  for (std::size_t i = 0; i < kLanes; ++i) {
-    sum += p[i];
-    tilt += kPlaces[i] * p[i];
-    xx += kPlaces[i] * kPlaces[i];
-  }
-  const float mean = sum / kLanes, slope = tilt / xx;
-  for (std::size_t i = 0; i < kLanes; ++i) {
-    p[i] -= mean + slope * kPlaces[i];
+  constexpr auto kCount = static_cast<float>(kLanes);
+  for (std::size_t first = 0; first < n; first += kEight) {
+    const std::size_t many = std::min(kEight, n - first);
+    float* these = rows + first * kLanes;
+    std::array<EightFloats, kLanes> v{};
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      for (std::size_t k = 0; k < many; ++k) {
+        v[i][k] = these[k * kLanes + i];
+      }
+    }
+    if (by_usual) {
+      EightFloats usual{};
+      for (const EightFloats& lane : v) {
+        usual += lane;
+      }
+      usual /= kCount;
+      for (EightFloats& lane : v) {
+        lane /= usual < 1.0F ? 1.0F + EightFloats{} : usual;
+      }
+    }
+    EightFloats sum{}, tilt{};
+    float xx = 0;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      sum += v[i];
+      tilt += kPlaces[i] * v[i];
+      xx += kPlaces[i] * kPlaces[i];
+    }
+    const EightFloats mean = sum / kCount, slope = tilt / xx;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      const EightFloats lane = v[i] - (mean + slope * kPlaces[i]);
+      for (std::size_t k = 0; k < many; ++k) {
+        these[k * kLanes + i] = lane[k];
+      }
+    }
   }
 }
+
+PUNCTUM_WIDE_LOOP void normalise(float* rows, std::size_t n, bool by_usual) {
+  normalise_each<21>(rows, n, by_usual);
+}
+
+}  // namespace
 
 // Empty near the border of the field.
 std::optional<NeedleShape::Profile> NeedleShape::light_across(const GradientField& field,
@@ -80,32 +115,56 @@ std::optional<NeedleShape::Profile> NeedleShape::light_across(const GradientFiel
   return light;
 }
 
-NeedleShape::Profile NeedleShape::absorption(Profile light) {
-  const float usual = std::accumulate(light.begin(), light.end(), 0.0F) / kLanes;
-  for (float& v : light) {
-    v /= std::max(usual, 1.0F);
+// Every half pixel from kAhead steps further ahead than `ahead` px on, `rows` of them or as far as the field
+// shows them.
+NeedleShape::Profiles NeedleShape::light_along(const GradientField& field, const NeedlePose& needle,
+                                               double ahead, int rows) const {
+  Profiles out;
+  out.reserve(static_cast<std::size_t>(rows));
+  for (int j = -kAhead; j < rows - kAhead; ++j) {
+    const auto light = light_across(field, needle, j * kStep_px - ahead);
+    if (!light) {
+      break;
+    }
+    out.push_back(*light);
   }
-  remove_mean_and_slope(light);
+  return out;
+}
+
+NeedleShape::Profiles NeedleShape::absorption(Profiles light) {
+  static_assert(kLanes == 21);
+  if (!light.empty()) {
+    normalise(light.front().data(), light.size(), true);
+  }
   return light;
 }
 
-// Where the backdrop is not known, of the usual light.
-NeedleShape::Profile NeedleShape::absorption_over(const Backdrop& backdrop, const NeedlePose& needle,
-                                                  double behind, Profile light) const {
+// As light_along; where the backdrop is not known, of the usual light.
+NeedleShape::Profiles NeedleShape::absorption_over(const Backdrop& backdrop, const NeedlePose& needle,
+                                                   double ahead, const Profiles& light,
+                                                   const Profiles& of_usual) const {
   constexpr auto kPlaces = places<kLanes>();
-  Profile without{};
-  for (std::size_t i = 0; i < kLanes; ++i) {
-    const auto g = backdrop.grey(needle.at(behind, static_cast<double>(kPlaces[i]) * reach_));
-    if (!g || *g <= 1) {
-      return absorption(light);
+  Profiles out = light;
+  Vector<std::uint8_t> known(light.size(), 1);
+  for (std::size_t k = 0; k < light.size(); ++k) {
+    const double behind = (static_cast<int>(k) - kAhead) * kStep_px - ahead;
+    Profile without{};
+    for (std::size_t i = 0; i < kLanes && known[k] != 0; ++i) {
+      const auto g = backdrop.grey(needle.at(behind, static_cast<double>(kPlaces[i]) * reach_));
+      known[k] = g && *g > 1 ? 1 : 0;
+      without[i] = static_cast<float>(g.value_or(1));
     }
-    without[i] = static_cast<float>(*g);
+    for (std::size_t i = 0; i < kLanes && known[k] != 0; ++i) {
+      out[k][i] /= without[i];
+    }
   }
-  for (std::size_t i = 0; i < kLanes; ++i) {
-    light[i] /= without[i];
+  normalise(out.front().data(), out.size(), false);
+  for (std::size_t k = 0; k < light.size(); ++k) {
+    if (known[k] == 0) {
+      out[k] = of_usual[k];
+    }
   }
-  remove_mean_and_slope(light);
-  return light;
+  return out;
 }
 
 void NeedleShape::learn(const GradientField& field, const NeedlePose& needle) {
@@ -113,14 +172,7 @@ void NeedleShape::learn(const GradientField& field, const NeedlePose& needle) {
     constexpr double kBeside_px = 2.5;  // the blur of the walls
     reach_ = needle.half_width_at(20) + kBeside_px;
   }
-  Vector<Profile> now;
-  for (int k = -kAhead; k <= kBehind; ++k) {
-    const auto light = light_across(field, needle, k * kStep_px);
-    if (!light) {
-      break;
-    }
-    now.push_back(absorption(*light));
-  }
+  const Profiles now = absorption(light_along(field, needle, 0, kAhead + kBehind + 1));
   if (now.size() < static_cast<std::size_t>(kAhead + kLeastShaft)) {
     return;
   }
@@ -137,8 +189,6 @@ void NeedleShape::learn(const GradientField& field, const NeedlePose& needle) {
 }
 
 namespace {
-
-using EightFloats = float __attribute__((vector_size(32)));
 
 // As median_of, of each of eight columns by itself: the lowest to the front, one by one, as far as the
 // middle.
@@ -269,6 +319,21 @@ std::optional<double> NeedleShape::face() const {
   return kAhead * kStep_px;  // the needle goes on at least so far
 }
 
+namespace {
+
+// To each of n sums, the weighted values from there on that lie so far apart.
+PUNCTUM_WIDE_LOOP void add_weighted(const float* values, const Vector<float>& weights, std::size_t apart,
+                                    std::size_t n, float* sums) {
+  for (std::size_t d = 0; d < weights.size(); ++d) {
+    const float weight = weights[d], *these = values + d * apart;
+    for (std::size_t i = 0; i < n; ++i) {
+      sums[i] += weight * these[i];
+    }
+  }
+}
+
+}  // namespace
+
 // The shape out of focus.
 void NeedleShape::blur(double sigma_px, Profiles& out) const {
   out = shape_.front().rows;
@@ -285,34 +350,25 @@ void NeedleShape::blur(double sigma_px, Profiles& out) const {
     return k;
   };
   const auto across = kernel(sigma_px * (kLanes - 1) / (2 * reach_)), along = kernel(sigma_px / kStep_px);
-  const int m = static_cast<int>(across.size() / 2), l = static_cast<int>(along.size() / 2);
-  Vector<float> wide(across.size() - 1 + kLanes, 0.0F);  // with nothing on either side
-  for (Profile& p : out) {
-    const float beside = 0.5F * (p.front() + p.back());  // there is no needle
-    for (std::size_t i = 0; i < kLanes; ++i) {
-      wide[static_cast<std::size_t>(m) + i] = p[i] - beside;
-    }
-    Profile q{};
-    for (std::size_t d = 0; d < across.size(); ++d) {
-      for (std::size_t i = 0; i < kLanes; ++i) {
-        q[i] += across[d] * wide[i + d];
-      }
-    }
-    remove_mean_and_slope(q);
-    p = q;
+  const std::size_t rows = out.size(), beyond = across.size() / 2, room = kLanes + 2 * beyond,
+                    ends = along.size() / 2;
+  Vector<float> wide(rows * room + 2 * beyond, 0.0F),
+      blurred(rows * room, 0.0F);  // with nothing on either side
+  for (std::size_t k = 0; k < rows; ++k) {
+    const float beside = 0.5F * (out[k].front() + out[k].back());  // there is no needle
+    std::transform(out[k].begin(), out[k].end(), wide.data() + k * room + beyond,
+                   [beside](float v) { return v - beside; });
   }
-  const Profiles sharp = out;
-  const int last = static_cast<int>(out.size()) - 1;
-  for (int k = 0; k <= last; ++k) {
-    Profile q{};
-    for (int d = -l; d <= l; ++d) {
-      const Profile& p = sharp[static_cast<std::size_t>(std::clamp(k + d, 0, last))];
-      for (std::size_t i = 0; i < kLanes; ++i) {
-        q[i] += along[static_cast<std::size_t>(d + l)] * p[i];
-      }
-    }
-    out[static_cast<std::size_t>(k)] = q;
+  add_weighted(wide.data(), across, 1, blurred.size(), blurred.data());
+  for (std::size_t k = 0; k < rows; ++k) {
+    std::copy_n(blurred.data() + k * room, kLanes, out[k].begin());
   }
+  normalise(out.front().data(), rows, false);
+  Profiles sharp(ends, out.front());  // going on at either end as it ends
+  sharp.insert(sharp.end(), out.begin(), out.end());
+  sharp.insert(sharp.end(), ends, out.back());
+  std::fill(out.begin(), out.end(), Profile{});
+  add_weighted(sharp.front().data(), along, kLanes, rows * kLanes, out.front().data());
 }
 
 namespace {
@@ -433,21 +489,11 @@ std::optional<NeedleShape::End> NeedleShape::end(const GradientField& field, con
                                                  View near) {
   const int ends = static_cast<int>((back + ahead) / kStep_px) + 1;
   // A backdrop takes granules off, unless they have moved since; then it doubles them.
-  Profiles plain, over;
-  plain.reserve(static_cast<std::size_t>(ends + kBehind));
-  over.reserve(plain.capacity());
-  for (int j = -kAhead; j < ends + kBehind - kAhead; ++j) {
-    const double behind = j * kStep_px - ahead;
-    const auto light = light_across(field, needle, behind);
-    if (!light) {
-      break;
-    }
-    plain.push_back(absorption(*light));
-    over.push_back(absorption_over(backdrop, needle, behind, *light));
-  }
-  if (!known() || static_cast<int>(plain.size()) < ends + kAhead + kLeastShaft) {
+  const Profiles light = light_along(field, needle, ahead, ends + kBehind);
+  if (!known() || static_cast<int>(light.size()) < ends + kAhead + kLeastShaft) {
     return std::nullopt;
   }
+  const Profiles plain = absorption(light), over = absorption_over(backdrop, needle, ahead, light, plain);
   Fit best = fit(plain, {false, near.blur}, ends);
   if (Fit f = fit(over, {true, near.blur}, ends); f.variance < best.variance) {
     best = std::move(f);
@@ -475,21 +521,13 @@ std::optional<NeedleShape::End> NeedleShape::end(const GradientField& field, con
 std::optional<double> NeedleShape::end_near(View view, const GradientField& field, const Backdrop& backdrop,
                                             const NeedlePose& needle, double reach) {
   const int ends = static_cast<int>(2 * reach / kStep_px) + 1;
-  Profiles seen;
-  seen.reserve(static_cast<std::size_t>(ends + kBehind));
-  for (int j = -kAhead; j < ends + kBehind - kAhead; ++j) {
-    const double behind = j * kStep_px - reach;
-    const auto light = light_across(field, needle, behind);
-    if (!light) {
-      break;
-    }
-    seen.push_back(view.over_backdrop ? absorption_over(backdrop, needle, behind, *light)
-                                      : absorption(*light));
-  }
-  if (!known() || static_cast<int>(seen.size()) < ends + kAhead + kLeastShaft) {
+  const Profiles light = light_along(field, needle, reach, ends + kBehind);
+  if (!known() || static_cast<int>(light.size()) < ends + kAhead + kLeastShaft) {
     return std::nullopt;
   }
-  const Fit f = fit(seen, view, ends);
+  const Profiles plain = absorption(light);
+  const Fit f =
+      fit(view.over_backdrop ? absorption_over(backdrop, needle, reach, light, plain) : plain, view, ends);
   return f.inside() ? std::optional(f.ahead_of(reach)) : std::nullopt;
 }
 

@@ -55,12 +55,13 @@ class NeedleShape {
 
   using Profiles = Vector<Profile>;  // every half pixel along the needle, from ahead of the tip
   [[nodiscard]] static float product(const Profile& a, const Profile& b);
-  static void remove_mean_and_slope(Profile& p);
   [[nodiscard]] std::optional<Profile> light_across(const GradientField& field, const NeedlePose& needle,
                                                     double behind) const;
-  [[nodiscard]] static Profile absorption(Profile light);
-  [[nodiscard]] Profile absorption_over(const Backdrop& backdrop, const NeedlePose& needle, double behind,
-                                        Profile light) const;
+  [[nodiscard]] Profiles light_along(const GradientField& field, const NeedlePose& needle, double ahead,
+                                     int rows) const;
+  [[nodiscard]] static Profiles absorption(Profiles light);
+  [[nodiscard]] Profiles absorption_over(const Backdrop& backdrop, const NeedlePose& needle, double ahead,
+                                         const Profiles& light, const Profiles& of_usual) const;
   void blur(double sigma_px, Profiles& out) const;
 
   // The shape in one sharpness.

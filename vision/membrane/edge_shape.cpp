@@ -50,15 +50,14 @@ SeenOutline outline(const Contour& base, const EdgeProfiles& profiles, const Com
   return out;
 }
 
-}  // namespace
+double waves_of(const EdgeShape& edge, const EdgeLearnt& learnt) {
+  return edge.modes * (edge.granular ? kFocus_px / std::max(kFocus_px, learnt.own_blur_px) : 1);
+}
 
-std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Contour& contour,
+std::optional<SeenOutline> shaped_once(const ClearedPicture& picture, const Contour& contour,
                                        const Vector<double>& soft, const EdgeShape& edge,
                                        EdgeLearnt& learnt) {
-  if (contour.size() < 64 || soft.size() != contour.size()) {
-    return std::nullopt;
-  }
-  const Vector<double> stiffness = stiffness_of(edge.modes, soft);
+  const Vector<double> stiffness = stiffness_of(waves_of(edge, learnt), soft);
   const Contour base = smoothed(contour, stiffness);
   EdgeProfiles profiles(picture, base, edge.inside, edge.outside);
   const bool apart = edge.nearby && edge.nearby_face.size() == base.size();
@@ -80,8 +79,9 @@ std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Cont
   if (!steps) {
     return std::nullopt;
   }
+  constexpr double kPart = 0.3;
+  learnt.own_blur_px += (learnt.own_blur_px == 0 ? 1 : kPart) * (steps->blur_px - learnt.own_blur_px);
   if (apart) {
-    constexpr double kPart = 0.3;
     const double part = learnt.nearby_height == 0 ? 1 : kPart;
     learnt.nearby_height += part * (steps->nearby_height - learnt.nearby_height);
     learnt.blur_px += part * (steps->blur_px - learnt.blur_px);
@@ -91,6 +91,23 @@ std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Cont
   const double blurred = edge.per_blur * std::max(0.0, steps->blur_px - kFocus_px);
   return outline(base, profiles, common, steps->own, math::hypot(steps->halo ? kHalo_px : 0, blurred),
                  picture.noise, learnt);
+}
+
+}  // namespace
+
+std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Contour& contour,
+                                       const Vector<double>& soft, const EdgeShape& edge,
+                                       EdgeLearnt& learnt) {
+  if (contour.size() < 64 || soft.size() != contour.size()) {
+    return std::nullopt;
+  }
+  constexpr double kClearly = 0.9;
+  const bool blur_known = learnt.own_blur_px > 0;
+  auto shaped = shaped_once(picture, contour, soft, edge, learnt);
+  if (shaped && !blur_known && waves_of(edge, learnt) < kClearly * edge.modes) {
+    shaped = shaped_once(picture, contour, soft, edge, learnt);
+  }
+  return shaped;
 }
 
 }  // namespace punctum::vision

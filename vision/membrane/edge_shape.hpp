@@ -21,6 +21,7 @@ struct NearbyEdge {
 struct EdgeShape {
   double inside = 8, outside = 6;  // px of the picture that are looked at on either side of the contour
   double modes = 12;               // finer waves round the contour are noise
+  bool granular = false;           // out of focus what lies beside the edge makes longer waves
   double lasting = 0;      // of the places' scatter at least this share is the same in the next frames
   double per_blur = 0.25;  // px by which the own step may be off for each px of blur beyond focus: sd
   std::optional<NearbyEdge> nearby;
@@ -37,6 +38,7 @@ struct EdgeLearnt {
   int frames = 0;                         // of these two
   bool halo = false;                      // in the last frame
   double nearby_height = 0, blur_px = 0;  // of the nearby edge: half of its change of grey, outwards
+  double own_blur_px = 0;                 // 0: not known
   // What all profiles had in common in the last frame, and how single ones differed from it; empty in relief.
   Vector<double> shape, spread;
   std::optional<cv::Vec4d> steps;  // in it: see BlurredSteps

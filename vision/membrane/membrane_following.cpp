@@ -108,6 +108,7 @@ std::optional<SeenOutline> refined(const MembraneSearch& search, const EdgePath&
       edge.inside = 6;
       edge.outside = 5;
       edge.modes = kInnerModes;
+      edge.granular = true;
       edge.lasting = kGranules;
       edge.per_blur = 0.8;  // granules and the wall blur into it
       if (surroundings.around) {

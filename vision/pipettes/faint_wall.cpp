@@ -162,11 +162,9 @@ std::optional<NeedlePose> with_faint_wall(const GradientField& field, double noi
   const Line& other = std::abs(low.contrast) > std::abs(high.contrast) ? low : high;
   const Line& opposite = &other == &low ? high : low;
   const double middle = 0.5 * (kFrom_px + kTo_px);
-  const bool faint =
-      std::abs(other.contrast)<kFaint * std::abs(wall.contrast),
-                               missed = std::max(std::abs(wall.at(middle)), std::abs(other.at(middle)))>
-          needle.half_width_at(middle) +
-      kMissed_px;
+  const double furthest = std::max(std::abs(wall.at(middle)), std::abs(other.at(middle)));
+  const bool faint = std::abs(other.contrast) < kFaint * std::abs(wall.contrast);
+  const bool missed = furthest > needle.half_width_at(middle) + kMissed_px;
   if (std::abs(other.contrast) < least || !(faint || missed) ||
       std::abs(other.contrast) < kOneSided * std::abs(opposite.contrast)) {
     return std::nullopt;

@@ -19,6 +19,9 @@ constexpr double kLeastNoise = 0.3;     // grey levels
 constexpr double kSmoothing_px = 1.2;   // sd of the Gaussian before the gradient
 constexpr int kImpurityLeast_px = 6;    // pixels; fewer are noise
 constexpr double kImpurityKeep_px = 4;  // nearer to a membrane, it belongs to the membrane
+// By which the mouth of the holding pipette may be told too near to the cell, px per grey level of noise
+// above.
+constexpr double kFaceOff = 0.3, kClear_grey = 6;
 constexpr double kFaceReach_px =
     6.5;  // nearer to the face of the holding pipette, an edge is blurred into it
 
@@ -181,7 +184,7 @@ void ClearedPicture::exclude_holder(EdgeBand& band, const Vector<double>& expect
     }
     const std::size_t k = static_cast<std::size_t>(i);
     if (limits) {
-      band.upper[k] = std::min(band.upper[k], r);
+      band.upper[k] = std::min(band.upper[k], r + kFaceOff * std::max(0.0, noise - kClear_grey));
     }
     if (expected[k] > r - kFaceReach_px) {
       band.hidden[k] = 1;

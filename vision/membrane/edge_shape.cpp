@@ -105,7 +105,9 @@ std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Cont
   const bool blur_known = learnt.own_blur_px > 0;
   auto shaped = shaped_once(picture, contour, soft, edge, learnt);
   if (shaped && !blur_known && waves_of(edge, learnt) < kClearly * edge.modes) {
-    shaped = shaped_once(picture, contour, soft, edge, learnt);
+    if (auto again = shaped_once(picture, contour, soft, edge, learnt)) {
+      return again;
+    }
   }
   return shaped;
 }

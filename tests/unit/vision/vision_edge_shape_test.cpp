@@ -211,6 +211,33 @@ TEST(EdgeShape, says_by_how_much_each_point_may_be_off) {
   }
 }
 
+// Granules that the blur has widened make waves that are as long as those of an outline in focus.
+TEST(EdgeShape, of_a_granular_body_is_smoother_out_of_focus) {
+  constexpr double kNoise = 3, kLeft = 3;  // of the granules' contrast, times that in focus
+  const Ring ring{.gap = 6, .blur = 2.8, .ripple = 1};
+  const cv::Mat clean = drawn(ring);
+  Ring body = ring;
+  body.R = ring.R - ring.wall - ring.gap;
+  EdgeShape edge;
+  edge.inside = 6;
+  edge.outside = 5;
+  edge.modes = 9;
+  edge.nearby = {6, 0};
+  double even = 0, smoother = 0;
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    cv::Mat grains = granular(cv::Mat::zeros(kSide, kSide, CV_32F), 8, 40 + seed);
+    cv::GaussianBlur(grains, grains, cv::Size(0, 0), ring.blur);
+    const ClearedPicture picture = noisy(clean + kLeft * grains, kNoise, seed);
+    for (const bool granular_body : {false, true}) {
+      edge.granular = granular_body;
+      const auto found = place_edge(picture, rough(body, -0.5, 0.2), kNowhereSoft, edge);
+      ASSERT_TRUE(found) << seed << ' ' << granular_body;
+      (granular_body ? smoother : even) += std::pow(error_against(found->contour, body).rms, 2);
+    }
+  }
+  EXPECT_LT(smoother, 0.8 * even);
+}
+
 // The same granules under another noise: what differs is the part that does not last.
 TEST(EdgeShape, tells_what_the_next_frame_repeats_from_what_it_tells_anew) {
   const Ring ring;

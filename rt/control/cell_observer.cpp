@@ -48,8 +48,8 @@ const CellFacts& CellObserver::step(const TickTime& time, const Readings& readin
   }
   const bool known = model.membrane().known;
   const double depth_before_correction_m = model.depth_m(tip_m);
-  model.step(time.now_ns, facts_.approach_axis, time.dt_s);
-  facts_.depth_m = model.depth_m(tip_m);
+  const bool moved = model.step(time.now_ns, facts_.approach_axis, time.dt_s);
+  facts_.depth_m = moved ? model.depth_m(tip_m) : depth_before_correction_m;
   facts_.depth_correction_m = known ? facts_.depth_m - depth_before_correction_m : 0;
 
   if (model.implausible()) {

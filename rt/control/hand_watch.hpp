@@ -21,6 +21,7 @@ class HandWatch {
  public:
   // A good reading, elapsed_s after the one before; force: on the handle meanwhile.
   void step(const hal::Vec3& position_m, const hal::Vec3& force_N, double elapsed_s) NONBLOCKING {
+    stuck_ = false;
     for (std::size_t i = 0; i < axes_.size(); ++i) {
       Axis& axis = axes_[i];
       const double x_m = position_m[static_cast<Eigen::Index>(i)];
@@ -34,13 +35,12 @@ class HandWatch {
       if (axis.high_N - axis.low_N > kMoving_N) {
         axis.unmoved_s = std::min(axis.unmoved_s + elapsed_s, 2 * kUnmoved_s);
       }
+      stuck_ = stuck_ || axis.unmoved_s > kUnmoved_s;
     }
   }
 
   // A changing force has not moved the handle.
-  [[nodiscard]] bool stuck() const NONBLOCKING {
-    return std::any_of(axes_.begin(), axes_.end(), [](const Axis& a) { return a.unmoved_s > kUnmoved_s; });
-  }
+  [[nodiscard]] bool stuck() const NONBLOCKING { return stuck_; }
 
  private:
   static constexpr double kMoving_N = 0.5;
@@ -54,6 +54,7 @@ class HandWatch {
   };
 
   std::array<Axis, 3> axes_{};
+  bool stuck_ = false;
 };
 
 }  // namespace punctum::rt

@@ -49,6 +49,8 @@ StageLimits::StageLimits(const LimitParams& limits, const MappingParams& mapping
       // A window as long as can be still has to bound the jerk: a stage this slow gets less acceleration.
       hardest_m_s2_(std::min(limits.stage_acceleration_m_s2,
                              limits.stage_jerk_m_s3* static_cast<double>(MovingAverage::kMost) * dt_s_ / 2)),
+      slowest_m_s_(std::min({limits.stage_velocity_m_s, limits.stage_velocity_near_m_s,
+                             limits.stage_velocity_inside_m_s})),
       bounds_jerk_(samples(2 * hardest_m_s2_ / limits.stage_jerk_m_s3, dt_s_)) {
   const double window_s = static_cast<double>(bounds_jerk_.samples()) * dt_s_;
   // A speed turns into any other within 2 v/a.
@@ -62,6 +64,7 @@ StageLimits::StageLimits(const LimitParams& limits, const MappingParams& mapping
 
 void StageLimits::place(const hal::Vec3& tip_m) NONBLOCKING {
   set_point_.tip_m = tip_m;
+  clear_m_ = 0;
   for (Eigen::Index i = 0; i < 3; ++i) {
     low_here_m_[i] = std::min(low_m_[i], tip_m[i]);
     high_here_m_[i] = std::max(high_m_[i], tip_m[i]);
@@ -82,6 +85,7 @@ bool StageLimits::is_in_workspace(const hal::Vec3& p) const NONBLOCKING {
 void StageLimits::restart(const hal::Vec3& tip_m, const hal::Vec3& axis) NONBLOCKING {
   place(tip_m);
   set_point_.axis = axis;
+  axis_stands_ = false;
   ahead_m_ = tip_m;
   ahead_m_s_.setZero();
   bounds_jerk_.restart(tip_m);
@@ -93,7 +97,10 @@ void StageLimits::look_for_regions() NONBLOCKING {
     return;
   }
   const NeedlePose needle{set_point_.tip_m, set_point_.axis};
-  free_m_ = std::numeric_limits<double>::infinity();
+  if (seen_.left_m(needle) > kNear_m + kSurface_m) {
+    return;
+  }
+  seen_ = {needle, std::numeric_limits<double>::infinity()};
   for (const Region region : kRegions) {
     if (!regions_->has(region)) {
       continue;
@@ -104,12 +111,18 @@ void StageLimits::look_for_regions() NONBLOCKING {
       away = regions_->away(region, needle);
       apart_m = regions_->apart_m(region, away, needle);
     }
-    free_m_ = std::min(free_m_, apart_m);
+    seen_.room_m = std::min(seen_.room_m, apart_m);
   }
 }
 
 StageLimits::Checked StageLimits::check(const hal::Vec3& wanted_m, const StageConstraint& c) const
     NONBLOCKING {
+  if (is_clear(wanted_m)) {
+    return {wanted_m, 0};
+  }
+  if (c.frozen || !hal::is_finite(wanted_m)) {
+    return {set_point_.tip_m, 0};
+  }
   Checked out = check_cell(wanted_m, c);
   if (!is_far_from_regions(out.point_m)) {
     keep_out(out, c);
@@ -134,13 +147,16 @@ hal::Vec3 StageLimits::within_workspace(const hal::Vec3& point_m) const NONBLOCK
   return part < 1 ? hal::Vec3(here + part * way) : point_m;
 }
 
+// The largest depth at a point.
+double StageLimits::room_in_cell_m(const StageConstraint& c, const hal::Vec3& p) const NONBLOCKING {
+  const double at_most_m = std::min(limits_.penetration_depth_m, c.depth_limit_m);
+  return std::max(std::min(at_most_m, c.membrane.chord_m(p) - limits_.far_wall_m), 0.0);
+}
+
 StageLimits::Checked StageLimits::check_cell(const hal::Vec3& wanted_m, const StageConstraint& c) const
     NONBLOCKING {
   const hal::Vec3& here = set_point_.tip_m;
   Checked out{wanted_m, 0};
-  if (c.frozen || !hal::is_finite(wanted_m)) {
-    return {here, 0};
-  }
 
   // What the stage cannot reach is not asked for: the hand slips there.
   if (reach_) {
@@ -208,16 +224,12 @@ StageLimits::Checked StageLimits::check_cell(const hal::Vec3& wanted_m, const St
   if (depth <= 0) {
     return out;
   }
-  const double at_most_m = std::min(limits_.penetration_depth_m, c.depth_limit_m);
-  const auto room = [&](const hal::Vec3& p) {
-    return std::max(std::min(at_most_m, m.chord_m(p) - limits_.far_wall_m), 0.0);
-  };
-  const double room_there = room(out.point_m);
+  const double room_there = room_in_cell_m(c, out.point_m);
   if (!c.no_deeper && depth <= room_there - kAtLimit_m) {
     return out;  // whatever room a needle that is too deep is left besides
   }
   const double depth_here = std::max(m.depth_m(here), 0.0);
-  const double excess = std::max(depth_here - room(here), 0.0);
+  const double excess = std::max(depth_here - room_in_cell_m(c, here), 0.0);
   double deepest = room_there + excess;
   if (depth > deepest - kAtLimit_m) {
     out.alarms |= alarm_depth_limited;
@@ -236,7 +248,38 @@ StageLimits::Checked StageLimits::check_cell(const hal::Vec3& wanted_m, const St
 }
 
 bool StageLimits::is_far_from_regions(const hal::Vec3& point_m) const NONBLOCKING {
-  return !regions_ || (point_m - set_point_.tip_m).norm() < free_m_;
+  return !regions_ || seen_.left_m(point_m) > 0;
+}
+
+// Every limit that check_cell() knows moves no faster than the point, but for the one across the cell. Within
+// half of its radius from the axis the sphere falls back by at most 1/sqrt(3) of the way across, the far wall
+// by twice that the other way, and the depth along the axis by all of the way: the room left of it by at most
+// twice the way.
+double StageLimits::clearance_m(const StageConstraint& c) const NONBLOCKING {
+  if (reach_ || c.withdrawal_only || c.no_deeper) {
+    return 0;
+  }
+  const hal::Vec3& here = set_point_.tip_m;
+  const Membrane3D& m = c.membrane;
+  double clear_m = c.inward_limit_m - kAtLimit_m - m.axis.dot(here);
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    clear_m = std::min({clear_m, here[i] - clear_low_m_[i], clear_high_m_[i] - here[i]});
+  }
+  if (regions_) {
+    clear_m = std::min(clear_m, seen_.left_m(here));
+  }
+  if (c.insertion) {
+    clear_m = std::min(clear_m, limits_.lateral_m - beside(*c.insertion, here).norm());
+  }
+  if (m.known) {
+    const double room_m = room_in_cell_m(c, here) - m.depth_m(here) - kAtLimit_m;
+    clear_m = std::min({clear_m, room_m / 2, m.R_m / 2 - m.beside_m(here)});
+  }
+  return clear_m - kSurface_m;  // rounding takes less
+}
+
+bool StageLimits::is_clear(const hal::Vec3& point_m) const NONBLOCKING {
+  return (point_m - set_point_.tip_m).norm() < clear_m_;
 }
 
 // A convex body lies wholly behind a plane across any direction in which the needle is apart from it.
@@ -332,16 +375,21 @@ bool StageLimits::may_point(const hal::Vec3& axis) const NONBLOCKING {
   return true;
 }
 
+hal::Vec3 StageLimits::beside(const FixtureFrame& line, const hal::Vec3& point_m) const NONBLOCKING {
+  const hal::Vec3 V = point_m - line.entry_m;
+  return made(V - line.axis.dot(V) * line.axis);
+}
+
 std::uint32_t StageLimits::keep_to_line(hal::Vec3& point_m, const FixtureFrame& line) const NONBLOCKING {
-  const auto beside = [&](const hal::Vec3& p) {
-    const hal::Vec3 V = p - line.entry_m;
-    return made(V - line.axis.dot(V) * line.axis);
-  };
-  const hal::Vec3 wanted = beside(point_m);
-  const hal::Vec3 now = beside(set_point_.tip_m);
-  hal::Vec3 allowed = shortened(wanted, limits_.lateral_m);
+  const hal::Vec3 wanted = beside(line, point_m);
+  const hal::Vec3 now = beside(line, set_point_.tip_m);
   const double now2 = now.squaredNorm();
-  if (now2 > limits_.lateral_m * limits_.lateral_m) {
+  const bool beyond = now2 > limits_.lateral_m * limits_.lateral_m;
+  if (!beyond && wanted.norm() <= limits_.lateral_m) {
+    return 0;
+  }
+  hal::Vec3 allowed = shortened(wanted, limits_.lateral_m);
+  if (beyond) {
     // Beyond the limit already: it may stay or come straight back.
     allowed = std::clamp(wanted.dot(now) / now2, 0.0, 1.0) * now;
   }
@@ -375,6 +423,9 @@ hal::Vec3 StageLimits::stop_of(const hal::Vec3& point_m, const hal::Vec3& veloci
 
 // A point that a region holds would be moved, whatever other limits make of it then.
 bool StageLimits::may_be_at(const hal::Vec3& point_m, const StageConstraint& c) const NONBLOCKING {
+  if (is_clear(point_m)) {
+    return true;
+  }
   const hal::Vec3 held_m = check_cell(point_m, c).point_m;
   if ((held_m - point_m).squaredNorm() > kRounding_m * kRounding_m) {
     return false;
@@ -448,6 +499,7 @@ const hal::StageCommand& StageLimits::step(const hal::StageCommand& target, cons
     return set_point_;
   }
   const hal::Vec3 here = set_point_.tip_m;
+  clear_m_ = clearance_m(c);
   const Checked goal = check(finite_ ? target.tip_m : stops_at_m(), c);
   alarms_ |= goal.alarms;
   advance(goal.point_m, c);
@@ -470,14 +522,23 @@ const hal::StageCommand& StageLimits::step(const hal::StageCommand& target, cons
     return set_point_;
   }
 
-  const hal::Vec3 turn = shortened(target.axis - set_point_.axis, kTiltSpeed_rad_s * dt_s_);
-  const hal::Vec3 axis = set_point_.axis + turn;
-  const double length = axis.norm();
-  if (length > 0.5 && (!regions_ || may_point(axis / length))) {
-    set_point_.axis = axis / length;
+  if (!axis_stands_ || target.axis != turned_to_) {
+    turn(target.axis);
   }
   look_for_regions();
   return set_point_;
+}
+
+void StageLimits::turn(const hal::Vec3& target) NONBLOCKING {
+  const hal::Vec3 before = set_point_.axis;
+  const hal::Vec3 axis = before + shortened(target - before, kTiltSpeed_rad_s * dt_s_);
+  const double length = axis.norm();
+  const bool may = length > 0.5 && (!regions_ || may_point(axis / length));
+  if (may) {
+    set_point_.axis = axis / length;
+  }
+  turned_to_ = target;
+  axis_stands_ = may && set_point_.axis == before;
 }
 
 LimitedForce limit_hand_force(const hal::Vec3& wanted_N, double max_N) NONBLOCKING {
@@ -488,7 +549,8 @@ LimitedForce limit_hand_force(const hal::Vec3& wanted_N, double max_N) NONBLOCKI
   }
   const double largest = std::max({std::abs(wanted_N.x()), std::abs(wanted_N.y()), std::abs(wanted_N.z())});
   out.force_N = wanted_N;
-  if (largest > 0) {
+  // No vector is twice as long as its largest part.
+  if (largest > 0 && !(2 * largest <= max_N)) {
     // Scaled first, so that a huge but finite force does not overflow in the norm.
     const double length = (wanted_N / largest).norm() * largest;
     if (!(length <= max_N)) {

@@ -65,6 +65,11 @@ struct Membrane3D {
     // The sphere falls back from the entry plane with the distance from the axis.
     return along - r2 / (R_m + std::sqrt(R_m * R_m - r2));
   }
+  // Its distance from the axis.
+  [[nodiscard]] double beside_m(const hal::Vec3& p) const NONBLOCKING {
+    const hal::Vec3 V = p - entry_m;
+    return (V - axis.dot(V) * axis).norm();
+  }
   // Depth of the far wall on the same line.
   [[nodiscard]] double chord_m(const hal::Vec3& p) const NONBLOCKING {
     const hal::Vec3 V = p - entry_m;
@@ -112,6 +117,10 @@ class StageLimits {
   };
   [[nodiscard]] Checked check(const hal::Vec3& wanted_m, const StageConstraint& c) const NONBLOCKING;
 
+  // Nearer to the set-point than this, check() leaves every point as it is, without an alarm: step() checks
+  // several, and mostly this says it of all of them.
+  [[nodiscard]] double clearance_m(const StageConstraint& c) const NONBLOCKING;
+
   // The next set-point. A target that is not finite leaves it where it is.
   const hal::StageCommand& step(const hal::StageCommand& target, const StageConstraint& c) NONBLOCKING;
 
@@ -119,6 +128,8 @@ class StageLimits {
   [[nodiscard]] hal::Vec3 stops_at_m() const NONBLOCKING { return stop_of(ahead_m_, ahead_m_s_); }
   // What the needle may do on its way through this constraint now.
   [[nodiscard]] double allowed_speed_m_s(const StageConstraint& c) const NONBLOCKING;
+  // What it may do in every constraint.
+  [[nodiscard]] double slowest_m_s() const NONBLOCKING { return slowest_m_s_; }
   // How long the set-point is behind a target that moves steadily.
   [[nodiscard]] double lag_s() const NONBLOCKING { return lag_s_; }
 
@@ -132,11 +143,12 @@ class StageLimits {
   [[nodiscard]] bool is_in_workspace(const hal::Vec3& point_m) const NONBLOCKING;
   // Workspace, cell and line of insertion.
   [[nodiscard]] Checked check_cell(const hal::Vec3& wanted_m, const StageConstraint& c) const NONBLOCKING;
+  [[nodiscard]] double room_in_cell_m(const StageConstraint& c, const hal::Vec3& p) const NONBLOCKING;
   // The part of a motion that the stage can make.
   [[nodiscard]] hal::Vec3 made(const hal::Vec3& motion_m) const NONBLOCKING;
   // The way to a point, up to where it leaves the workspace.
   [[nodiscard]] hal::Vec3 within_workspace(const hal::Vec3& point_m) const NONBLOCKING;
-  // So near to the set-point that no region is between them.
+  // So near to where regions were looked for from that none is between them.
   [[nodiscard]] bool is_far_from_regions(const hal::Vec3& point_m) const NONBLOCKING;
   void keep_out(Checked& out, const StageConstraint& c) const NONBLOCKING;
   // A way of the tip that begins at the set-point: how much of it keeps out of the region, and what lies
@@ -147,15 +159,18 @@ class StageLimits {
     hal::Vec3 away = hal::Vec3::UnitX();
   };
   [[nodiscard]] FreeWay free_way(Region region, const hal::Vec3& to_m) const NONBLOCKING;
+  [[nodiscard]] bool is_clear(const hal::Vec3& point_m) const NONBLOCKING;  // of every limit, within a step
   // From the set-point, after it was moved.
   void look_for_regions() NONBLOCKING;
   [[nodiscard]] bool may_point(const hal::Vec3& axis) const NONBLOCKING;
+  void turn(const hal::Vec3& target) NONBLOCKING;
   // The set-point was held at held_m instead: its way across that limit begins from rest.
   void settle(const hal::Vec3& wanted_m, const hal::Vec3& held_m) NONBLOCKING;
   void advance(const hal::Vec3& goal_m, const StageConstraint& c) NONBLOCKING;
   // Where braking from there ends.
   [[nodiscard]] hal::Vec3 stop_of(const hal::Vec3& point_m, const hal::Vec3& velocity_m_s) const NONBLOCKING;
   [[nodiscard]] bool may_be_at(const hal::Vec3& point_m, const StageConstraint& c) const NONBLOCKING;
+  [[nodiscard]] hal::Vec3 beside(const FixtureFrame& line, const hal::Vec3& point_m) const NONBLOCKING;
   [[nodiscard]] std::uint32_t keep_to_line(hal::Vec3& point_m, const FixtureFrame& line) const NONBLOCKING;
 
   LimitParams limits_;
@@ -169,15 +184,19 @@ class StageLimits {
   std::optional<ForbiddenRegions> regions_;
   // Directions in which needle and regions lie apart: as long as they do, nothing more is computed.
   std::array<hal::Vec3, std::size(kRegions)> away_{hal::Vec3::UnitX(), hal::Vec3::UnitX()};
-  double free_m_ = 0;  // so far from the set-point there is no region
+  SeenRoom seen_;       // of the set-point, before the regions
+  double clear_m_ = 0;  // clearance_m() of this step; 0 between steps, when the constraint is another
   double dt_s_;
   double hardest_m_s2_;  // of which the window bounds the jerk
-  double reach_m_;       // on its way to a new speed the needle gets no further
+  double slowest_m_s_;
+  double reach_m_;  // on its way to a new speed the needle gets no further
   double lag_s_;
   hal::Vec3 ahead_m_ = hal::Vec3::Zero();  // goes to the target, its jerk not bounded
   hal::Vec3 ahead_m_s_ = hal::Vec3::Zero();
   MovingAverage bounds_jerk_;
   hal::StageCommand set_point_;
+  hal::Vec3 turned_to_ = hal::Vec3::Zero();  // the last target of its axis
+  bool axis_stands_ = false;                 // that target no longer turned it
   std::uint32_t alarms_ = 0;
   bool finite_ = true;
 };

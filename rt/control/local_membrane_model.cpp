@@ -138,6 +138,7 @@ bool LocalMembraneModel::observe(const Observation& seen, bool inside) NONBLOCKI
   seen_a_sd_m_ = seen.a_sd_m;
   remember_first(now);
 
+  settled_ = false;
   if (!membrane_.known) {
     membrane_ = now;
     entry_correction_m_.setZero();
@@ -288,11 +289,26 @@ bool LocalMembraneModel::agrees(const TipPose& pose, const hal::Vec3& seen_tip_m
   return false;
 }
 
-void LocalMembraneModel::step(std::int64_t now_ns, const hal::Vec3& axis, double dt_s) NONBLOCKING {
+bool LocalMembraneModel::step(std::int64_t now_ns, const hal::Vec3& axis, double dt_s) NONBLOCKING {
   if (!started_) {
     started_ = true;
     not_before_ns_ = now_ns;
   }
+  const bool moves = !settled_ || axis != membrane_.axis;
+  if (moves) {
+    move(axis, dt_s);
+  }
+
+  seen_ = seen_ && newest_exposure_ns_ <= now_ns;  // the clock went back: that time says nothing
+  const double since_start_s = static_cast<double>(now_ns - not_before_ns_) * 1e-9;
+  age_s_ = seen_ ? static_cast<double>(now_ns - newest_exposure_ns_) * 1e-9 : -1;
+  stale_ = !seen_ || age_s_ > params_.stale_after_s;
+  overdue_ = stale_ && since_start_s > params_.stale_after_s;
+  fade_.step(!stale_, params_.return_s, params_.fade_s, dt_s);
+  return moves;
+}
+
+void LocalMembraneModel::move(const hal::Vec3& axis, double dt_s) NONBLOCKING {
   // The cell stays where it is when the needle's axis tilts about it.
   const hal::Vec3 turn = membrane_.axis - axis;
   touched_entry_m_ += membrane_.R_m * turn;
@@ -308,16 +324,12 @@ void LocalMembraneModel::step(std::int64_t now_ns, const hal::Vec3& axis, double
   entry_correction_m_ *= 1 - part;
   correct(membrane_.R_m, R_correction_m_, most_m);
   correct(dimple_scale_, scale_correction_, params_.dimple_scale_rate_1_s * dt_s);
-
-  seen_ = seen_ && newest_exposure_ns_ <= now_ns;  // the clock went back: that time says nothing
-  const double since_start_s = static_cast<double>(now_ns - not_before_ns_) * 1e-9;
-  age_s_ = seen_ ? static_cast<double>(now_ns - newest_exposure_ns_) * 1e-9 : -1;
-  stale_ = !seen_ || age_s_ > params_.stale_after_s;
-  overdue_ = stale_ && since_start_s > params_.stale_after_s;
-  fade_.step(!stale_, params_.return_s, params_.fade_s, dt_s);
+  settled_ =
+      part == 1 && R_correction_m_ == 0 && (scale_correction_ == 0 || params_.dimple_scale_rate_1_s == 0);
 }
 
 void LocalMembraneModel::restart(std::int64_t now_ns) NONBLOCKING {
+  settled_ = false;
   membrane_.known = false;
   membrane_.R_m = R_default_m_;
   entry_correction_m_.setZero();

@@ -102,8 +102,8 @@ class LocalMembraneModel {
   // can be). inside: past the puncture, where a frame that shows the needle is enough to count as sight.
   bool observe(const Observation& seen, bool inside) NONBLOCKING;
 
-  // Bounded-rate correction, age, fade.
-  void step(std::int64_t now_ns, const hal::Vec3& axis, double dt_s) NONBLOCKING;
+  // Bounded-rate correction, age, fade. True if it moved the membrane.
+  bool step(std::int64_t now_ns, const hal::Vec3& axis, double dt_s) NONBLOCKING;
 
   // The needle touches the cell: from here on the undeformed membrane stays where it is, but for disagree_m.
   void touch() NONBLOCKING;
@@ -146,6 +146,8 @@ class LocalMembraneModel {
   [[nodiscard]] bool in_order(const Observation& seen) NONBLOCKING;
   void remember_first(const Membrane3D& claim) NONBLOCKING;
   [[nodiscard]] bool can_be(const Membrane3D& claim) const NONBLOCKING;
+  // Turns the membrane to this axis, and applies of the corrections as much as their rate allows.
+  void move(const hal::Vec3& axis, double dt_s) NONBLOCKING;
 
   // The offset between the picture and the stage's frame is unknown but constant. A picture that stands still
   // while the needle moves would move the membrane with the needle, and no depth limit would hold it.
@@ -160,6 +162,7 @@ class LocalMembraneModel {
   double R_correction_m_ = 0;
   double variance_m2_ = 0;  // of the entry along the axis
   double scale_correction_ = 0;
+  bool settled_ = false;  // of these nothing is left, or what never will be
   double dimple_scale_;
   std::array<Membrane3D, kFirstFrames> first_claims_{};
   std::size_t first_frames_ = 0;

@@ -103,7 +103,8 @@ void MasterToStage::step(const hal::HandState& hand, bool coupled, bool tilting)
   if (!(params_.max_tilt_rad > 0)) {
     return;
   }
-  if (coupled && tilting) {
+  tilts_ = coupled && tilting;
+  if (tilts_) {
     if (tilt_stands_) {
       tilt_anchor_rad_ = tilt_wanted_rad_ - handle_tilt_rad(stood_at_);
     }
@@ -143,7 +144,9 @@ const hal::StageCommand& MasterToStage::filter(double dt_s) NONBLOCKING {
   const LowPass low_pass(params_.tremor_cutoff_Hz, dt_s);
   low_pass.step(set_point_.tip_m, filter_velocity_m_s_, hand_point_m_);
   if (params_.max_tilt_rad > 0) {
-    low_pass.step(tilt_rad_, tilt_velocity_rad_s_, tilt_wanted_rad_);
+    if (tilts_) {
+      low_pass.step(tilt_rad_, tilt_velocity_rad_s_, tilt_wanted_rad_);
+    }
     tilt_rad_ = bounded(tilt_rad_, params_.max_tilt_rad);
     if (tilt_rad_ != turned_by_rad_) {
       turned_by_rad_ = tilt_rad_;

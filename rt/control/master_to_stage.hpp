@@ -77,6 +77,7 @@ class MasterToStage {
   MappingParams params_;
   bool anchored_ = false;
   bool has_tilted_ = false;
+  bool tilts_ = false;                          // the needle with the handle, since step()
   bool tilt_stands_ = false;                    // the handle turned freely, and the needle's tilt stayed
   hal::Quat stood_at_ = hal::Quat::Identity();  // the handle, when it was seen last meanwhile
   hal::Vec3 anchor_hand_m_ = hal::Vec3::Zero();

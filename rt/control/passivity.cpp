@@ -73,18 +73,15 @@ constexpr double kFaster = 2.5;
 // Below what a finger feels: the work of such a force within an encoder step is no surplus.
 constexpr double kSteadyForce_N = 0.02;
 
-// 0 if it is finite, otherwise not a number.
-[[nodiscard]] double nothing(double x) NONBLOCKING { return 0 * x; }
-[[nodiscard]] double nothing(const hal::Vec3& v) NONBLOCKING { return 0 * v.x() + 0 * v.y() + 0 * v.z(); }
-
-[[nodiscard]] bool finite(const GuardInput& in) NONBLOCKING {
-  double zero = nothing(in.position_m) + nothing(in.dissipative_N) + nothing(in.active_N) +
-                nothing(in.stiffness_N_m) + nothing(in.damping_Ns_m) + nothing(in.elapsed_s) +
-                nothing(in.stored_J) + nothing(in.between_s) + nothing(in.age_s);
-  for (const StoringForce& s : in.storing) {
-    zero += nothing(s.force_N) + nothing(s.point_m);
+// A sum is finite only where all of its terms are: one test for all of them.
+[[nodiscard]] bool finite(const ForceParts& parts, const HandMotion& hand) NONBLOCKING {
+  hal::Vec3 vectors = hand.position_m + parts.dissipative_N + parts.active_N;
+  for (const StoringForce& s : parts.storing) {
+    vectors += s.force_N + s.point_m;
   }
-  return zero == 0 && in.elapsed_s > 0;
+  const double sum = vectors.sum() + parts.stiffness_N_m + parts.damping_Ns_m + parts.stored_J +
+                     hand.elapsed_s + hand.between_s + hand.age_s;
+  return std::isfinite(sum) && hand.elapsed_s > 0;
 }
 
 [[nodiscard]] double square(double x) NONBLOCKING { return x * x; }
@@ -113,10 +110,12 @@ constexpr double kSteadyForce_N = 0.02;
   return own;
 }
 
-// Moves towards `to` with time constant tau_s.
+// Moves towards `to` with time constant tau_s. What is there stays there: most gains and accounts, mostly.
 template <class T>
 void approach(T& x, const T& to, double dt_s, double tau_s) NONBLOCKING {
-  x += (to - x) * std::min(1.0, dt_s / tau_s);
+  if (x != to) {
+    x += (to - x) * std::min(1.0, dt_s / tau_s);
+  }
 }
 
 }  // namespace
@@ -162,31 +161,39 @@ PassivityGuard::PassivityGuard(const GuardParams& params, const HandDevice& devi
       tick_(T_s_),
       sample_(T_s_) {}
 
+double PassivityGuard::transport_s() const NONBLOCKING { return device_.delay_ticks * tick_.kept_s(); }
+
 // A position is held for the samples' period and its force comes late by ticks.
-double PassivityGuard::delay_s() const NONBLOCKING {
-  return 0.5 * sample_.kept_s() + device_.delay_ticks * tick_.kept_s();
+PassivityGuard::Input PassivityGuard::input(const ForceParts& parts, const HandMotion& hand) const
+    NONBLOCKING {
+  const hal::Vec3 stored_N = parts.stored_N();
+  const double delay_s = 0.5 * sample_.kept_s() + transport_s();
+  return {.parts = parts,
+          .hand = hand,
+          .stored_N = stored_N,
+          .wanted_N = stored_N.norm(),
+          .stiffness_N_m = std::max(parts.stiffness_N_m, 0.0),
+          .delay_s = delay_s,
+          .passive_N_m = params_.margin * device_.damping_Ns_m / delay_s,
+          .on_time = T_s_ / sample_.kept_s()};
 }
 
 // The time between two samples of a device that keeps its period.
 double PassivityGuard::regular_s() const NONBLOCKING { return std::min(sample_.kept_s(), kSlowest_s); }
 
-double PassivityGuard::allowed_stiffness_N_m() const NONBLOCKING {
-  return params_.margin * device_.damping_Ns_m / delay_s();
-}
-
 // What a few encoder steps come to.
-double PassivityGuard::real_J(const GuardInput& in) const NONBLOCKING {
-  return device_.encoder_step_m * (2 * gain_ * in.stored_N().norm() + kSteadyForce_N);
+double PassivityGuard::real_J(const Input& in) const NONBLOCKING {
+  return device_.encoder_step_m * (2 * gain_ * in.wanted_N + kSteadyForce_N);
 }
 
-void PassivityGuard::lower_gain(const GuardInput& in) NONBLOCKING {
-  const double stiffness = std::max(in.stiffness_N_m, 0.0);
-  const double passive = allowed_stiffness_N_m();
+void PassivityGuard::lower_gain(const Input& in) NONBLOCKING {
+  const double stiffness = in.stiffness_N_m;
+  const double passive = in.passive_N_m;
   const double passive_gain = stiffness > passive ? passive / stiffness : 1;
   if (passive_gain < stiff_gain_) {
     stiff_gain_ = passive_gain;
   } else {
-    approach(stiff_gain_, passive_gain, in.elapsed_s, params_.recover_s);
+    approach(stiff_gain_, passive_gain, in.hand.elapsed_s, params_.recover_s);
   }
   gain_ = std::min(stiff_gain_ * net_gain_, surplus_gain_);
 }
@@ -199,22 +206,23 @@ void PassivityGuard::forget_interval() NONBLOCKING {
 
 // What the storing effects took up in the last interval: the trapezoid of their force as rendered, which no
 // path or parameter of theirs enters.
-void PassivityGuard::observe_tick(const GuardInput& in) NONBLOCKING {
+void PassivityGuard::observe_tick(const Input& in) NONBLOCKING {
   const auto ago = static_cast<std::size_t>(device_.delay_ticks);
   const Forces& acted = written_[(newest_ + kRing - ago) % kRing];
-  acted_Ns_.passive_N += in.elapsed_s * acted.passive_N;
-  acted_Ns_.active_N += in.elapsed_s * acted.active_N;
+  acted_Ns_.passive_N += in.hand.elapsed_s * acted.passive_N;
+  acted_Ns_.active_N += in.hand.elapsed_s * acted.active_N;
   acted_Ns_.stored_J = acted.stored_J;
-  for (std::size_t i = 0; i < in.storing.size(); ++i) {
-    const hal::Vec3 force_N = 0.5 * (last_storing_[i].force_N + gain_ * in.storing[i].force_N);
-    taken_up_J_ += force_N.dot(in.storing[i].point_m - last_storing_[i].point_m);
+  for (std::size_t i = 0; i < in.parts.storing.size(); ++i) {
+    const StoringForce& now = in.parts.storing[i];
+    const hal::Vec3 force_N = 0.5 * (last_storing_[i].force_N + gain_ * now.force_N);
+    taken_up_J_ += force_N.dot(now.point_m - last_storing_[i].point_m);
   }
 }
 
 // The work of the written forces between two samples, less what half an encoder step of error at either end
 // can pretend: it is surplus where it exceeds what the storing effects took up, and goes to the net account.
-void PassivityGuard::observe_sample(const GuardInput& in) NONBLOCKING {
-  const hal::Vec3 moved_m = in.position_m - position_m_;
+void PassivityGuard::observe_sample(const Input& in) NONBLOCKING {
+  const hal::Vec3 moved_m = in.hand.position_m - position_m_;
   const hal::Vec3 acted_N = acted_Ns_.passive_N / since_s_;
   const double given_J = acted_N.dot(moved_m);
   const double pretended_J = 0.5 * device_.encoder_step_m * (acted_N - acted_N_).lpNorm<1>();
@@ -243,7 +251,7 @@ void PassivityGuard::observe_sample(const GuardInput& in) NONBLOCKING {
 // The net account. Between two steps of a coordinate the mean force acted on the way between the places where
 // it stepped. An encoder that steps by one count after a while is where two counts meet, not in the middle of
 // the new one: a handle that trembles about that place goes no way and gets nothing.
-void PassivityGuard::account(const GuardInput& in, const hal::Vec3& moved_m, const hal::Vec3& acted_N)
+void PassivityGuard::account(const Input& in, const hal::Vec3& moved_m, const hal::Vec3& acted_N)
     NONBLOCKING {
   double given_J = 0, given_W = 0;
   for (Eigen::Index i = 0; i < 3; ++i) {
@@ -256,35 +264,34 @@ void PassivityGuard::account(const GuardInput& in, const hal::Vec3& moved_m, con
       continue;
     }
     const bool by_one = std::abs(step_m) < 1.5 * device_.encoder_step_m;
-    const double at_m = in.position_m[i] - (by_one ? 0.5 * step_m * (1 - 1.0 / way.samples) : 0);
+    const double at_m = in.hand.position_m[i] - (by_one ? 0.5 * step_m * (1 - 1.0 / way.samples) : 0);
     const double work_J = (by_one ? way.acted_N : acted_N[i]) * (at_m - way.at_m);
     given_J += work_J;
     given_W += work_J / way.since_s;
     way = {at_m};
   }
-  net_J_ = std::min(net_J_ - given_J, std::max(gain_ * in.stored_J, acted_Ns_.stored_J));
+  net_J_ = std::min(net_J_ - given_J, std::max(gain_ * in.parts.stored_J, acted_Ns_.stored_J));
   if (net_J_ < 0) {
     net_J_ = std::min(0.0, net_J_ + kAllowed_W * since_s_);
   }
   // As much again, over hold and delay, is on its way already, and what the force gives as it comes down.
   const double falls_s = written_[newest_].passive_N.norm() / slew_N_s_;
-  const double coming_s = sample_.kept_s() + device_.delay_ticks * tick_.kept_s() + 0.5 * falls_s;
+  const double coming_s = sample_.kept_s() + transport_s() + 0.5 * falls_s;
   const double soon_J = net_J_ - std::max(given_W, 0.0) * coming_s;
   const double most = std::clamp((1 - kUnnoticed + soon_J / kAllowed_J) / kFallsFrom, 0.0, 1.0);
   approach(net_gain_, 1.0, since_s_, params_.recover_s);
   // A handle that presses in meets the passive stiffness from where it is: no effect falls away under it.
-  const double wanted_N = in.stored_N().norm();
-  const double room_N_m = allowed_stiffness_N_m() - gain_ * std::max(in.stiffness_N_m, 0.0);
-  if (given_J < 0 && room_N_m > 0 && wanted_N > 0) {
-    net_gain_ += room_N_m * moved_m.norm() / (stiff_gain_ * wanted_N);
+  const double room_N_m = in.passive_N_m - gain_ * in.stiffness_N_m;
+  if (given_J < 0 && room_N_m > 0 && in.wanted_N > 0) {
+    net_gain_ += room_N_m * moved_m.norm() / (stiff_gain_ * in.wanted_N);
   }
   net_gain_ = std::min(net_gain_, most);
 }
 
 // The guard's own velocity at a new sample, and how fast the handle is braked.
-void PassivityGuard::follow_motion(const GuardInput& in, double between_s) NONBLOCKING {
+void PassivityGuard::follow_motion(const HandMotion& hand, double between_s) NONBLOCKING {
   const hal::Vec3 before_m_s = v_m_s_;
-  v_m_s_ = velocity_.step(in.position_m, between_s);
+  v_m_s_ = velocity_.step(hand.position_m, between_s);
   const double speed_m_s = before_m_s.norm();
   braked_m_s2_ = !first_ && speed_m_s > 0
                      ? std::max(0.0, before_m_s.dot(before_m_s - v_m_s_) / (speed_m_s * between_s))
@@ -293,13 +300,13 @@ void PassivityGuard::follow_motion(const GuardInput& in, double between_s) NONBL
 
 // The damper beside the springs and against surplus, of a new sample. share: of the effects' damping that is
 // rendered while nothing brakes the handle: what is left out then, the damper does not make up for.
-void PassivityGuard::damp(const GuardInput& in, double share) NONBLOCKING {
+void PassivityGuard::damp(const Input& in, double share) NONBLOCKING {
   const hal::Vec3& v = v_m_s_;
-  const double bound = kDamperShare * (T_s_ / sample_.kept_s()) * own_stable_Ns_m_;
-  const double stiffness = gain_ * std::max(in.stiffness_N_m, 0.0);
-  const double compensation = std::min(kCompensation * stiffness * delay_s(), bound);
+  const double bound = kDamperShare * in.on_time * own_stable_Ns_m_;
+  const double stiffness = gain_ * in.stiffness_N_m;
+  const double compensation = std::min(kCompensation * stiffness * in.delay_s, bound);
   const double fast = std::min(kFastCompensation / kCompensation * compensation, bound - compensation);
-  const double room = std::max(0.0, bound - share * in.damping_Ns_m - compensation - fast);
+  const double room = std::max(0.0, bound - share * in.parts.damping_Ns_m - compensation - fast);
   approach(slow_m_s_, v, since_s_, kSlow_s);
   const double speed2 = v.squaredNorm();
   const double to_take_J = std::max(
@@ -312,8 +319,9 @@ void PassivityGuard::damp(const GuardInput& in, double share) NONBLOCKING {
   // Where the damper cannot suffice, stiffness falls. A late needle leaves surplus at a handle that rests:
   // the stage has paid for it, and nothing is given back yet.
   const bool at_its_bound = wanted > room && taking_Ns_m_ >= (1 - kAtBound) * (room - kAtBound * bound);
-  const bool gives = given_J_ > real_J(in);
-  if (surplus_J_ > real_J(in) && at_its_bound && gives) {
+  const double real = real_J(in);
+  const bool gives = given_J_ > real;
+  if (surplus_J_ > real && at_its_bound && gives) {
     surplus_gain_ *= 1 - std::min(kMostLowered, since_s_ / kLower_s);
   } else {
     approach(surplus_gain_, 1.0, since_s_, params_.recover_s);
@@ -328,86 +336,87 @@ void PassivityGuard::damp(const GuardInput& in, double share) NONBLOCKING {
   damper_N_ = -damper_Ns_m_ * v + fast * slow_m_s_;
 }
 
-hal::Vec3 PassivityGuard::step(const GuardInput& in) NONBLOCKING {
-  asked_ = {};
-  if (!finite(in)) {
-    return in.wanted_N();
+hal::Vec3 PassivityGuard::step(const ForceParts& parts, const HandMotion& hand) NONBLOCKING {
+  if (!finite(parts, hand)) {
+    asked_ = {};
+    return parts.wanted_N();
   }
-  if (in.begins) {
+  if (hand.begins) {
     first_ = true;
     velocity_.restart();
     forget_interval();
   }
-  tick_.follow(in.elapsed_s, params_.recover_s);
-  since_s_ += in.elapsed_s;
-  if (in.fresh) {
-    const double between_s = in.between_s > 0 ? in.between_s : since_s_;
+  tick_.follow(hand.elapsed_s, params_.recover_s);
+  since_s_ += hand.elapsed_s;
+  if (hand.fresh) {
+    const double between_s = hand.between_s > 0 ? hand.between_s : since_s_;
     sample_.follow(between_s, params_.recover_s);
-    gap_ = in.leaps || between_s > kSeen * regular_s();
-    follow_motion(in, between_s);
+    gap_ = hand.leaps || between_s > kSeen * regular_s();
+    follow_motion(hand, between_s);
   }
+  const Input in = input(parts, hand);
   lower_gain(in);
   if (!first_) {
     observe_tick(in);
-    if (in.fresh) {
+    if (hand.fresh) {
       observe_sample(in);
     }
   }
 
   // Effects' damping that the device can render, and that a spring of this stiffness leaves in phase.
-  const double rendered = gain_ * std::max(in.stiffness_N_m, 0.0);
+  const double rendered = gain_ * in.stiffness_N_m;
   const double in_phase = rendered > in_phase_N_m_ ? square(in_phase_N_m_ / rendered) : 1;
-  const double renders = kDamperShare * (T_s_ / sample_.kept_s()) * stable_Ns_m_ * in_phase;
-  const double regular = in.damping_Ns_m > renders ? renders / in.damping_Ns_m : 1;
+  const double renders = kDamperShare * in.on_time * stable_Ns_m_ * in_phase;
+  const double regular = parts.damping_Ns_m > renders ? renders / parts.damping_Ns_m : 1;
   // Of a handle that is braked hard only as much as the limit behind the guard lets go before the handle
   // turns round: what is left of the force then pushes it on.
   const double comes_down_Ns_m = slew_N_s_ / braked_m_s2_;
   const double share =
-      regular * in.damping_Ns_m > comes_down_Ns_m ? comes_down_Ns_m / in.damping_Ns_m : regular;
-  if (in.fresh) {
+      regular * parts.damping_Ns_m > comes_down_Ns_m ? comes_down_Ns_m / parts.damping_Ns_m : regular;
+  if (hand.fresh) {
     damp(in, regular);
     if (first_) {
-      way_ = {Way{in.position_m.x()}, Way{in.position_m.y()}, Way{in.position_m.z()}};
+      way_ = {Way{hand.position_m.x()}, Way{hand.position_m.y()}, Way{hand.position_m.z()}};
     }
-    moved_m_ = first_ ? hal::Vec3::Zero().eval() : hal::Vec3(in.position_m - position_m_);
+    moved_m_ = first_ ? hal::Vec3::Zero().eval() : hal::Vec3(hand.position_m - position_m_);
     first_ = false;
-    position_m_ = in.position_m;
+    position_m_ = hand.position_m;
     forget_interval();
   }
 
   // A hand that is silent may be anywhere by now.
-  const double age = in.age_s / regular_s();
+  const double age = hand.age_s / regular_s();
   const double seen = std::clamp((kBlind - age) / (kBlind - kSeen), 0.0, 1.0);
   const double rendered_gain = seen * gain_;
   // A velocity over a gap is the mean of it, and says little of now. After it, or after a false position, it
   // may be wrong for a while: a handle that has got too much is not pushed the way it goes.
-  hal::Vec3 damping_N = gap_ ? hal::Vec3::Zero().eval() : hal::Vec3(share * in.dissipative_N + damper_N_);
+  hal::Vec3 damping_N = gap_ ? hal::Vec3::Zero().eval() : hal::Vec3(share * parts.dissipative_N + damper_N_);
   const double along = damping_N.dot(moved_m_);
   if (net_J_ < -kUnnoticed * kAllowed_J && along > 0) {
     damping_N -= along / moved_m_.squaredNorm() * moved_m_;
   }
 
-  last_storing_ = in.storing;
-  for (StoringForce& s : last_storing_) {
-    s.force_N *= rendered_gain;
+  for (std::size_t i = 0; i < parts.storing.size(); ++i) {
+    last_storing_[i] = {rendered_gain * parts.storing[i].force_N, parts.storing[i].point_m};
   }
-  asked_.passive_N = rendered_gain * in.stored_N() + seen * damping_N;
-  asked_.active_N = seen * active_gain_ * in.active_N;
-  asked_.stored_J = rendered_gain * in.stored_J;
+  asked_.passive_N = rendered_gain * in.stored_N + seen * damping_N;
+  asked_.active_N = seen * active_gain_ * parts.active_N;
+  asked_.stored_J = rendered_gain * parts.stored_J;
   return asked_.passive_N + asked_.active_N;
 }
 
 void PassivityGuard::wrote(const hal::Vec3& force_N) NONBLOCKING {
   newest_ = (newest_ + 1) % kRing;
-  written_[newest_] = {};
-  if (hal::is_finite(force_N)) {
-    // A limit takes the same part of both.
-    const double asked_N = (asked_.passive_N + asked_.active_N).norm();
-    const double written_N = force_N.norm();
-    const hal::Vec3 active_N =
-        written_N < asked_N ? hal::Vec3(written_N / asked_N * asked_.active_N) : asked_.active_N;
-    written_[newest_] = {force_N - active_N, active_N, asked_.stored_J};
+  if (!hal::is_finite(force_N)) {
+    written_[newest_] = {};
+    return;
   }
+  // A limit takes the same part of both.
+  const double asked_N = (asked_.passive_N + asked_.active_N).norm();
+  const double written_N = force_N.norm();
+  const hal::Vec3 active_N =
+      written_N < asked_N ? hal::Vec3(written_N / asked_N * asked_.active_N) : asked_.active_N;
+  written_[newest_] = {force_N - active_N, active_N, asked_.stored_J};
 }
 
 }  // namespace punctum::rt

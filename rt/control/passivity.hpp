@@ -53,8 +53,8 @@ constexpr auto keys_of(const GuardParams*) {
                    hal::real("recover_s", &GuardParams::recover_s, 0.1, 60));
 }
 
-// What the effects of one tick ask for, at the hand.
-struct GuardInput : ForceParts {
+// The handle on one tick.
+struct HandMotion {
   hal::Vec3 position_m = hal::Vec3::Zero();  // of the handle, as its encoders read
   double elapsed_s = 0;                      // since the last step
   bool fresh = true;                         // the position is a new sample
@@ -63,6 +63,9 @@ struct GuardInput : ForceParts {
   bool begins = false;   // it has nothing to do with the one before: no motion lies between them
   bool leaps = false;    // it tells nothing of a velocity
 };
+
+// What the effects of one tick ask for, at the hand.
+struct GuardInput : ForceParts, HandMotion {};
 
 class PassivityGuard {
  public:
@@ -77,7 +80,8 @@ class PassivityGuard {
                  double rate_Hz, double slew_N_s = std::numeric_limits<double>::infinity()) NONBLOCKING;
 
   // The force to render. Input that is not finite passes through as it is and changes nothing here.
-  [[nodiscard]] hal::Vec3 step(const GuardInput& in) NONBLOCKING;
+  [[nodiscard]] hal::Vec3 step(const ForceParts& parts, const HandMotion& hand) NONBLOCKING;
+  [[nodiscard]] hal::Vec3 step(const GuardInput& in) NONBLOCKING { return step(in, in); }
 
   // After step(): what was written to the device, saturation and a stop included.
   void wrote(const hal::Vec3& force_N) NONBLOCKING;
@@ -122,17 +126,29 @@ class PassivityGuard {
     double samples = 0;
   };
 
+  // The input of one tick, and what several of the steps below take of it.
+  struct Input {
+    const ForceParts& parts;
+    const HandMotion& hand;
+    hal::Vec3 stored_N;
+    double wanted_N;       // length of stored_N
+    double stiffness_N_m;  // not negative
+    double delay_s;        // of hold and transport
+    double passive_N_m;    // stiffness that is passive with this delay
+    double on_time;        // nominal period over the one that the samples keep
+  };
+  [[nodiscard]] Input input(const ForceParts& parts, const HandMotion& hand) const NONBLOCKING;
+
   [[nodiscard]] double regular_s() const NONBLOCKING;
-  [[nodiscard]] double delay_s() const NONBLOCKING;  // of hold and transport
-  [[nodiscard]] double allowed_stiffness_N_m() const NONBLOCKING;
-  [[nodiscard]] double real_J(const GuardInput& in) const NONBLOCKING;
-  void lower_gain(const GuardInput& in) NONBLOCKING;
+  [[nodiscard]] double transport_s() const NONBLOCKING;
+  [[nodiscard]] double real_J(const Input& in) const NONBLOCKING;
+  void lower_gain(const Input& in) NONBLOCKING;
   void forget_interval() NONBLOCKING;
-  void observe_tick(const GuardInput& in) NONBLOCKING;
-  void observe_sample(const GuardInput& in) NONBLOCKING;
-  void account(const GuardInput& in, const hal::Vec3& moved_m, const hal::Vec3& acted_N) NONBLOCKING;
-  void follow_motion(const GuardInput& in, double between_s) NONBLOCKING;
-  void damp(const GuardInput& in, double share) NONBLOCKING;
+  void observe_tick(const Input& in) NONBLOCKING;
+  void observe_sample(const Input& in) NONBLOCKING;
+  void account(const Input& in, const hal::Vec3& moved_m, const hal::Vec3& acted_N) NONBLOCKING;
+  void follow_motion(const HandMotion& hand, double between_s) NONBLOCKING;
+  void damp(const Input& in, double share) NONBLOCKING;
 
   GuardParams params_;
   HandDevice device_;

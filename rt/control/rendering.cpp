@@ -80,9 +80,9 @@ hal::Vec3 Rendering::keep_passive(const EffectSum& sum, const Readings& readings
   if (!guard_) {
     return sum.force_N;
   }
-  hal::Vec3 force_N =
-      guard_->step({sum.parts, world_from_hand(readings.hand.position_m), elapsed_s, readings.hand_fresh,
-                    readings.between_hand_s, readings.hand_age_s, readings.hand_begins, readings.hand_leaps});
+  hal::Vec3 force_N = guard_->step(
+      sum.parts, {world_from_hand(readings.hand.position_m), elapsed_s, readings.hand_fresh,
+                  readings.between_hand_s, readings.hand_age_s, readings.hand_begins, readings.hand_leaps});
   if (faded()) {
     force_N.setZero();  // no effect is left that the guard could be needed for
   }

@@ -21,13 +21,13 @@ enum class SampleIs : std::uint8_t { fresh, repeated, untimely };
 class SampleClock {
  public:
   explicit SampleClock(double timeout_s) NONBLOCKING
-      : timeout_s_(timeout_s),
+      : longest_s_(timeout_s + kRounding_s),
         timeout_ns_(static_cast<std::int64_t>(timeout_s * 1e9 + 0.5)) {}
 
   // Once per tick, before its reading.
   void step(double elapsed_s) NONBLOCKING {
     silent_s_ = std::min(silent_s_ + elapsed_s, kLongest_s);
-    if (silent_s_ > timeout_s_ + kRounding_s) {
+    if (silent_s_ > longest_s_) {
       begun_ = false;  // the device begins anew, whatever its clock said before
     }
   }
@@ -60,7 +60,7 @@ class SampleClock {
 
   // Of the newest sample; before the first one, the time that was waited for it.
   [[nodiscard]] double age_s() const NONBLOCKING { return age_at_arrival_s_ + silent_s_; }
-  [[nodiscard]] bool timed_out() const NONBLOCKING { return age_s() > timeout_s_ + kRounding_s; }
+  [[nodiscard]] bool timed_out() const NONBLOCKING { return age_s() > longest_s_; }
 
  private:
   // A device takes its sample after the tick has read the clock and before the tick reads the device: at most
@@ -71,7 +71,7 @@ class SampleClock {
   static constexpr std::int64_t kNearest_ns = 50'000;
   static constexpr double kLongest_s = 1e6;
 
-  double timeout_s_;
+  double longest_s_;  // the time-out
   std::int64_t timeout_ns_;
   double silent_s_ = 0;  // since the newest sample arrived
   double age_at_arrival_s_ = 0;

@@ -78,12 +78,15 @@ std::uint32_t StageSetPoint::follow_hand(const Readings& readings, const FollowI
     allowed.alarms |= alarm_travel_limited;
   }
   // A hand that was faster than the needle may be slips too: the needle does not go on for long after it.
-  const double lead_m = limits_.allowed_speed_m_s(in.constraint) * (lag_s_ + kLead_s);
   const hal::Vec3 lead = allowed.point_m - limits_.set_point().tip_m;
-  if (const double length_m = lead.norm(); length_m > lead_m) {
-    allowed = limits_.check(limits_.set_point().tip_m + lead * (lead_m / length_m), in.constraint);
-    allowed.alarms |= alarm_travel_limited;
-    mapping_.slip(allowed.point_m);
+  const double length_m = lead.norm();
+  if (length_m > limits_.slowest_m_s() * (lag_s_ + kLead_s)) {
+    const double lead_m = limits_.allowed_speed_m_s(in.constraint) * (lag_s_ + kLead_s);
+    if (length_m > lead_m) {
+      allowed = limits_.check(limits_.set_point().tip_m + lead * (lead_m / length_m), in.constraint);
+      allowed.alarms |= alarm_travel_limited;
+      mapping_.slip(allowed.point_m);
+    }
   }
   return allowed.alarms;
 }

@@ -70,7 +70,8 @@ BasicKalman<Real>::BasicKalman(const VelocityParams& params, double T_s) NONBLOC
 }
 
 template <class Real>
-typename BasicKalman<Real>::Vector BasicKalman<Real>::step(const Vector& position_m, Real dt_s) NONBLOCKING {
+const typename BasicKalman<Real>::Vector& BasicKalman<Real>::step(const Vector& position_m, Real dt_s)
+    NONBLOCKING {
   if (!hal::is_finite(position_m) || (begun_ && !(dt_s > 0))) {
     return velocity_;
   }

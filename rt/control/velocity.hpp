@@ -57,7 +57,7 @@ class BasicKalman {
   BasicKalman(const VelocityParams& params, double T_s) NONBLOCKING;
 
   // A new sample, dt_s after the one before. Returns the velocity, 0 for the first.
-  Vector step(const Vector& position_m, Real dt_s) NONBLOCKING;
+  const Vector& step(const Vector& position_m, Real dt_s) NONBLOCKING;
   // The next sample is the first.
   void restart() NONBLOCKING {
     begun_ = false;

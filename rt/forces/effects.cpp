@@ -50,6 +50,9 @@ template <Gives gives>
 }
 
 void fade(ForceParts& parts, double force_fade) NONBLOCKING {
+  if (force_fade == 1) {
+    return;
+  }
   for (StoringForce& storing : parts.storing) {
     storing.force_N *= force_fade;
   }

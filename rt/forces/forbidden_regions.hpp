@@ -73,6 +73,20 @@ struct NeedlePose {
   hal::Vec3 axis = -hal::Vec3::UnitX();  // unit, out of the tip
 };
 
+// Room that a needle was once seen to have. A plane that it is apart from comes no nearer than the tip goes,
+// as long as the needle does not turn: until the room is used up there is nothing to look for anew.
+struct SeenRoom {
+  NeedlePose needle;
+  double room_m = 0;
+
+  [[nodiscard]] double left_m(const hal::Vec3& tip_m) const NONBLOCKING {
+    return room_m - (tip_m - needle.tip_m).norm();
+  }
+  [[nodiscard]] double left_m(const NeedlePose& now) const NONBLOCKING {
+    return now.axis == needle.axis ? left_m(now.tip_m) : 0;
+  }
+};
+
 class ForbiddenRegions {
  public:
   explicit ForbiddenRegions(const ForbiddenParams& params) NONBLOCKING : params_(params) {}

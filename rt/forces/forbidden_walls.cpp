@@ -1,10 +1,14 @@
 #include "rt/forces/forbidden_walls.hpp"
 
+#include <algorithm>
+#include <limits>
+
 #include "rt/forces/ramp.hpp"
 
 namespace punctum::rt {
 namespace {
 
+constexpr double kUsedUp_m = 1e-9;  // more than rounding may hide
 constexpr double kSoftPart = 0.25;  // of felt: over so much the wall's stiffness begins
 
 }  // namespace
@@ -12,11 +16,13 @@ constexpr double kSoftPart = 0.25;  // of felt: over so much the wall's stiffnes
 PotentialForce ForbiddenWalls::push(Region region, const NeedlePose& needle) NONBLOCKING {
   PotentialForce push;
   hal::Vec3& away = away_[static_cast<std::size_t>(region)];
-  if (regions_.apart_m(region, away, needle) >= params_.felt_m) {
+  if (const double room_m = regions_.apart_m(region, away, needle) - params_.felt_m; room_m >= 0) {
+    seen_.room_m = std::min(seen_.room_m, room_m);
     return push;  // in that direction alone they are far apart
   }
   away = regions_.away(region, needle);
   const double delta_m = params_.felt_m - regions_.apart_m(region, away, needle);
+  seen_.room_m = std::min(seen_.room_m, -delta_m);
   push.force_N = params_.K_N_m * soft_spring(delta_m, kSoftPart * params_.felt_m) * away;
   if (reach_) {
     push.force_N = reach_->lazyProduct(hal::Vec3(push.force_N));
@@ -27,8 +33,9 @@ PotentialForce ForbiddenWalls::push(Region region, const NeedlePose& needle) NON
 
 EffectOutput ForbiddenWalls::step(const EffectInput& in) NONBLOCKING {
   EffectOutput out;
-  if (in.coupling_gain > 0) {
-    const NeedlePose needle{in.fixture_point_m, in.needle_axis};
+  const NeedlePose needle{in.fixture_point_m, in.needle_axis};
+  if (in.coupling_gain > 0 && !(seen_.left_m(needle) > kUsedUp_m)) {
+    seen_ = {needle, std::numeric_limits<double>::infinity()};
     for (const Region region : kRegions) {
       if (!regions_.has(region)) {
         continue;

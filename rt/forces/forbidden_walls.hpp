@@ -40,6 +40,7 @@ class ForbiddenWalls {
   ForbiddenRegions regions_;
   std::optional<hal::Mat3> reach_;
   std::array<hal::Vec3, std::size(kRegions)> away_{hal::Vec3::UnitX(), hal::Vec3::UnitX()};
+  SeenRoom seen_;  // before a wall is felt
   double last_stored_J_ = 0;
   hal::Vec3 last_force_N_ = hal::Vec3::Zero();
   hal::Vec3 last_handle_m_ = hal::Vec3::Zero();

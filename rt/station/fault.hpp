@@ -65,8 +65,10 @@ struct Causes {
     all |= later.all;
   }
   constexpr void add(Fault later) NONBLOCKING {
-    first = first_of(first, later);
-    all |= later != Fault::none ? 1U << static_cast<unsigned>(later) : 0U;
+    if (later != Fault::none) {
+      first = first_of(first, later);
+      all |= 1U << static_cast<unsigned>(later);
+    }
   }
   Fault first = Fault::none;
   std::uint32_t all = 0;  // bit: Fault

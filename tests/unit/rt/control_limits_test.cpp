@@ -264,6 +264,37 @@ TEST(StageLimits, bound_velocity_acceleration_and_jerk_for_any_targets_and_pass_
   EXPECT_GT(sharpest, 0.9);
 }
 
+TEST(StageLimits, hold_no_point_that_is_nearer_than_their_clearance) {
+  int clear = 0;
+  for (unsigned seed = 0; seed < 20'000; ++seed) {
+    Wild wild(seed);
+    ForbiddenParams forbidden;
+    forbidden.floor = DishFloorParams{.z_m = wild.uniform(20e-6, 70e-6)};
+    StageLimits stage({}, {}, 1000, forbidden);
+    StageConstraint c;
+    c.membrane = cell(wild);
+    c.membrane.known = wild.pick(4) != 0;
+    const Vec3 from_entry =
+        wild.uniform(-30e-6, 80e-6) * c.membrane.axis + wild.uniform(0, 58e-6) * wild.unit();
+    const Vec3 here = c.membrane.entry_m + from_entry;
+    stage.restart(here, -Vec3::UnitX());
+    c.depth_limit_m = wild.uniform(0, 90e-6);
+    c.inward_limit_m = c.membrane.axis.dot(here) + wild.uniform(-2e-6, 40e-6);
+    if (wild.pick(2) == 0) {
+      c.insertion = FixtureFrame{here + wild.uniform(0, 6e-6) * wild.unit(), c.membrane.axis};
+    }
+    const double clearance_m = stage.clearance_m(c);
+    for (int k = 0; k < 20 && clearance_m > 0; ++k) {
+      const Vec3 point_m = here + 0.9999 * clearance_m * wild.unit();
+      const StageLimits::Checked checked = stage.check(point_m, c);
+      ASSERT_EQ(checked.point_m, point_m) << "seed " << seed;
+      ASSERT_EQ(checked.alarms, 0U) << "seed " << seed;
+      ++clear;
+    }
+  }
+  EXPECT_GT(clear, 100'000);
+}
+
 TEST(StageLimits, are_slower_near_the_membrane_and_slower_still_past_it) {
   const LimitParams limits;
   StageConstraint c;

@@ -218,7 +218,7 @@ INSTANTIATE_TEST_SUITE_P(
                     DrawnCell{"on_shaft", {.on_shaft = 6}, {4, 4, 4, 4, 4}},
                     DrawnCell{"crossed", {.gap_px = -1}, {3, 4, 4, 4, 3, 1}},
                     DrawnCell{"impurities_60", {.impurities = 60}, {3, 4, 3, 4, 4}, 4, false, 37},
-                    DrawnCell{"out_of_focus", {.focus_px = 4}, {2, 4, 2, 4, 4}, 4, true},
+                    DrawnCell{"out_of_focus", {.focus_px = 4}, {1, 4, 1, 4, 4, 1}, 4, true},
                     DrawnCell{"relief", {.relief = true}, {3, 4, 3, 4, 4, 1}, 4, true, 5}),
     [](const auto& one) { return std::string(one.param.name); });
 
@@ -352,7 +352,7 @@ TEST_P(RenderedStart, shows_everything_in_the_first_frame) {
 INSTANTIATE_TEST_SUITE_P(
     Cells, RenderedStart,
     testing::Values(RenderedCell{"noise_2", {3, 4, 3, 4, 4, 1}}, RenderedCell{"noise_5", {4, 4, 4, 4, 4}},
-                    RenderedCell{"noise_10", {4, 4, 4, 4, 4}}, RenderedCell{"noise_20", {4, 4, 4, 4, 4}},
+                    RenderedCell{"noise_10", {4, 4, 4, 4, 4}}, RenderedCell{"noise_20", {3, 4, 3, 4, 4}},
                     RenderedCell{"crossed", {2, 4, 2, 4, 4, 2}}, RenderedCell{"halo", {4, 4, 4, 4, 4}},
                     RenderedCell{"impurities_60", {3, 4, 3, 4, 4, 1}}, RenderedCell{"blur", {4, 4, 4, 4, 4}}),
     [](const auto& one) { return std::string(one.param.name); });

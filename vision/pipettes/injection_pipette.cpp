@@ -36,9 +36,10 @@ constexpr double kStraight = 0.65;    // share of the stations along the shaft o
 constexpr double kShortest_px = 4, kLongest_px = 40;  // of a wall that an edge is averaged over, at the start
 constexpr double kFollowed_px = 24;                   // and later, of a faint one: it may bend
 // Standard deviation of the outermost glass with which a faint needle may begin, and of an end that is found
-// together with its cut; and of an end from which more is learnt later. A tip that is less certain does more
-// harm than one that is not claimed: membranes are then taken for pushed that are free.
-constexpr double kStartKnown_px = 2, kEndKnown_px = 1.2;
+// together with its cut; out of focus, where a point may be a disc or a ring and not what is fitted; and of
+// an end from which more is learnt later. A tip that is less certain does more harm than one that is not
+// claimed: membranes are then taken for pushed that are free.
+constexpr double kStartKnown_px = 2.5, kUnsharpKnown_px = 1.8, kEndKnown_px = 1.2;
 // Further out of focus the lumen closes, the walls end up to 5 px from where the shape does, and the end is
 // somewhere in 3 px.
 constexpr double kSharp_px = 2.3;
@@ -350,25 +351,25 @@ bool InjectionPipette::learn_end_anew(const GradientField& field, double noise) 
   glass_ahead_ = glass_scatter_ = glass_blur_ = 0;
   glass_frames_ = 0;
   const bool lumen = last_.half_width >= kLumen_px;
-  const auto known = [&](const GlassEnd& end) {
-    return end.blur <= kMostBlur_px && sd_of({end, bevel_}, last_.half_width) <= kStartKnown_px;
+  const auto known = [&](const CutGlass& cut) {
+    return cut.end.blur <= kMostBlur_px &&
+           sd_of(cut, last_.half_width) <= (cut.end.blur > kSharp_px ? kUnsharpKnown_px : kStartKnown_px);
   };
-  const std::optional<CutGlass> cut = lumen ? go_to_cut(field, noise) : std::nullopt;
-  if (cut) {
+  if (const auto cut = lumen ? go_to_cut(field, noise) : std::nullopt; cut && known(*cut)) {
     bevel_ = cut->bevel;
-    if (known(cut->end)) {
-      learn_glass(cut->end);
-      return true;
-    }
-  } else {
-    bevel_ = lumen ? bevel_of_glass(field, noise, last_, kStartReach_px, kStartReach_px).value_or(Bevel{})
-                   : Bevel{};
+    learn_glass(cut->end);
+    return true;
   }
+  bevel_ =
+      lumen ? bevel_of_glass(field, noise, last_, kStartReach_px, kStartReach_px).value_or(Bevel{}) : Bevel{};
   const auto end = end_of_glass(field, noise, last_, bevel_.tangent, kStartReach_px, kStartReach_px);
-  if (lumen && end && end->sd <= kStartKnown_px) {
+  if (!end || end->sd > kEndKnown_px) {
+    return false;
+  }
+  if (lumen) {
     learn_glass(*end);
   }
-  return end && known(*end);
+  return known({*end, bevel_});
 }
 
 // How the needle is cut, and how far ahead the glass ends. It is put where they are when that is far from the

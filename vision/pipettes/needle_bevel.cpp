@@ -25,6 +25,7 @@ constexpr double kShaftFrom_px = 6, kShaftTo_px = 51;  // behind the range: tell
 constexpr double kBehind_px = 14;                      // behind the range, compared with every end
 // Half the thickness of the glass over the radius of its middle, in a usual capillary.
 constexpr double kHalfOfWall = 0.17;
+constexpr int kCutsToEachSide = 9;  // that are tried, of one at right angles
 using GlassRow = std::array<double, kAllLanes>;
 
 double lane_at(std::size_t lane, double half_width) {
@@ -114,10 +115,17 @@ struct CutEnd {
   double at = 0, tangent = 0, blur = 1.7;  // behind the tip of the pose, px; of the cut; px
 };
 
-// The most likely end of that cut.
-struct EndOfCut {
-  double at = 0, tangent = 0;      // as in CutEnd
-  double gain = 0, curvature = 0;  // how fast it falls with the place, per px^2
+// Weighted, of a quantity.
+struct Moments {
+  double weight = 0, sum = 0, squares = 0;
+
+  void add(double w, double x) {
+    weight += w;
+    sum += w * x;
+    squares += w * x * x;
+  }
+  [[nodiscard]] double mean() const { return sum / weight; }
+  [[nodiscard]] double variance() const { return std::max(squares / weight - mean() * mean(), 0.0); }
 };
 
 // Walls that stop along an oblique line, and a line of glass of any strength along it. Where the blur is
@@ -130,7 +138,6 @@ class CutModel {
   [[nodiscard]] bool stands_out() const noexcept { return clear_; }
   // Log likelihood over no needle, twice.
   [[nodiscard]] double gain(const CutEnd& end) const;
-  [[nodiscard]] EndOfCut end_of_cut(double tangent, double blur, double near) const;
   // What specks and granules leave of the picture, over what the noise alone would, at least 1.
   [[nodiscard]] double misfit(double gain) const {
     return std::max(1.0, (square_ - gain * unit_) / (area_px2_ * smooth_noise_ * smooth_noise_));
@@ -309,22 +316,6 @@ double CutModel::gain(const CutEnd& end) const {
   return g.dot(a.inv() * g) / unit_;
 }
 
-EndOfCut CutModel::end_of_cut(double tangent, double blur, double near) const {
-  EndOfCut end{near, tangent};
-  constexpr double kMost_px = 1;  // in a step
-  for (const double apart : {0.5, 0.5, 0.25}) {
-    const double before = gain({end.at - apart, tangent, blur}), here = gain({end.at, tangent, blur}),
-                 after = gain({end.at + apart, tangent, blur});
-    const double slope = (after - before) / (2 * apart);
-    end.curvature = (2 * here - before - after) / (apart * apart);
-    const double move = end.curvature > 0 ? std::clamp(slope / end.curvature, -kMost_px, kMost_px)
-                                          : std::copysign(apart, slope);
-    end.at += move;
-    end.gain = here + move * (slope - 0.5 * end.curvature * move);
-  }
-  return end;
-}
-
 }  // namespace
 
 double outer_radius_of_glass(double half_width, double blur) {
@@ -446,51 +437,48 @@ std::optional<CutGlass> cut_of_glass(const GradientField& field, double noise, c
   if (best.at < -ahead + kEdge_px || best.at > back - kEdge_px) {
     return CutGlass{{-best.at, back + ahead, blur_px}, {}};
   }
-  // Of every cut the most likely end, from that of its neighbour.
-  constexpr int kToEachSide = 18, kCuts = 2 * kToEachSide + 1;
-  constexpr double kApart = 0.05;
-  std::array<EndOfCut, kCuts> ends;
-  const auto find = [&](int k, double near) {
-    ends[static_cast<std::size_t>(k)] = model.end_of_cut(kApart * (k - kToEachSide), blur_px, near);
+  // Ends far from the best one may be as likely: in noise the likelihood falls off in straight lines, not as
+  // a parabola.
+  constexpr double kApart_px = 0.5, kCutsApart = 0.1, kBeyond_px = 2;  // the range
+  struct Likely {
+    CutEnd end;
+    double gain;
   };
-  const int first = kToEachSide + static_cast<int>(std::lround(best.tangent / kApart));
-  find(first, best.at);
-  for (int k = first + 1; k < kCuts; ++k) {
-    find(k, ends[static_cast<std::size_t>(k - 1)].at);
-  }
-  for (int k = first - 1; k >= 0; --k) {
-    find(k, ends[static_cast<std::size_t>(k + 1)].at);
-  }
-  for (const EndOfCut& end : ends) {
-    most = std::max(most, end.gain);
+  Vector<Likely> ends;
+  for (int k = -kCutsToEachSide; k <= kCutsToEachSide; ++k) {
+    for (double at = -ahead - kBeyond_px; at <= back + kBeyond_px; at += kApart_px) {
+      const CutEnd end{at, kCutsApart * k, blur_px};
+      ends.push_back({end, model.gain(end)});
+      most = std::max(most, ends.back().gain);
+    }
   }
   // A granule is about as wide as a wall, and not drawn anew in every pixel as noise is: over an end its sum
   // varies so many times as much as that of noise that leaves as much.
   constexpr double kOfGranules = 4;
   const double misfit = 1 + kOfGranules * (model.misfit(most) - 1);
-  constexpr double kBeyond_px = 2;  // the range
   const double radius = outer_radius_of_glass(needle.half_width, blur_px);
-  double sum = 0, outermost = 0, variance = 0, tangent = 0, tangent2 = 0;
-  for (const EndOfCut& end : ends) {
-    if (end.curvature <= 0 || end.at < -ahead - kBeyond_px || end.at > back + kBeyond_px) {
-      continue;
-    }
+  // Of the end, and of the end where the cut is known.
+  Moments outermost, tangents;
+  double where_cut_is_known = 0;
+  Moments of_cut;
+  for (std::size_t i = 0; i < ends.size(); ++i) {
+    const auto& [end, gain] = ends[i];
     // Before anything is seen, a needle is as likely cut at right angles as anyhow up to the steepest.
-    const double before = 1.0 / kCuts + (end.tangent == 0 ? 1 : 0);
-    const double of_end = 2 * misfit / end.curvature,
-                 weight = before * math::exp(0.5 * (end.gain - most) / misfit) * std::sqrt(of_end);
-    sum += weight;
-    outermost += weight * (std::abs(end.tangent) * radius - end.at);
-    variance += weight * of_end;
-    tangent += weight * end.tangent;
-    tangent2 += weight * end.tangent * end.tangent;
+    const double before = 1.0 / (2 * kCutsToEachSide + 1) + (end.tangent == 0 ? 1 : 0);
+    const double weight = before * math::exp(0.5 * (gain - most) / misfit);
+    const double place = std::abs(end.tangent) * radius - end.at;
+    outermost.add(weight, place);
+    tangents.add(weight, end.tangent);
+    of_cut.add(weight, place);
+    if (i + 1 == ends.size() || ends[i + 1].end.tangent != end.tangent) {
+      where_cut_is_known += of_cut.weight * of_cut.variance();
+      of_cut = {};
+    }
   }
-  if (sum <= 0) {
-    return std::nullopt;
-  }
-  tangent /= sum;
-  return CutGlass{{outermost / sum, std::sqrt(variance / sum), blur_px},
-                  {tangent, std::sqrt(std::max(tangent2 / sum - tangent * tangent, 0.0))}};
+  const double with_cut = outermost.variance() - tangents.variance() * radius * radius;
+  return CutGlass{
+      {outermost.mean(), std::sqrt(std::max(with_cut, where_cut_is_known / outermost.weight)), blur_px},
+      {tangents.mean(), std::sqrt(tangents.variance())}};
 }
 
 }  // namespace punctum::vision

@@ -37,9 +37,9 @@ struct CutGlass {
   Bevel bevel;
 };
 
-// Both at once, where the blur is known. By likelihood, with an end as above: the means over all cuts, each
-// as likely as it explains the picture. Specks tell nothing. Empty where the walls do not stand out; an end
-// at the border of the range is one that lies further on.
+// Both at once, where the blur is known. By likelihood, with an end as above: the means over all ends and
+// cuts, each as likely as it explains the picture. Specks tell nothing. Empty where the walls do not stand
+// out; an end at the border of the range is one that lies further on.
 [[nodiscard]] std::optional<CutGlass> cut_of_glass(const GradientField& field, double noise,
                                                    const NeedlePose& needle, double blur_px, double back,
                                                    double ahead);

@@ -126,7 +126,7 @@ std::optional<NeedlePose> with_faint_wall(const GradientField& field, double noi
   constexpr std::size_t kFewest = 20;  // stations
   constexpr double kNoises = 6, kMostNoises = 4, kOneSided = 1.6, kFaint = 0.35;
   constexpr double kNearest_px = 7, kSteepestTaper = 0.1;  // of the lines' middles
-  constexpr double kHalfOfLine_px = 2.2, kMissed_px = 2;
+  constexpr double kHalfOfLine_px = 2.2;
   Rows rows = rows_across(field, needle);
   Band band = lines_of(rows);
   if (band.size() < kFewest) {
@@ -161,11 +161,7 @@ std::optional<NeedlePose> with_faint_wall(const GradientField& field, double noi
   const Line low = beside(-1), high = beside(1);
   const Line& other = std::abs(low.contrast) > std::abs(high.contrast) ? low : high;
   const Line& opposite = &other == &low ? high : low;
-  const double middle = 0.5 * (kFrom_px + kTo_px);
-  const double furthest = std::max(std::abs(wall.at(middle)), std::abs(other.at(middle)));
-  const bool faint = std::abs(other.contrast) < kFaint * std::abs(wall.contrast);
-  const bool missed = furthest > needle.half_width_at(middle) + kMissed_px;
-  if (std::abs(other.contrast) < least || !(faint || missed) ||
+  if (std::abs(other.contrast) < least || std::abs(other.contrast) > kFaint * std::abs(wall.contrast) ||
       std::abs(other.contrast) < kOneSided * std::abs(opposite.contrast)) {
     return std::nullopt;
   }

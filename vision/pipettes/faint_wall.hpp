@@ -11,7 +11,7 @@ namespace punctum::vision {
 
 // The needle between the strongest line along the pose and a fainter one on one side of it. noise: grey
 // levels. radius: expected at the tip, px. Empty where no such line stands out, or lines do on both sides, or
-// it is nearly as strong and the pose encloses both.
+// it is not much fainter.
 [[nodiscard]] std::optional<NeedlePose> with_faint_wall(const GradientField& field, double noise,
                                                         double radius, const NeedlePose& needle);
 

@@ -310,13 +310,16 @@ double InjectionPipette::lie_between_walls(const GradientField& field, double no
   last_ = walls_tried_->needle;
   double straight = walls_tried_->straight;
   look_further_out(field, noise, radius_px_, last_, straight);
-  put_at_end(field, noise, back, 25, last_);
-  for (int k = 0; k < kAcross && walls_go_on(field, noise, last_, kAcross_px); ++k) {
-    last_.tip += kAcross_px * last_.axis;
-    last_.half_width -= kAcross_px * last_.taper;
-    (void)fit_walls(field, noise, radius_px_, last_, kLongest_px);
-    put_at_end(field, noise, kAcross_px + 15, 25, last_);
-  }
+  const auto go_to_end = [&] {
+    put_at_end(field, noise, back, 25, last_);
+    for (int k = 0; k < kAcross && walls_go_on(field, noise, last_, kAcross_px); ++k) {
+      last_.tip += kAcross_px * last_.axis;
+      last_.half_width -= kAcross_px * last_.taper;
+      (void)fit_walls(field, noise, radius_px_, last_, kLongest_px);
+      put_at_end(field, noise, kAcross_px + 15, 25, last_);
+    }
+  };
+  go_to_end();
   for (int round = 0; round < 2; ++round) {
     straight = fit_walls(field, noise, radius_px_, last_, kLongest_px);
     put_at_end(field, noise, back, 10, last_);
@@ -329,6 +332,7 @@ double InjectionPipette::lie_between_walls(const GradientField& field, double no
       last_ = fitted;
       straight = s;
     }
+    go_to_end();
     put_at_end(field, noise, back, 10, last_);
   }
   return straight;

@@ -25,7 +25,7 @@ constexpr double kShaftFrom_px = 6, kShaftTo_px = 51;  // behind the range: tell
 constexpr double kBehind_px = 14;                      // behind the range, compared with every end
 // Half the thickness of the glass over the radius of its middle, in a usual capillary.
 constexpr double kHalfOfWall = 0.17;
-constexpr int kCutsToEachSide = 9;  // that are tried, of one at right angles
+constexpr double kSteepestCut = 0.95;  // px along per px across
 using GlassRow = std::array<double, kAllLanes>;
 
 double lane_at(std::size_t lane, double half_width) {
@@ -316,6 +316,57 @@ double CutModel::gain(const CutEnd& end) const {
   return g.dot(a.inv() * g) / unit_;
 }
 
+// Ends from..to px behind the tip of the pose, and cuts, with what is between two of them.
+struct EndsAndCuts {
+  double from, to, apart, cut_from, cut_to, cut_apart;
+};
+
+// Each as likely as it explains the picture; and the likeliest. radius: of the glass, px.
+CutGlass mean_of(const CutModel& model, const EndsAndCuts& tried, double blur_px, double radius,
+                 CutEnd& best) {
+  struct Likely {
+    CutEnd end;
+    double gain;
+  };
+  Vector<Likely> ends;
+  double most = -1e18;
+  for (int k = static_cast<int>(std::ceil(tried.cut_from / tried.cut_apart));
+       k * tried.cut_apart <= tried.cut_to; ++k) {
+    for (double at = tried.from; at <= tried.to; at += tried.apart) {
+      const CutEnd end{at, k * tried.cut_apart, blur_px};
+      ends.push_back({end, model.gain(end)});
+      if (ends.back().gain > most) {
+        most = ends.back().gain;
+        best = end;
+      }
+    }
+  }
+  // A granule is about as wide as a wall, and not drawn anew in every pixel as noise is: over an end its sum
+  // varies so many times as much as that of noise that leaves as much.
+  constexpr double kOfGranules = 4;
+  const double misfit = 1 + kOfGranules * (model.misfit(most) - 1);
+  // Of the end, of the cut, and of the end where the cut is known.
+  Moments outermost, tangents, of_cut;
+  double where_cut_is_known = 0;
+  for (std::size_t i = 0; i < ends.size(); ++i) {
+    const auto& [end, gain] = ends[i];
+    // Before anything is seen, a needle is as likely cut at right angles as anyhow up to the steepest.
+    const double before = tried.cut_apart / (2 * kSteepestCut) + (end.tangent == 0 ? 1 : 0);
+    const double weight = before * math::exp(0.5 * (gain - most) / misfit);
+    const double place = std::abs(end.tangent) * radius - end.at;
+    outermost.add(weight, place);
+    tangents.add(weight, end.tangent);
+    of_cut.add(weight, place);
+    if (i + 1 == ends.size() || ends[i + 1].end.tangent != end.tangent) {
+      where_cut_is_known += of_cut.weight * of_cut.variance();
+      of_cut = {};
+    }
+  }
+  const double with_cut = outermost.variance() - tangents.variance() * radius * radius;
+  return {{outermost.mean(), std::sqrt(std::max(with_cut, where_cut_is_known / outermost.weight)), blur_px},
+          {tangents.mean(), std::sqrt(tangents.variance())}};
+}
+
 }  // namespace
 
 double outer_radius_of_glass(double half_width, double blur) {
@@ -438,47 +489,20 @@ std::optional<CutGlass> cut_of_glass(const GradientField& field, double noise, c
     return CutGlass{{-best.at, back + ahead, blur_px}, {}};
   }
   // Ends far from the best one may be as likely: in noise the likelihood falls off in straight lines, not as
-  // a parabola.
-  constexpr double kApart_px = 0.5, kCutsApart = 0.1, kBeyond_px = 2;  // the range
-  struct Likely {
-    CutEnd end;
-    double gain;
-  };
-  Vector<Likely> ends;
-  for (int k = -kCutsToEachSide; k <= kCutsToEachSide; ++k) {
-    for (double at = -ahead - kBeyond_px; at <= back + kBeyond_px; at += kApart_px) {
-      const CutEnd end{at, kCutsApart * k, blur_px};
-      ends.push_back({end, model.gain(end)});
-      most = std::max(most, ends.back().gain);
-    }
-  }
-  // A granule is about as wide as a wall, and not drawn anew in every pixel as noise is: over an end its sum
-  // varies so many times as much as that of noise that leaves as much.
-  constexpr double kOfGranules = 4;
-  const double misfit = 1 + kOfGranules * (model.misfit(most) - 1);
+  // a parabola. Where they are not, it is sharp.
+  constexpr double kBeyond_px = 2, kSharp_px2 = 1,
+                   kReach_px = 1;  // of the range; variance; round the best end
+  constexpr double kReachOfCut = 0.16;
   const double radius = outer_radius_of_glass(needle.half_width, blur_px);
-  // Of the end, and of the end where the cut is known.
-  Moments outermost, tangents;
-  double where_cut_is_known = 0;
-  Moments of_cut;
-  for (std::size_t i = 0; i < ends.size(); ++i) {
-    const auto& [end, gain] = ends[i];
-    // Before anything is seen, a needle is as likely cut at right angles as anyhow up to the steepest.
-    const double before = 1.0 / (2 * kCutsToEachSide + 1) + (end.tangent == 0 ? 1 : 0);
-    const double weight = before * math::exp(0.5 * (gain - most) / misfit);
-    const double place = std::abs(end.tangent) * radius - end.at;
-    outermost.add(weight, place);
-    tangents.add(weight, end.tangent);
-    of_cut.add(weight, place);
-    if (i + 1 == ends.size() || ends[i + 1].end.tangent != end.tangent) {
-      where_cut_is_known += of_cut.weight * of_cut.variance();
-      of_cut = {};
-    }
+  const EndsAndCuts all{-ahead - kBeyond_px, back + kBeyond_px, 0.5, -kSteepestCut, kSteepestCut, 0.1};
+  CutGlass found = mean_of(model, all, blur_px, radius, best);
+  if (const double of_cut = found.bevel.sd * radius;
+      found.end.sd * found.end.sd + of_cut * of_cut < kSharp_px2) {
+    const EndsAndCuts near{best.at - kReach_px,        best.at + kReach_px,        0.1,
+                           best.tangent - kReachOfCut, best.tangent + kReachOfCut, 0.02};
+    found = mean_of(model, near, blur_px, radius, best);
   }
-  const double with_cut = outermost.variance() - tangents.variance() * radius * radius;
-  return CutGlass{
-      {outermost.mean(), std::sqrt(std::max(with_cut, where_cut_is_known / outermost.weight)), blur_px},
-      {tangents.mean(), std::sqrt(tangents.variance())}};
+  return found;
 }
 
 }  // namespace punctum::vision

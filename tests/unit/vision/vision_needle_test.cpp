@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "vision/image/gradient.hpp"
@@ -342,11 +343,13 @@ TEST(WideNeedle, is_no_wider_for_fringes_beside_a_thin_one) {
 }
 
 TEST(WideNeedle, does_not_end_where_something_lies_across_it) {
-  for (const double lump_px : {90.0, 130.0, 170.0}) {
+  constexpr double kSharp_px = 1.1, kBlurred_px = 2.6;
+  for (const auto& [blur_px, lump_px] :
+       {std::pair{kSharp_px, 90.0}, {kSharp_px, 170.0}, {kSharp_px, 200.0}, {kBlurred_px, 200.0}}) {
     InjectionPipette needle(Side::right, kWideRadius);
-    const Wide wide{.lump_px = lump_px};
-    ASSERT_TRUE(needle.start(draw(wide), kWideNoise, kClear)) << lump_px;
-    EXPECT_NEAR(needle.as_found(kWideNoise).tip.x, wide.tip, 2.5) << lump_px;
+    const Wide wide{.closed = true, .lump_px = lump_px, .blur_px = blur_px, .radius = 6};
+    ASSERT_TRUE(needle.start(draw(wide), kWideNoise, kClear)) << lump_px << ' ' << blur_px;
+    EXPECT_NEAR(needle.as_found(kWideNoise).tip.x, wide.tip, 3) << lump_px << ' ' << blur_px;
   }
 }
 

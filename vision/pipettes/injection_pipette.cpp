@@ -338,7 +338,7 @@ double InjectionPipette::lie_between_walls(const GradientField& field, double no
   return straight;
 }
 
-// Its shape, cut and glass. Whether the outermost glass is known to kStartKnown_px.
+// Its shape, cut and glass. Whether the outermost glass is known well enough for a faint needle to begin.
 bool InjectionPipette::learn_end_anew(const GradientField& field, double noise) {
   step_sign_ = 0;
   walls_offset_ = 0.15 * last_.half_width;

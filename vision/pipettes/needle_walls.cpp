@@ -257,7 +257,10 @@ double fit_walls(const GradientField& field, double noise, double radius, Needle
 
 bool walls_go_on(const GradientField& field, double noise, const NeedlePose& needle, double ahead) {
   constexpr double kFrom_px = 14, kApart_px = 4, kMostly = 0.75;
-  constexpr double kOnLine_px = 1.5;
+  constexpr double kOnLine_px = 1.5, kThinnest_px = 1;
+  if (needle.half_width - needle.taper * ahead < kThinnest_px) {  // they would have met before
+    return false;
+  }
   for (const double length : {12.0, 24.0}) {
     const double floor = least_edge(field, noise, length);
     int tried = 0, on_lines = 0;

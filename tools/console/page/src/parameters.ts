@@ -30,6 +30,7 @@ const range = (p: Parameter) => isFixed(p) ? 'fixed in this scene' : `${p.above_
 interface Row {
   p: Parameter; value: HTMLElement; input: HTMLInputElement; set: HTMLButtonElement; undo: HTMLButtonElement; who: HTMLElement; note: HTMLElement;
   earlier: number[]; expected: number[];  // values before this one, the newest last; what undoing asked for
+  undoing: boolean;  // asked for, not answered: a second click would go back by one more
 }
 
 export class Parameters {
@@ -75,7 +76,7 @@ export class Parameters {
     }
     this.mine = mine;
     const mayTake = fresh && control?.role === 'operate' && control.control !== "another's";
-    const key = [why, mine, mayTake, this.problem, this.rows.map((row) => row.earlier)].join(';');
+    const key = [why, mine, mayTake, this.problem, this.rows.map((row) => [row.earlier, row.undoing])].join(';');
     if (key === this.last) return;
     this.last = key;
     this.button.textContent = mine ? 'Give control back' : 'Take control';
@@ -83,7 +84,7 @@ export class Parameters {
     this.note.textContent = why || this.problem ? [this.problem && `${this.problem}.`, why].filter(Boolean).join(' ') : 'You have control.';
     for (const row of this.rows) {
       row.input.disabled = row.set.disabled = why !== '' || isFixed(row.p);
-      row.undo.disabled = why !== '' || row.earlier.length === 0;
+      row.undo.disabled = why !== '' || row.undoing || row.earlier.length === 0;
       row.undo.textContent = `Back to ${number(row.earlier.at(-1) ?? row.p.value)}`;
     }
   }
@@ -115,7 +116,9 @@ export class Parameters {
     const value = row.earlier.pop();
     if (value === undefined) return;
     row.expected.push(value);
+    row.undoing = row.undo.disabled = true;
     this.ask(row.p.name, value, (problem) => {
+      row.undoing = false;
       row.note.textContent = problem ? `${problem}.` : '';
       if (!problem) return;
       row.expected = row.expected.filter((one) => one !== value);
@@ -137,7 +140,7 @@ export class Parameters {
     };
     this.rows = this.all.map((p) => {
       const row: Row = {p, value: make('b'), input: make('input'), set: make('button', 'Set'), undo: make('button'), who: make('span'), note: make('em'),
-        earlier: isSame(p.before, p.value) ? [] : [p.before], expected: []};
+        earlier: isSame(p.before, p.value) ? [] : [p.before], expected: [], undoing: false};
       const label = p.name.replaceAll('_', ' ');
       row.input.inputMode = 'decimal';
       row.input.setAttribute('aria-label', `new ${label}, ${range(p)}`);

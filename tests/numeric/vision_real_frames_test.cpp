@@ -1,10 +1,12 @@
 // Real microscope pictures from the folder $PUNCTUM_DATA, or ../shared/data; they are not part of this tree.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
@@ -127,6 +129,25 @@ TEST(NoCell, is_claimed_in_a_pipette_and_its_shadows) {
   }
 }
 
+// The glass is in focus at 22, and widens by a third of its length; nothing is told of it today.
+TEST(PipetteThroughFocus, its_tip_is_told_right_or_not_at_all) {
+  SKIP_WITHOUT("pipette-focus")
+  const Point tip(834, 394);  // by hand in 22
+  for (int i = 0; i <= 28; i += 2) {
+    const std::string file =
+        "pipette-focus/focus_" + std::string(i < 10 ? "0" : "") + std::to_string(i) + ".png";
+    const cv::Mat picture = cv::imread(data(file), cv::IMREAD_GRAYSCALE);
+    ASSERT_FALSE(picture.empty()) << file;
+    VisionConfig config;
+    Tracker tracker(config, picture.cols, picture.rows);
+    for (int again = 0; again < 5; ++again) {
+      const Result& r = tracker.process(frame_of(picture));
+      EXPECT_TRUE(!r.needle.ok || cv::norm(r.needle.tip - tip) < 3)
+          << file << ' ' << again << ' ' << r.needle.tip;
+    }
+  }
+}
+
 struct Embryo {
   const char* name;
   cv::Rect roi;
@@ -164,10 +185,19 @@ TEST_P(Zebrafish, chorion_and_embryo_are_followed_through_all_frames) {
   EXPECT_EQ(frames, 16);
 }
 
-INSTANTIATE_TEST_SUITE_P(Cases, Zebrafish,
-                         testing::Values(Embryo{"top", {700, 140, 420, 420}, {{906, 343}, 185.5, 0}},
-                                         Embryo{"right", {1440, 1180, 440, 440}, {{1664, 1404}, 190.5, 0}}),
-                         [](const auto& one) { return std::string(one.param.name); });
+INSTANTIATE_TEST_SUITE_P(
+    Cases, Zebrafish,
+    testing::Values(Embryo{"top", {700, 140, 420, 420}, {{906, 343}, 185.5, 0}},
+                    Embryo{"upper_right", {990, 421, 440, 440}, {{1210, 641}, 189, 0}},
+                    Embryo{"left", {269, 599, 440, 440}, {{489, 819}, 192, 0}},
+                    Embryo{"middle", {749, 730, 440, 440}, {{969, 950}, 196, 0}},
+                    Embryo{"middle_right", {1115, 861, 440, 440}, {{1335, 1081}, 186, 0}},
+                    Embryo{"lower_left", {229, 992, 440, 440}, {{449, 1212}, 199, 0}},
+                    Embryo{"lower_middle", {809, 1104, 440, 440}, {{1029, 1324}, 186, 0}},
+                    Embryo{"bottom", {540, 1377, 440, 440}, {{760, 1597}, 191, 0}},
+                    Embryo{"lower_right", {1101, 1356, 440, 440}, {{1321, 1576}, 198, 0}},
+                    Embryo{"right", {1440, 1180, 440, 440}, {{1664, 1404}, 190.5, 0}}),
+    [](const auto& one) { return std::string(one.param.name); });
 
 struct Vesicle {
   const char* name;
@@ -200,6 +230,33 @@ INSTANTIATE_TEST_SUITE_P(Cases, Vesicles,
                          testing::Values(Vesicle{"large", "20100930-1-01_8bit.png", {{125, 230.5}, 100, 0}},
                                          Vesicle{"small", "snapshot-image_8bit.png", {{187, 115}, 77, 0}}),
                          [](const auto& one) { return std::string(one.param.name); });
+
+TEST(VesicleVideo, is_followed_through_all_frames_while_a_pipette_draws_it_in) {
+  SKIP_WITHOUT("vesicle-video")
+  auto camera = recorded::Camera::open(data("vesicle-video"), 25);
+  ASSERT_TRUE(camera) << camera.error();
+  VisionConfig config;
+  config.pixel_m = 0.27e-6;
+  config.holder.reset();
+  config.needle = config.inner = false;
+  config.R_min_m = 12e-6;
+  config.R_max_m = 25e-6;
+  const std::map<int, double> tongues{{12, 62}, {23, 53}, {35, 49}, {47, 46},
+                                      {59, 45}, {71, 44}, {85, 44}};  // by hand
+  Tracker tracker(config, 256, 256);
+  int frames = 0;
+  for (hal::Frame frame; camera->next(frame, 0) == hal::Status::ok; ++frames) {
+    const Result& r = tracker.process(frame);
+    ASSERT_EQ(r.verdict, "ok") << frames;
+    EXPECT_NEAR(r.undeformed->centre.x, 146, 4) << frames;  // by hand, as are the others
+    EXPECT_NEAR(r.undeformed->centre.y, 133, 4) << frames;
+    EXPECT_NEAR(r.undeformed->r, 66, 3) << frames;
+    if (const auto tongue = tongues.find(frames); tongue != tongues.end()) {
+      EXPECT_NEAR(std::ranges::min(r.outer.contour, {}, &Point::x).x, tongue->second, 3) << frames;
+    }
+  }
+  EXPECT_EQ(frames, 86);
+}
 
 TEST(SceneChange, sees_one_scene_in_frames_that_show_nothing_but_their_noise) {
   cv::Mat before(485, 727, CV_8U), now(485, 727, CV_8U);

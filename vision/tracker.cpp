@@ -357,14 +357,17 @@ void Tracker::Impl::locate_needle() {
   n.sd = math::hypot(n.sd, punctured ? kInside_px : at_membrane() ? kAtMembrane_px : 0);
   seen_needle = n;
   wall_px = 0;
-  if (const auto tip_told = by_stage.tip(); tip_told && !n.ok) {
+  const auto tip_told = by_stage.tip();
+  seen_needle.ok = n.ok =
+      n.ok && !(tip_told && needle.goes_on_to(picture.field, picture.noise, n, *tip_told));
+  if (tip_told && !n.ok) {
     n = needle.by_shaft(picture.field, picture.noise, *tip_told).value_or(n);
     n.sd = by_stage.sd();
   } else if (tip_told) {
     n = by_stage.most_likely(n);
     needle.put(n.tip);
-    // In contact the picture shows where the membrane is, on the tip.
-    if (at_membrane()) {
+    // In contact the picture shows where the membrane is, on the tip; of a thin needle it draws the end back.
+    if (at_membrane() && needle.shows_lumen()) {
       constexpr double kThick_px = 1;
       wall_px = std::clamp((seen_needle.tip - n.tip).dot(n.axis), -kThick_px, kThick_px);
     }

@@ -47,7 +47,7 @@ constexpr double kSharp_px = 2.3;
 constexpr double kFar_px = 5;
 constexpr int kFurther = 8;
 // Where the walls go on so far behind what lies across the needle, it does not end there; so often.
-constexpr double kAcross_px = 60;
+constexpr double kAcross_px = 60, kLump_px = 14, kAcrossAveraged_px = 12;
 constexpr int kAcross = 8;
 constexpr double kMostBlur_px = 3.6;  // the widest blur of which the end is known
 // In a needle with a smaller half-width no lumen is left between the walls, and a line across it looks like
@@ -312,7 +312,8 @@ double InjectionPipette::lie_between_walls(const GradientField& field, double no
   look_further_out(field, noise, radius_px_, last_, straight);
   const auto go_to_end = [&] {
     put_at_end(field, noise, back, 25, last_);
-    for (int k = 0; k < kAcross && walls_go_on(field, noise, last_, kAcross_px); ++k) {
+    for (int k = 0; k < kAcross && walls_go_on(field, noise, last_, kLump_px, kAcross_px, kAcrossAveraged_px);
+         ++k) {
       last_.tip += kAcross_px * last_.axis;
       last_.half_width -= kAcross_px * last_.taper;
       (void)fit_walls(field, noise, radius_px_, last_, kLongest_px);
@@ -354,23 +355,28 @@ bool InjectionPipette::learn_end_anew(const GradientField& field, double noise) 
   }
   glass_ahead_ = glass_scatter_ = glass_blur_ = 0;
   glass_frames_ = 0;
-  const bool lumen = last_.half_width >= kLumen_px;
+  lumen_ = last_.half_width >= kLumen_px;
+  if (!lumen_) {  // once, for the memory that it takes
+    thin_end_.add(field, last_);
+    (void)thin_end_.end(noise);
+  }
+  thin_end_.forget();
   const auto known = [&](const CutGlass& cut) {
     return cut.end.blur <= kMostBlur_px &&
            sd_of(cut, last_.half_width) <= (cut.end.blur > kSharp_px ? kUnsharpKnown_px : kStartKnown_px);
   };
-  if (const auto cut = lumen ? go_to_cut(field, noise) : std::nullopt; cut && known(*cut)) {
+  if (const auto cut = lumen_ ? go_to_cut(field, noise) : std::nullopt; cut && known(*cut)) {
     bevel_ = cut->bevel;
     learn_glass(cut->end);
     return true;
   }
-  bevel_ =
-      lumen ? bevel_of_glass(field, noise, last_, kStartReach_px, kStartReach_px).value_or(Bevel{}) : Bevel{};
+  bevel_ = lumen_ ? bevel_of_glass(field, noise, last_, kStartReach_px, kStartReach_px).value_or(Bevel{})
+                  : Bevel{};
   const auto end = end_of_glass(field, noise, last_, bevel_.tangent, kStartReach_px, kStartReach_px);
   if (!end || end->sd > kEndKnown_px) {
     return false;
   }
-  if (lumen) {
+  if (lumen_) {
     learn_glass(*end);
   }
   return known({*end, bevel_});
@@ -416,11 +422,12 @@ NeedlePose InjectionPipette::as_found(double noise) const { return told(last_, n
 
 NeedlePose InjectionPipette::told(NeedlePose needle, double noise) const {
   needle.tip += glass_ahead_ * needle.axis;
-  // Of a needle whose lumen is not seen only the walls tell the end.
-  constexpr double kWalls_px = 0.5, kBeyondWalls_px = 0.8;
-  const bool by_walls = last_.half_width < kLumen_px && glass_frames_ == 0;
-  needle.constant_sd =
-      by_walls ? kBeyondWalls_px : bevel_.sd * outer_radius_of_glass(last_.half_width, glass_blur_);
+  // Of a needle whose lumen is not seen only the walls tell the end at first, and its cut is not seen.
+  constexpr double kWalls_px = 0.5, kBeyondWalls_px = 0.8, kUnseenCut_px = 0.4;
+  const bool by_walls = !lumen_ && glass_frames_ == 0;
+  needle.constant_sd = by_walls ? kBeyondWalls_px
+                       : lumen_ ? bevel_.sd * outer_radius_of_glass(last_.half_width, glass_blur_)
+                                : kUnseenCut_px;
   // It is learnt in focus. Out of it the end seems to lie further back; beyond the blurs that are tried, as
   // far as its contrast lasts.
   constexpr double kBeyondBlurs_px = 6;
@@ -454,6 +461,14 @@ bool InjectionPipette::go_on_at(const GradientField& field, double noise, const 
   backdrop_ = {};
   view_ = {};
   return true;
+}
+
+bool InjectionPipette::goes_on_to(const GradientField& field, double noise, const NeedlePose& seen,
+                                  const Point& tip) const {
+  constexpr double kSpeck_px = 5, kLeast_px = 8, kAveraged_px = 4;
+  const double ahead = (tip - seen.tip).dot(seen.axis);
+  return ahead > kLeast_px && std::abs((tip - seen.tip).cross(seen.axis)) < seen.half_width &&
+         walls_go_on(field, noise, seen, kSpeck_px, ahead - kAveraged_px / 2, kAveraged_px);
 }
 
 std::optional<NeedlePose> InjectionPipette::by_shaft(const GradientField& field, double noise,
@@ -636,13 +651,31 @@ void InjectionPipette::learn_shape_anew(const GradientField& field) {
 // Nothing else may touch the tip: a membrane that it pushes looks like a line of glass.
 void InjectionPipette::learn_glass(const GradientField& field, double noise, NeedlePose followed) {
   constexpr int kFrames = 30;  // by then the noise of one frame has fallen to a fifth
-  if (glass_frames_ >= kFrames || followed.half_width < kLumen_px) {
+  if (!lumen_) {
+    learn_thin_end(field, noise, followed);
+    return;
+  }
+  if (glass_frames_ >= kFrames) {
     return;
   }
   followed.tip += glass_ahead_ * followed.axis;
   const auto end = end_of_glass(field, noise, followed, bevel_.tangent, kGlassReach_px, kGlassReach_px);
   if (end && end->sd < kEndKnown_px) {
     learn_glass(*end);
+  }
+}
+
+void InjectionPipette::learn_thin_end(const GradientField& field, double noise, const NeedlePose& followed) {
+  constexpr int kFrames = 96, kTogether = 8;
+  if (thin_end_.frames() >= kFrames) {
+    return;
+  }
+  thin_end_.add(field, followed);
+  if (const auto end = thin_end_.frames() % kTogether == 0 ? thin_end_.end(noise) : std::nullopt) {
+    glass_ahead_ = end->ahead;
+    glass_scatter_ = end->sd * end->sd;
+    glass_blur_ = end->blur;
+    glass_frames_ = thin_end_.frames();
   }
 }
 

@@ -18,6 +18,7 @@
 #include "vision/pipettes/needle_end.hpp"
 #include "vision/pipettes/needle_pose.hpp"
 #include "vision/pipettes/needle_shape.hpp"
+#include "vision/pipettes/thin_end.hpp"
 #include "vision/pipettes/tube_trace.hpp"
 
 namespace punctum::vision {
@@ -47,6 +48,9 @@ class InjectionPipette {
   // No frame was seen for a while, and its tip is known to be there now: what was learnt of the needle itself
   // is kept. False, and to be found anew, unless its shaft lies there.
   [[nodiscard]] bool go_on_at(const GradientField& field, double noise, const Point& tip);
+  // What is taken for its end is a speck: its walls go on from there to a tip that is known otherwise.
+  [[nodiscard]] bool goes_on_to(const GradientField& field, double noise, const NeedlePose& seen,
+                                const Point& tip) const;
   // Its shaft is seen behind a tip that is known otherwise; its axis and width are then as seen.
   [[nodiscard]] std::optional<NeedlePose> by_shaft(const GradientField& field, double noise,
                                                    const Point& tip);
@@ -54,6 +58,8 @@ class InjectionPipette {
   void learn(const GradientField& field, const NeedlePose& needle, double noise);
 
   [[nodiscard]] bool started() const noexcept { return started_; }
+  // Walls and what lies between them were told apart at the start.
+  [[nodiscard]] bool shows_lumen() const noexcept { return lumen_; }
   // The border through which a straight needle enters, even where its end is not clear.
   [[nodiscard]] bool side_known() const noexcept { return side_known_; }
   [[nodiscard]] Side side() const noexcept { return found_side_; }
@@ -77,6 +83,7 @@ class InjectionPipette {
   [[nodiscard]] std::optional<CutGlass> go_to_cut(const GradientField& field, double noise);
   void learn_glass(const GradientField& field, double noise, NeedlePose followed);
   void learn_glass(const GlassEnd& end);
+  void learn_thin_end(const GradientField& field, double noise, const NeedlePose& followed);
   [[nodiscard]] double tip_sd(double noise) const;
   // The end that is followed, as the outermost glass.
   [[nodiscard]] NeedlePose told(NeedlePose needle, double noise) const;
@@ -117,11 +124,13 @@ class InjectionPipette {
   double shape_offset_ = 0;   // from where the learnt shape has its origin to the end face, px
   double walls_offset_ = 0;   // from where the profile of the walls ends to the end face, px
   int offset_frames_ = 0;     // that walls_offset_ was learnt from
+  bool lumen_ = true;         // shows between the walls, in focus
   Bevel bevel_;               // of its end, as it was found
   double glass_ahead_ = 0;    // of the end that is followed: the outermost glass, px
   int glass_frames_ = 0;      // that it was learnt from
   double glass_scatter_ = 0;  // variance of where the end that is followed seems to be from it, px^2
   double glass_blur_ = 0;     // px
+  ThinEnd thin_end_;          // tells the same of a needle whose lumen is not seen
   double step_sign_ = 0;      // +1: it is brighter ahead of the walls, -1: darker, 0: not known yet
   bool walls_tell_ = true;    // where it ends, more finely than the shape does: in focus
   bool walls_agree_ = false;  // with the shape, in the last frame

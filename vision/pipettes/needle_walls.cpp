@@ -255,16 +255,17 @@ double fit_walls(const GradientField& field, double noise, double radius, Needle
   return best;
 }
 
-bool walls_go_on(const GradientField& field, double noise, const NeedlePose& needle, double ahead) {
-  constexpr double kFrom_px = 14, kApart_px = 4, kMostly = 0.75;
+bool walls_go_on(const GradientField& field, double noise, const NeedlePose& needle, double from,
+                 double ahead, double shortest) {
+  constexpr double kMostly = 0.75;
   constexpr double kOnLine_px = 1.5, kThinnest_px = 1;
   if (needle.half_width - needle.taper * ahead < kThinnest_px) {  // they would have met before
     return false;
   }
-  for (const double length : {12.0, 24.0}) {
+  for (const double length : {shortest, 2 * shortest}) {
     const double floor = least_edge(field, noise, length);
     int tried = 0, on_lines = 0;
-    for (double s = kFrom_px; s <= ahead; s += kApart_px) {
+    for (double s = from; s <= ahead; s += shortest / 3) {
       const double w = needle.half_width - needle.taper * s;
       if (!field.area.contains(needle.at(-s, 0))) {
         break;

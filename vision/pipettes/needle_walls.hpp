@@ -16,10 +16,10 @@ inline constexpr double kWallReach_px = 3, kWallReachAtStart_px = 7;
 [[nodiscard]] double fit_walls(const GradientField& field, double noise, double radius, NeedlePose& needle,
                                double longest, double reach = kWallReach_px);
 
-// Whether both walls go on for `ahead` px ahead of the tip: something lies across the needle there, and it
-// does not end.
+// Whether both walls go on from `from` to `ahead` px ahead of the tip: something lies across the needle
+// there, and it does not end. shortest: of a wall that an edge is averaged over, px.
 [[nodiscard]] bool walls_go_on(const GradientField& field, double noise, const NeedlePose& needle,
-                               double ahead);
+                               double from, double ahead, double shortest);
 
 // Distance ahead of the tip (< 0: behind it) at which the cross profile of walls and lumen ends; sub-pixel.
 // Searched from `back` px behind the tip to `ahead` px ahead of it. Empty when it does not end there.

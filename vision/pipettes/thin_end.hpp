@@ -1,0 +1,32 @@
+// Where the glass of a needle ends that is so thin that its lumen is hardly seen.
+#pragma once
+
+#include <optional>
+
+#include "vision/image/gradient.hpp"
+#include "vision/image/kept_vector.hpp"
+#include "vision/pipettes/needle_end.hpp"
+
+namespace punctum::vision {
+
+// What the needle takes of the light, summed across, is a step along it, and a line of glass that closes it a
+// hump on this step: the walls alone seem to end up to a blur ahead of the glass. A single frame tells step
+// and hump apart badly, so it is told from the mean of many. Taken to be cut at right angles.
+class ThinEnd {
+ public:
+  void forget() { frames_ = 0; }
+  // One more frame with nothing near the end that is followed. What lies at the border of the picture tells
+  // nothing.
+  void add(const GradientField& field, const NeedlePose& followed);
+  [[nodiscard]] int frames() const noexcept { return frames_; }
+  // The outermost glass, from the end that is followed. noise: grey levels, of a frame. Empty where that is
+  // not certain to 0.45 px.
+  [[nodiscard]] std::optional<GlassEnd> end(double noise) const;
+
+ private:
+  int frames_ = 0;
+  double half_width_ = 0;  // px
+  Vector<double> taken_;   // of the light in each row: mean of the frames, grey levels times px
+};
+
+}  // namespace punctum::vision

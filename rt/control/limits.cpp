@@ -65,12 +65,10 @@ StageLimits::StageLimits(const LimitParams& limits, const MappingParams& mapping
 void StageLimits::place(const hal::Vec3& tip_m) NONBLOCKING {
   set_point_.tip_m = tip_m;
   clear_m_ = 0;
-  for (Eigen::Index i = 0; i < 3; ++i) {
-    low_here_m_[i] = std::min(low_m_[i], tip_m[i]);
-    high_here_m_[i] = std::max(high_m_[i], tip_m[i]);
-    clear_low_m_[i] = low_here_m_[i] + kAtLimit_m;
-    clear_high_m_[i] = high_here_m_[i] - kAtLimit_m;
-  }
+  low_here_m_ = low_m_.cwiseMin(tip_m);
+  high_here_m_ = high_m_.cwiseMax(tip_m);
+  clear_low_m_ = low_here_m_.array() + kAtLimit_m;
+  clear_high_m_ = high_here_m_.array() - kAtLimit_m;
 }
 
 bool StageLimits::is_in_workspace(const hal::Vec3& p) const NONBLOCKING {
@@ -106,12 +104,12 @@ void StageLimits::look_for_regions() NONBLOCKING {
       continue;
     }
     hal::Vec3& away = away_[static_cast<std::size_t>(region)];
-    double apart_m = regions_->apart_m(region, away, needle);
-    if (apart_m < kNear_m) {
-      away = regions_->away(region, needle);
-      apart_m = regions_->apart_m(region, away, needle);
+    Gap gap{away, regions_->apart_m(region, away, needle)};
+    if (gap.apart_m < kNear_m) {
+      gap = regions_->widest_gap(region, needle);
+      away = gap.away;
     }
-    seen_.room_m = std::min(seen_.room_m, apart_m);
+    seen_.room_m = std::min(seen_.room_m, gap.apart_m);
   }
 }
 
@@ -285,24 +283,29 @@ bool StageLimits::is_clear(const hal::Vec3& point_m) const NONBLOCKING {
 // A convex body lies wholly behind a plane across any direction in which the needle is apart from it.
 // Newton's steps along the way come to its surface from outside and never pass it: no plane that they use
 // lets the needle through, and none takes away more than the last.
-StageLimits::FreeWay StageLimits::free_way(Region region, const hal::Vec3& to_m) const NONBLOCKING {
+template <Region region>
+[[gnu::noinline]] StageLimits::FreeWay StageLimits::free_way(const hal::Vec3& to_m) const NONBLOCKING {
+  FreeWay free;
+  if (!regions_->has(region)) {
+    return free;
+  }
   const hal::Vec3& from_m = set_point_.tip_m;
   const hal::Vec3 way = to_m - from_m;
   const auto apart_m = [&](const hal::Vec3& direction, const hal::Vec3& tip_m) {
     return regions_->apart_m(region, direction, {tip_m, set_point_.axis});
   };
-  FreeWay free;
   free.away = away_[static_cast<std::size_t>(region)];
   if (apart_m(free.away, from_m) >= 0 && apart_m(free.away, to_m) >= 0) {
     return free;
   }
   double at = 0;
   double level_m = 0;
+#pragma GCC unroll 1  // one copy of what is long and rare
   for (int i = 0; i < kSurfaceSteps; ++i) {
     const hal::Vec3 tip_m = from_m + at * way;
-    free.away = regions_->away(region, {tip_m, set_point_.axis});
-    const double here_m = apart_m(free.away, tip_m);
-    const double along_m = free.away.dot(way);
+    const auto [away, here_m] = regions_->widest_gap(region, {tip_m, set_point_.axis});
+    const double along_m = away.dot(way);
+    free.away = away;
     if (i == 0 && here_m < -2 * kSurface_m) {
       level_m = here_m;  // inside already: no further in
     }
@@ -319,35 +322,37 @@ StageLimits::FreeWay StageLimits::free_way(Region region, const hal::Vec3& to_m)
   return free;
 }
 
-void StageLimits::keep_out(Checked& out, const StageConstraint& c) const NONBLOCKING {
+template <Region region>
+[[gnu::noinline]] bool StageLimits::hold_before(hal::Vec3& point_m, bool stops) const NONBLOCKING {
+  const FreeWay free = free_way<region>(point_m);
+  if (free.part >= 1) {
+    return false;
+  }
   const hal::Vec3& here = set_point_.tip_m;
+  if (stops) {
+    point_m = here + free.part * (point_m - here);
+  } else {
+    point_m += free.beyond_m * free.away;
+  }
+  return true;
+}
+
+void StageLimits::keep_out(Checked& out, const StageConstraint& c) const NONBLOCKING {
+#pragma GCC unroll 1  // likewise
   for (int round = 0; round < kCornerRounds; ++round) {
-    bool held = false;
-    for (const Region region : kRegions) {
-      if (!regions_->has(region)) {
-        continue;
-      }
-      const FreeWay free = free_way(region, out.point_m);
-      if (free.part >= 1) {
-        continue;
-      }
-      held = true;
+    // The way back leads along its line alone; and where limits meet, the needle stops.
+    const bool stops = c.withdrawal_only || round + 1 == kCornerRounds;
+    const bool by_floor = hold_before<Region::floor>(out.point_m, stops);
+    const bool by_holder = hold_before<Region::holder>(out.point_m, stops);
+    if (by_floor || by_holder) {
       out.alarms |= alarm_forbidden_region;
-      if (c.withdrawal_only || round + 1 == kCornerRounds) {
-        // The way back leads along its line alone; and where limits meet, the needle stops.
-        out.point_m = here + free.part * (out.point_m - here);
-      } else {
-        out.point_m += free.beyond_m * free.away;
-      }
     }
-    if (!held || c.withdrawal_only) {
+    if (stops || !(by_floor || by_holder)) {
       return;
     }
-    if (round + 1 < kCornerRounds) {
-      const Checked again = check_cell(out.point_m, c);
-      out.point_m = again.point_m;
-      out.alarms |= again.alarms;
-    }
+    const Checked again = check_cell(out.point_m, c);
+    out.point_m = again.point_m;
+    out.alarms |= again.alarms;
   }
 }
 
@@ -366,9 +371,8 @@ bool StageLimits::may_point(const hal::Vec3& axis) const NONBLOCKING {
       continue;
     }
     const NeedlePose now{tip_m, set_point_.axis};
-    const double now_m = regions_->apart_m(region, regions_->away(region, now), now);
-    const double turned_m = regions_->apart_m(region, regions_->away(region, turned), turned);
-    if (turned_m < std::min(now_m, 0.0)) {
+    const double now_m = regions_->widest_gap(region, now).apart_m;
+    if (regions_->widest_gap(region, turned).apart_m < std::min(now_m, 0.0)) {
       return false;
     }
   }
@@ -433,12 +437,7 @@ bool StageLimits::may_be_at(const hal::Vec3& point_m, const StageConstraint& c) 
   if (is_far_from_regions(held_m)) {
     return true;
   }
-  for (const Region region : kRegions) {
-    if (regions_->has(region) && free_way(region, held_m).part < 1) {
-      return false;
-    }
-  }
-  return true;
+  return free_way<Region::floor>(held_m).part >= 1 && free_way<Region::holder>(held_m).part >= 1;
 }
 
 void StageLimits::advance(const hal::Vec3& goal_m, const StageConstraint& c) NONBLOCKING {

@@ -158,7 +158,11 @@ class StageLimits {
     double beyond_m = 0;  // of the whole way
     hal::Vec3 away = hal::Vec3::UnitX();
   };
-  [[nodiscard]] FreeWay free_way(Region region, const hal::Vec3& to_m) const NONBLOCKING;
+  template <Region region>
+  [[nodiscard]] FreeWay free_way(const hal::Vec3& to_m) const NONBLOCKING;
+  // Whether a region ends the way to the point, which is moved before it then; stops: not aside.
+  template <Region region>
+  [[nodiscard]] bool hold_before(hal::Vec3& point_m, bool stops) const NONBLOCKING;
   [[nodiscard]] bool is_clear(const hal::Vec3& point_m) const NONBLOCKING;  // of every limit, within a step
   // From the set-point, after it was moved.
   void look_for_regions() NONBLOCKING;

@@ -411,11 +411,15 @@ void PassivityGuard::wrote(const hal::Vec3& force_N) NONBLOCKING {
     written_[newest_] = {};
     return;
   }
-  // A limit takes the same part of both.
-  const double asked_N = (asked_.passive_N + asked_.active_N).norm();
-  const double written_N = force_N.norm();
-  const hal::Vec3 active_N =
-      written_N < asked_N ? hal::Vec3(written_N / asked_N * asked_.active_N) : asked_.active_N;
+  hal::Vec3 active_N = asked_.active_N;
+  if (active_N != hal::Vec3::Zero()) {
+    // A limit takes the same part of both.
+    const double asked_N = (asked_.passive_N + asked_.active_N).norm();
+    const double written_N = force_N.norm();
+    if (written_N < asked_N) {
+      active_N *= written_N / asked_N;
+    }
+  }
   written_[newest_] = {force_N - active_N, active_N, asked_.stored_J};
 }
 

@@ -83,14 +83,12 @@ const typename BasicKalman<Real>::Vector& BasicKalman<Real>::step(const Vector& 
     return velocity_;
   }
   const BasicKalmanGains<Real> gain = dt_s <= late_s_ ? settled_ : late_gains(dt_s);
-  for (Eigen::Index i = 0; i < 3; ++i) {
-    const Real a = acceleration_[i];
-    const Real x = position_[i] + dt_s * (velocity_[i] + dt_s / 2 * a);
-    const Real difference = position_m[i] - x;
-    position_[i] = x + gain.position * difference;
-    velocity_[i] += dt_s * a + gain.velocity * difference;
-    acceleration_[i] = a + gain.acceleration * difference;
-  }
+  const Vector a = acceleration_;
+  const Vector x = position_ + dt_s * (velocity_ + dt_s / 2 * a);
+  const Vector difference = position_m - x;
+  position_ = x + gain.position * difference;
+  velocity_ += dt_s * a + gain.velocity * difference;
+  acceleration_ = a + gain.acceleration * difference;
   return velocity_;
 }
 

@@ -49,6 +49,16 @@ template <Gives gives>
   return whole_N;
 }
 
+// What the effects are added to: the rest is assigned.
+void clear(ForceParts& parts) NONBLOCKING {
+  for (StoringForce& storing : parts.storing) {
+    storing.force_N.setZero();
+  }
+  parts.dissipative_N.setZero();
+  parts.active_N.setZero();
+  parts.damping_Ns_m = 0;
+}
+
 void fade(ForceParts& parts, double force_fade) NONBLOCKING {
   if (force_fade == 1) {
     return;
@@ -87,15 +97,20 @@ Effects::Effects(const EffectParams& params, const EffectSetup& setup) NONBLOCKI
 }
 
 const EffectSum& Effects::step(const EffectInput& in, const EffectGains& gain) NONBLOCKING {
-  ForceParts& parts = sum_.parts = {};
+  ForceParts& parts = sum_.parts;
+  clear(parts);
   Sums sums;
+  const bool full = gain == kFullGains;
+  const bool scaled = !full || !last_full_;  // rarely
   const auto take = [&]<class Class>(std::optional<Class>& effect, Effect which) {
     if (!effect) {
       return;
     }
     constexpr Gives gives = Class::kGives;
     EffectOutput out = effect->step(in);
-    scale(out, gain[which], last_gain_[which]);
+    if (scaled) {
+      scale(out, gain[which], last_gain_[which]);
+    }
     // The stored energy changes only along the ways that the stage can make.
     if (gives.storing && gives.point != EnergyPoint::handle && reach_) {
       out.storing_N = reach_->lazyProduct(hal::Vec3(out.storing_N));
@@ -130,7 +145,10 @@ const EffectSum& Effects::step(const EffectInput& in, const EffectGains& gain) N
   sum_.injected_J +=
       in.fixture_gain * fixtures.stored_J - last_fixture_gain_ * (fixtures.stored_J - fixtures.injected_J);
   last_fixture_gain_ = in.fixture_gain;
-  last_gain_ = gain;
+  if (scaled) {
+    last_gain_ = gain;
+    last_full_ = full;
+  }
   for (std::size_t i = 0; i < sums.other_count; ++i) {  // at most effect_count rounds
     const Energy& other = sums.others[i];
     sum_.stored_J += other.stored_J;

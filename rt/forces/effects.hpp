@@ -45,6 +45,7 @@ class Effects {
   EffectSum sum_;
   double last_fixture_gain_ = 0;
   EffectGains last_gain_ = kFullGains;
+  bool last_full_ = true;  // last_gain_ is kFullGains
 };
 
 }  // namespace punctum::rt

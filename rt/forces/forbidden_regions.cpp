@@ -117,11 +117,12 @@ double nearest_to_rim_m(const HolderBodyParams& holder, const NeedlePose& needle
 
 }  // namespace
 
-hal::Vec3 ForbiddenRegions::away(Region region, const NeedlePose& needle) const NONBLOCKING {
-  if (region == Region::floor) {
-    return {0, 0, params_.floor->z_m > 0 ? -1.0 : 1.0};
+Gap ForbiddenRegions::widest_gap(Region region, const NeedlePose& needle) const NONBLOCKING {
+  if (region == Region::holder) {
+    return widest_gap_to_holder(needle);
   }
-  return away_from_holder(needle);
+  const hal::Vec3 away{0, 0, params_.floor->z_m > 0 ? -1.0 : 1.0};
+  return {away, apart_from_floor_m(away, needle)};
 }
 
 // D - r, the distance of the needle's axis from a convex body less the needle's radius, is convex along the
@@ -130,8 +131,10 @@ hal::Vec3 ForbiddenRegions::away(Region region, const NeedlePose& needle) const 
 // ends whether it is the end. If it is neither, n.a = -r' there. Then the nearest place of the holder is on
 // its side, n.b = 0 and n is known, or on its rim; on the flat mouth D is linear. A search that ends early
 // gives room away and never takes any: apart_m is no more than the distance for every n.
-hal::Vec3 ForbiddenRegions::away_from_holder(const NeedlePose& needle) const NONBLOCKING {
+// Long, and rarely needed: a function of its own in every loop round it.
+[[gnu::noinline]] Gap ForbiddenRegions::widest_gap_to_holder(const NeedlePose& needle) const NONBLOCKING {
   const HolderBodyParams& holder = *params_.holder;
+  const auto gap = [&](const hal::Vec3& away) { return Gap{away, apart_from_holder_m(away, needle)}; };
   const auto at = [&](double behind_m) { return away_from(holder, needle.tip_m - behind_m * needle.axis); };
   const double taper = (params_.shaft_radius_m - params_.tip_radius_m) / params_.taper_m;
 
@@ -139,29 +142,36 @@ hal::Vec3 ForbiddenRegions::away_from_holder(const NeedlePose& needle) const NON
   const double along = of_shoulder.dot(needle.axis);
   const bool in_shaft = along > 0;
   if (!in_shaft && along >= -taper) {
-    return of_shoulder;
+    return gap(of_shoulder);
   }
   const double slope = in_shaft ? 0 : taper;
   const hal::Vec3 of_end = at(in_shaft ? kShaft_m : 0);
   if ((of_end.dot(needle.axis) >= -slope) == in_shaft) {
-    return of_end;
+    return gap(of_end);
   }
-  const hal::Vec3 of_side = across_both(needle.tip_m - holder.mouth_m, needle.axis, slope, holder.axis);
+  const Gap of_side = gap(across_both(needle.tip_m - holder.mouth_m, needle.axis, slope, holder.axis));
   const double at_rim_m = nearest_to_rim_m(holder, needle, slope, in_shaft ? params_.taper_m : 0,
                                            in_shaft ? kShaft_m : params_.taper_m);
-  const hal::Vec3 of_rim = across(at(at_rim_m), needle.axis, slope);
-  return apart_m(Region::holder, of_side, needle) > apart_m(Region::holder, of_rim, needle) ? of_side
-                                                                                            : of_rim;
+  const Gap of_rim = gap(across(at(at_rim_m), needle.axis, slope));
+  return of_side.apart_m > of_rim.apart_m ? of_side : of_rim;
 }
 
 double ForbiddenRegions::apart_m(Region region, const hal::Vec3& direction, const NeedlePose& needle) const
     NONBLOCKING {
-  if (region == Region::floor) {
-    // Of the needle the tip alone. The shaft is not kept from the floor: that of a horizontal needle is
-    // thicker than its tip and lies lower.
-    const double below_tip_m = direction.z() * (needle.tip_m.z() - params_.floor->z_m);
-    return below_tip_m - params_.tip_radius_m - params_.clearance_m;
-  }
+  return region == Region::floor ? apart_from_floor_m(direction, needle)
+                                 : apart_from_holder_m(direction, needle);
+}
+
+// Of the needle the tip alone. The shaft is not kept from the floor: that of a horizontal needle is thicker
+// than its tip and lies lower.
+double ForbiddenRegions::apart_from_floor_m(const hal::Vec3& direction, const NeedlePose& needle) const
+    NONBLOCKING {
+  const double below_tip_m = direction.z() * (needle.tip_m.z() - params_.floor->z_m);
+  return below_tip_m - params_.tip_radius_m - params_.clearance_m;
+}
+
+double ForbiddenRegions::apart_from_holder_m(const hal::Vec3& direction, const NeedlePose& needle) const
+    NONBLOCKING {
   const HolderBodyParams& holder = *params_.holder;
   const double backwards = direction.dot(holder.axis);
   if (backwards > kBackwards) {

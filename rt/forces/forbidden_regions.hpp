@@ -67,10 +67,15 @@ constexpr auto keys_of(const ForbiddenParams*) {
 enum class Region : std::uint8_t { floor, holder };
 inline constexpr Region kRegions[] = {Region::floor, Region::holder};
 
-// Tip and axis of a needle, and a direction that leads away from a region.
 struct NeedlePose {
   hal::Vec3 tip_m = hal::Vec3::Zero();
   hal::Vec3 axis = -hal::Vec3::UnitX();  // unit, out of the tip
+};
+
+// Between needle and region: a direction that leads away from the region, unit, and apart_m() in it.
+struct Gap {
+  hal::Vec3 away;
+  double apart_m;
 };
 
 // Room that a needle was once seen to have. A plane that it is apart from comes no nearer than the tip goes,
@@ -94,15 +99,19 @@ class ForbiddenRegions {
   [[nodiscard]] bool has(Region region) const NONBLOCKING {
     return region == Region::floor ? params_.floor.has_value() : params_.holder.has_value();
   }
-  // The direction from the region to the needle where the two are nearest. Unit; bounded work.
-  [[nodiscard]] hal::Vec3 away(Region region, const NeedlePose& needle) const NONBLOCKING;
+  // In the direction from the region to the needle where the two are nearest. Bounded work.
+  [[nodiscard]] Gap widest_gap(Region region, const NeedlePose& needle) const NONBLOCKING;
   // How far needle and region are apart in this direction; never more than they are apart. < 0: too near, or
   // not apart in this direction.
   [[nodiscard]] double apart_m(Region region, const hal::Vec3& direction, const NeedlePose& needle) const
       NONBLOCKING;
 
  private:
-  [[nodiscard]] hal::Vec3 away_from_holder(const NeedlePose& needle) const NONBLOCKING;
+  [[nodiscard]] Gap widest_gap_to_holder(const NeedlePose& needle) const NONBLOCKING;
+  [[nodiscard]] double apart_from_floor_m(const hal::Vec3& direction, const NeedlePose& needle) const
+      NONBLOCKING;
+  [[nodiscard]] double apart_from_holder_m(const hal::Vec3& direction, const NeedlePose& needle) const
+      NONBLOCKING;
 
   ForbiddenParams params_;
 };

@@ -20,8 +20,9 @@ PotentialForce ForbiddenWalls::push(Region region, const NeedlePose& needle) NON
     seen_.room_m = std::min(seen_.room_m, room_m);
     return push;  // in that direction alone they are far apart
   }
-  away = regions_.away(region, needle);
-  const double delta_m = params_.felt_m - regions_.apart_m(region, away, needle);
+  const Gap gap = regions_.widest_gap(region, needle);
+  away = gap.away;
+  const double delta_m = params_.felt_m - gap.apart_m;
   seen_.room_m = std::min(seen_.room_m, -delta_m);
   push.force_N = params_.K_N_m * soft_spring(delta_m, kSoftPart * params_.felt_m) * away;
   if (reach_) {

@@ -767,7 +767,7 @@ Found check_forbidden(const rt::ForbiddenParams& forbidden, const sim::StagePara
   const rt::ForbiddenRegions regions(forbidden);
   const rt::NeedlePose start{stage->start_m + stage->registration_m, stage->axis};
   for (const rt::Region region : rt::kRegions) {
-    if (regions.has(region) && regions.apart_m(region, regions.away(region, start), start) < 0) {
+    if (regions.has(region) && regions.widest_gap(region, start).apart_m < 0) {
       return Problem{"sim.stage.start_um",
                      fmt::format("is in a forbidden region, allowed: outside [forbidden.{}]",
                                  region == rt::Region::floor ? "floor" : "holder")};

@@ -23,8 +23,7 @@ ForbiddenParams both() {
 }
 
 double apart_m(const ForbiddenParams& params, Region region, const NeedlePose& needle) {
-  const ForbiddenRegions regions(params);
-  return regions.apart_m(region, regions.away(region, needle), needle);
+  return ForbiddenRegions(params).widest_gap(region, needle).apart_m;
 }
 
 TEST(ForbiddenRegions, are_as_far_as_geometry_says) {

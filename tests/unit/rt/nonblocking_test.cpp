@@ -61,7 +61,8 @@ TEST(Nonblocking, nothing_in_the_core_switches_the_proof_off) {
     }
     std::ifstream in(entry.path());
     for (std::string line; std::getline(in, line);) {
-      EXPECT_TRUE(!std::regex_search(line, off) || line == "#pragma once") << entry.path() << ": " << line;
+      const bool harmless = line == "#pragma once" || line.starts_with("#pragma GCC unroll ");
+      EXPECT_TRUE(harmless || !std::regex_search(line, off)) << entry.path() << ": " << line;
     }
   }
 }

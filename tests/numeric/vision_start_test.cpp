@@ -211,14 +211,14 @@ INSTANTIATE_TEST_SUITE_P(
     Cells, DrawnStart,
     testing::Values(DrawnCell{"noise_2", {.noise = 2}, {4, 4, 4, 4, 4}},
                     DrawnCell{"noise_5", {.noise = 5}, {4, 4, 4, 4, 4}},
-                    DrawnCell{"noise_10", {.noise = 10}, {4, 4, 4, 4, 4}, 4, false, 27},
+                    DrawnCell{"noise_10", {.noise = 10}, {4, 4, 4, 4, 4}, 4, false, 637},
                     DrawnCell{"noise_20", {.noise = 20}, {3, 4, 3, 4, 4}, 4, true, 20},
                     DrawnCell{"tilted_30", {}, {4, 4, 4, 4, 4}, 30},
                     DrawnCell{"tilted_45", {}, {4, 4, 4, 4, 4}, 45, false, 7},
                     DrawnCell{"on_shaft", {.on_shaft = 6}, {4, 4, 4, 4, 4}},
                     DrawnCell{"crossed", {.gap_px = -1}, {3, 4, 4, 4, 3, 1}},
                     DrawnCell{"impurities_60", {.impurities = 60}, {3, 4, 3, 4, 4}, 4, false, 37},
-                    DrawnCell{"out_of_focus", {.focus_px = 4}, {1, 4, 1, 4, 4, 1}, 4, true},
+                    DrawnCell{"out_of_focus", {.focus_px = 4}, {4, 4, 4, 4, 4}, 4, true},
                     DrawnCell{"relief", {.relief = true}, {3, 4, 3, 4, 4, 1}, 4, true, 5}),
     [](const auto& one) { return std::string(one.param.name); });
 

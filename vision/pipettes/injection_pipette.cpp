@@ -103,26 +103,42 @@ bool walls_differ(const GradientField& field, const NeedlePose& needle) {
          std::abs(high) > kUnequal * std::abs(low);
 }
 
-// It may hold on to the inner face of one wall: then both faces have the same sense, and on one side there
-// is another face further out, about as strong, of the opposite sense.
+// It may hold on to the inner face of one wall, so that both faces have the same sense, or to those of both,
+// so that it is bright as a lumen is. Then there are faces further out, of the opposite sense.
 void look_further_out(const GradientField& field, double noise, double radius_px, NeedlePose& needle,
                       double& straight) {
-  constexpr double kWider_px = 1.5, kNearlyAs = 0.1, kAsStrong = 0.6;
-  for (const double side : {-1.0, 1.0}) {
-    const auto [low, high] = faces(field, needle);
-    if (low * high <= 0) {
-      break;
-    }
-    NeedlePose wider = needle;
-    wider.tip = needle.at(0, side * kWider_px);
-    wider.half_width += kWider_px;
-    const double s = fit_walls(field, noise, radius_px, wider, kLongest_px);
+  // Half the distance of the faces of a wall, and where they are looked for: sharp and out of focus. There
+  // the inner face is twice as strong, and must not be seen again.
+  struct Wall {
+    double half_px, reach_px;
+  };
+  constexpr std::array<Wall, 2> kWalls = {{{1.5, kWallReach_px}, {2.5, 2}}};
+  constexpr double kAsStrong = 0.6, kAsInner = 0.35;
+  const auto [low, high] = faces(field, needle);
+  const bool one = low * high > 0, both = low > 0 && high < 0;
+  const double weaker = std::min(std::abs(low), std::abs(high));
+  const NeedlePose before = needle;
+  double most = kStraight;
+  const auto try_wider = [&](double by_low, double by_high, double reach) {
+    NeedlePose wider = before;
+    wider.tip = before.at(0, by_high - by_low);
+    wider.half_width += by_low + by_high;
+    const double s = fit_walls(field, noise, radius_px, wider, kLongest_px, reach);
     const auto [lower, higher] = faces(field, wider);
-    if (s > std::max(kStraight, straight - kNearlyAs) &&
-        wider.half_width > needle.half_width + kWider_px / 2 && lower * higher < 0 &&
-        std::min(std::abs(lower), std::abs(higher)) > kAsStrong * std::min(std::abs(low), std::abs(high))) {
+    const double weakest = std::min(std::abs(lower), std::abs(higher));
+    if (s > most && wider.half_width > before.half_width + kWalls[0].half_px / 2 &&
+        (one ? lower * higher < 0 && weakest > kAsStrong * weaker
+             : lower < 0 && higher > 0 && weakest > kAsInner * weaker)) {
       needle = wider;
-      straight = s;
+      straight = most = s;
+    }
+  };
+  for (const auto& [by, reach] : kWalls) {
+    if (one) {
+      try_wider(by, 0, reach);
+      try_wider(0, by, reach);
+    } else if (both) {
+      try_wider(by, by, reach);
     }
   }
 }
@@ -365,14 +381,14 @@ bool InjectionPipette::learn_end_anew(const GradientField& field, double noise) 
     return cut.end.blur <= kMostBlur_px &&
            sd_of(cut, last_.half_width) <= (cut.end.blur > kSharp_px ? kUnsharpKnown_px : kStartKnown_px);
   };
-  if (const auto cut = lumen_ ? go_to_cut(field, noise) : std::nullopt; cut && known(*cut)) {
+  if (const auto cut = lumen_ ? go_to_cut(field, noise) : std::nullopt;
+      cut && (known(*cut) || cut->end.blur > kSharp_px)) {
     bevel_ = cut->bevel;
     learn_glass(cut->end);
-    return true;
+    return known(*cut);
   }
-  bevel_ = lumen_ ? bevel_of_glass(field, noise, last_, kStartReach_px, kStartReach_px).value_or(Bevel{})
-                  : Bevel{};
-  const auto end = end_of_glass(field, noise, last_, bevel_.tangent, kStartReach_px, kStartReach_px);
+  bevel_ = {};
+  const auto end = end_of_glass(field, noise, last_, 0, kStartReach_px, kStartReach_px);
   if (!end || end->sd > kEndKnown_px) {
     return false;
   }

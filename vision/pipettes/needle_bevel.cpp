@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <numbers>
 #include <opencv2/core.hpp>
 
@@ -19,25 +18,17 @@ namespace {
 
 constexpr double kRow_px = 1;                        // along the needle
 constexpr std::size_t kWithin = 5, kClearLanes = 3;  // lanes on one side: of the glass, beside it
-constexpr std::size_t kLumenLanes = 2;               // of those, in the lumen
+constexpr double kClearApart = 0.9;                  // of those beside it, over the blur
+constexpr std::size_t kBeside = 2;                   // of those, the outer ones: hardly blurred walls
+constexpr std::size_t kLumenLanes = 2;               // of those of the glass, in the lumen
 constexpr std::size_t kOneSide = kWithin + kClearLanes, kAllLanes = 2 * kOneSide;
 constexpr double kShaftFrom_px = 6, kShaftTo_px = 51;  // behind the range: tell how the walls look
 constexpr double kBehind_px = 14;                      // behind the range, compared with every end
 // Half the thickness of the glass over the radius of its middle, in a usual capillary.
 constexpr double kHalfOfWall = 0.17;
-constexpr double kSteepestCut = 0.95;  // px along per px across
+// px along per px across; what is cut more steeply is no needle's end.
+constexpr double kSteepestCut = 0.95, kCutMost = 0.85;
 using GlassRow = std::array<double, kAllLanes>;
-
-double lane_at(std::size_t lane, double half_width) {
-  const std::size_t i = lane % kOneSide;
-  const double u = i < kWithin ? half_width * (static_cast<double>(i) + 0.5) / kWithin
-                               : half_width + static_cast<double>(i - kWithin) + 0.5;
-  return lane < kOneSide ? -u : u;
-}
-
-double lane_width(std::size_t lane, double half_width) {
-  return lane % kOneSide < kWithin ? half_width / kWithin : 1;
-}
 
 // A table of a function of the distance in blurs.
 class OfBlurs {
@@ -97,7 +88,9 @@ Vector<double> half_profile(const GradientField& field, const NeedlePose& needle
 // What is left of the profile, grey levels squared, when two walls so far from the axis, a lumen between them
 // and a level are taken off, each as strong as it fits best.
 double unexplained(const Vector<double>& profile, double apart_px, double middle_px, double blur_px) {
-  cv::Matx33d a = 1e-6 * cv::Matx33d::eye();
+  // Out of focus a lumen looks like a wider blur. In focus it covers several lanes.
+  constexpr double kNoLumen = 1;  // as surely as one place of the profile tells it
+  cv::Matx33d a = cv::Matx33d::diag({1e-6, kNoLumen, 1e-6});
   cv::Vec3d g;
   double square = 0;
   for (std::size_t k = 0; k < profile.size(); ++k) {
@@ -112,7 +105,7 @@ double unexplained(const Vector<double>& profile, double apart_px, double middle
 }
 
 struct CutEnd {
-  double at = 0, tangent = 0, blur = 1.7;  // behind the tip of the pose, px; of the cut; px
+  double at = 0, tangent = 0;  // behind the tip of the pose, px; of the cut
 };
 
 // Weighted, of a quantity.
@@ -128,13 +121,13 @@ struct Moments {
   [[nodiscard]] double variance() const { return std::max(squares / weight - mean() * mean(), 0.0); }
 };
 
-// Walls that stop along an oblique line, and a line of glass of any strength along it. Where the blur is
-// known, what is neither walls nor clear is a speck and tells nothing; else no speck tells more than the
-// needle.
+// Two walls that stop along an oblique line, each as its own line is blurred, and a line of glass along it,
+// or none. What is neither walls nor clear is a speck and tells nothing. The medium is as even as it is
+// beside the needle: were it not known out of focus, where the walls merge, the end would be half as certain.
 class CutModel {
  public:
-  CutModel(const GradientField& field, const NeedlePose& needle, double noise, std::optional<double> blur_px,
-           double back, double ahead);
+  CutModel(const GradientField& field, const NeedlePose& needle, double noise, double blur_px, double back,
+           double ahead);
   [[nodiscard]] bool stands_out() const noexcept { return clear_; }
   // Log likelihood over no needle, twice.
   [[nodiscard]] double gain(const CutEnd& end) const;
@@ -146,37 +139,52 @@ class CutModel {
  private:
   struct Seen {
     double s, half_width;
-    GlassRow grey;      // times the weight, without mean and slope
+    GlassRow grey;      // later times the weight, without what the medium may add
     GlassRow weight{};  // width of the lane, px; nearly none where there is a speck
     // Of the weights: mean place, sum, sum over the squares of the distance from that place.
     double middle = 0, weights = 0, tilts = 0;
+    // px, px cubed: what tells that the medium is even here, in the mean and across.
+    double even = 0, level = 0;
   };
+  [[nodiscard]] double lane_at(std::size_t lane, double half_width) const;
+  [[nodiscard]] double lane_width(std::size_t lane, double half_width) const;
+  [[nodiscard]] static bool is_beside(std::size_t lane) { return lane % kOneSide + kBeside >= kOneSide; }
   void weigh_without_specks(Seen& row, double most) const;
-  static void take_off_mean_and_slope(Seen& row);
-  double half_width_, smooth_noise_, unit_;
+  void take_off_plane();
+  void tell_how_even_it_is();
+  void take_off_mean_and_slope(Seen& row) const;
+  double half_width_, blur_, smooth_noise_, unit_;
   double square_ = 0, area_px2_ = 0;  // of what is seen, grey levels squared
   bool clear_ = false;
   Vector<Seen> rows_;
-  GlassRow walls_{};
+  GlassRow walls_{}, near_{}, line_{};  // of the shaft; the share of the nearer one; of a line across
+  double middle_, line_behind_;         // of a wall, from the axis; of the line, behind the end
 };
 
-CutModel::CutModel(const GradientField& field, const NeedlePose& needle, double noise,
-                   std::optional<double> blur_px, double back, double ahead)
+double CutModel::lane_at(std::size_t lane, double half_width) const {
+  const std::size_t i = lane % kOneSide;
+  const double u = i < kWithin ? half_width * (static_cast<double>(i) + 0.5) / kWithin
+                               : half_width + kClearApart * blur_ * (static_cast<double>(i - kWithin) + 0.5);
+  return lane < kOneSide ? -u : u;
+}
+
+double CutModel::lane_width(std::size_t lane, double half_width) const {
+  return lane % kOneSide < kWithin ? half_width / kWithin : kClearApart * blur_;
+}
+
+CutModel::CutModel(const GradientField& field, const NeedlePose& needle, double noise, double blur_px,
+                   double back, double ahead)
     : half_width_(needle.half_width),
-      smooth_noise_(std::max(noise, 0.3) / (2 * field.sigma * std::sqrt(std::numbers::pi))) {
+      blur_(blur_px),
+      smooth_noise_(std::max(noise, 0.3) / (2 * field.sigma * std::sqrt(std::numbers::pi))),
+      middle_(std::max(half_width_ - blur_, 0.6 * half_width_)),
+      line_behind_(kHalfOfWall * middle_) {
   constexpr double kMargin_px = 6;  // the blur of the end reaches so far
   constexpr double kLeast_grey = 1.5, kMost_noises = 0.25;
-  constexpr double kOfWallsMost = 1.6;  // of the strongest wall, what a speck may tell
-  // What the smoothing leaves of the noise in what is about as wide, and in an end of that blur: it is a peak
-  // across, a slope along.
-  double smoothed = 0.6;
-  if (blur_px) {
-    const double blur2 = *blur_px * *blur_px, of_noise = blur2 / (blur2 + field.sigma * field.sigma);
-    smoothed = of_noise * of_noise;
-  }
-  unit_ = std::max(noise * noise, 0.1) * smoothed / kRow_px;
+  // What the smoothing leaves of the noise in an end of that blur: it is a peak across, a slope along.
+  const double blur2 = blur_ * blur_, of_noise = blur2 / (blur2 + field.sigma * field.sigma);
+  unit_ = std::max(noise * noise, 0.1) * of_noise * of_noise / kRow_px;
   std::array<Vector<double>, kAllLanes> shaft;
-  Vector<GlassRow> greys;
   for (double s = -ahead - kMargin_px; s <= back + kShaftTo_px; s += kRow_px) {
     GlassRow grey{};
     const double w = needle.half_width + needle.taper * s;
@@ -207,28 +215,34 @@ CutModel::CutModel(const GradientField& field, const NeedlePose& needle, double 
   if (shaft[0].size() < kFewest) {
     return;
   }
-  double square = 0, most = 0;
+  double square = 0, most = 0, of_wall = 0, squares = 0;
   for (std::size_t i = 0; i < kAllLanes; ++i) {
     walls_[i] = median_of(shaft[i]);
     square += walls_[i] * walls_[i] / kAllLanes;
     most = std::max(most, std::abs(walls_[i]));
+    const double u = lane_at(i, half_width_), lumen = middle_ - line_behind_;
+    const double near = bump_of((std::abs(u) - middle_) / blur_),
+                 far = bump_of((std::abs(u) + middle_) / blur_);
+    near_[i] = near / std::max(near + far, 1e-9);
+    line_[i] = step_of((lumen - u) / blur_) - step_of((-lumen - u) / blur_);
+    of_wall += walls_[i] * (near + far);
+    squares += (near + far) * (near + far);
+  }
+  for (double& l : line_) {
+    l *= of_wall / squares;
   }
   clear_ = square > kLeast_grey * kLeast_grey && square > kMost_noises * kMost_noises * noise * noise;
-  const double at_most = blur_px ? std::numeric_limits<double>::infinity() : kOfWallsMost * most;
   for (Seen& row : rows_) {
-    if (blur_px) {
-      weigh_without_specks(row, most);
-    } else {
-      for (std::size_t i = 0; i < kAllLanes; ++i) {
-        row.weight[i] = lane_width(i, row.half_width);
-      }
-    }
+    weigh_without_specks(row, most);
+  }
+  take_off_plane();
+  tell_how_even_it_is();
+  for (Seen& row : rows_) {
     take_off_mean_and_slope(row);
     for (std::size_t i = 0; i < kAllLanes; ++i) {
-      const double grey = std::clamp(row.grey[i], -at_most, at_most);
-      square_ += row.weight[i] * grey * grey;
+      square_ += row.weight[i] * row.grey[i] * row.grey[i];
       area_px2_ += row.weight[i];
-      row.grey[i] = row.weight[i] * grey;
+      row.grey[i] *= row.weight[i];
     }
   }
 }
@@ -252,7 +266,63 @@ void CutModel::weigh_without_specks(Seen& row, double most) const {
   }
 }
 
-void CutModel::take_off_mean_and_slope(Seen& row) {
+// Of the medium beside the needle.
+void CutModel::take_off_plane() {
+  cv::Matx33d a = 1e-6 * cv::Matx33d::eye();
+  cv::Vec3d g;
+  for (const Seen& row : rows_) {
+    for (std::size_t i = 0; i < kAllLanes; ++i) {
+      if (is_beside(i)) {
+        const cv::Vec3d plane(1, row.s, lane_at(i, row.half_width));
+        a += row.weight[i] * plane * plane.t();
+        g += row.weight[i] * row.grey[i] * plane;
+      }
+    }
+  }
+  const cv::Vec3d plane = a.inv() * g;
+  for (Seen& row : rows_) {
+    for (std::size_t i = 0; i < kAllLanes; ++i) {
+      row.grey[i] -= plane[0] + plane[1] * row.s + plane[2] * lane_at(i, row.half_width);
+    }
+  }
+}
+
+// By what is beside the needle in the rows about it: a membrane across it, say.
+void CutModel::tell_how_even_it_is() {
+  constexpr std::size_t kAbout = 4;
+  struct Uneven {
+    double level, slope, of_level, of_slope;  // squared; what the noise makes of both
+  };
+  Vector<Uneven> uneven;
+  for (const Seen& row : rows_) {
+    double m0 = 0, m2 = 0, r0 = 0, r1 = 0;
+    for (std::size_t i = 0; i < kAllLanes; ++i) {
+      if (is_beside(i)) {
+        const double u = lane_at(i, row.half_width), w = row.weight[i];
+        m0 += w;
+        m2 += w * u * u;
+        r0 += w * row.grey[i];
+        r1 += w * u * row.grey[i];
+      }
+    }
+    uneven.push_back({r0 * r0 / (m0 * m0), r1 * r1 / (m2 * m2), unit_ / m0, unit_ / m2});
+  }
+  for (std::size_t j = 0; j < rows_.size(); ++j) {
+    const std::size_t from = j > kAbout ? j - kAbout : 0, to = std::min(j + kAbout + 1, rows_.size());
+    Uneven sum{};
+    for (std::size_t k = from; k < to; ++k) {
+      sum.level += uneven[k].level;
+      sum.slope += uneven[k].slope;
+      sum.of_level += uneven[k].of_level;
+      sum.of_slope += uneven[k].of_slope;
+    }
+    const double n = static_cast<double>(to - from), doubt = std::sqrt(2 / n);
+    rows_[j].even = unit_ * n / (std::max(sum.level - sum.of_level, 0.0) + doubt * sum.of_level);
+    rows_[j].level = unit_ * n / (std::max(sum.slope - sum.of_slope, 0.0) + doubt * sum.of_slope);
+  }
+}
+
+void CutModel::take_off_mean_and_slope(Seen& row) const {
   for (std::size_t i = 0; i < kAllLanes; ++i) {
     row.weights += row.weight[i];
     row.middle += row.weight[i] * lane_at(i, row.half_width);
@@ -265,6 +335,8 @@ void CutModel::take_off_mean_and_slope(Seen& row) {
     mean += row.weight[i] * row.grey[i];
     slope += row.weight[i] * tilt * row.grey[i];
   }
+  row.weights += row.even;
+  row.tilts += row.level;
   for (std::size_t i = 0; i < kAllLanes; ++i) {
     row.grey[i] -= mean / row.weights + slope / row.tilts * (lane_at(i, row.half_width) - row.middle);
   }
@@ -273,23 +345,22 @@ void CutModel::take_off_mean_and_slope(Seen& row) {
 double CutModel::gain(const CutEnd& end) const {
   constexpr double kStrength = 0.25,
                    kPerPx = 0.01;  // usual deviations of the walls' strength from the shaft's
-  const double middle = std::max(half_width_ - end.blur, 0.6 * half_width_);
-  const double line_behind = kHalfOfWall * middle, lumen = middle - line_behind;
-  GlassRow line{};
-  for (std::size_t i = 0; i < kAllLanes; ++i) {
-    const double u = lane_at(i, half_width_);
-    line[i] = step_of((lumen - u) / end.blur) - step_of((-lumen - u) / end.blur);
-  }
+  // Usual deviation of the line's strength from none, or from that of the walls. In focus it shows, and is
+  // not just where a usual capillary has it; out of focus the walls merge into one.
+  constexpr double kFocused = 3, kClosed = 0.15, kUnsharp_px = 2.2;
   // Walls; the same times the distance from the end; line.
   cv::Matx33d a = cv::Matx33d::zeros();
   cv::Vec3d g;
+  const double cut_px = end.tangent * middle_;
   for (const Seen& row : rows_) {
     double x0 = 0, x1 = 0, l0 = 0, l1 = 0, xx = 0, xl = 0, ll = 0, xy = 0, ly = 0;
+    const double along = row.s - end.at, low = step_of((along + cut_px) / blur_),
+                 high = step_of((along - cut_px) / blur_);
     for (std::size_t i = 0; i < kAllLanes; ++i) {
       const double u = lane_at(i, row.half_width), w = row.weight[i], tilt = u - row.middle;
-      const double behind = row.s - end.at - end.tangent * u;
-      const double x = walls_[i] * step_of(behind / end.blur);
-      const double l = line[i] * bump_of((behind - line_behind) / end.blur);
+      const double near = i < kOneSide ? low : high, far = i < kOneSide ? high : low;
+      const double x = walls_[i] * (far + near_[i] * (near - far));
+      const double l = line_[i] * bump_of((along - end.tangent * u - line_behind_) / blur_);
       x0 += w * x;
       x1 += w * tilt * x;
       l0 += w * l;
@@ -312,8 +383,14 @@ double CutModel::gain(const CutEnd& end) const {
   a(0, 0) += sure;
   g[0] += sure;
   a(1, 1) += unit_ / (kPerPx * kPerPx);
-  a(2, 2) += 1e-3 * unit_;
-  return g.dot(a.inv() * g) / unit_;
+  // An open end or one that is closed by glass as strong as the walls.
+  const double usual = blur_ > kUnsharp_px ? kClosed : kFocused, of_line = unit_ / (usual * usual);
+  a(2, 2) += of_line;
+  const cv::Matx33d inverse = a.inv();
+  const double open = (g.dot(inverse * g) - sure) / unit_;
+  g[2] += of_line;
+  const double closed = (g.dot(inverse * g) - sure - of_line) / unit_, likelier = std::max(open, closed);
+  return likelier + 2 * math::log(0.5 * (1 + math::exp(-0.5 * std::abs(open - closed))));
 }
 
 // Ends from..to px behind the tip of the pose, and cuts, with what is between two of them.
@@ -333,7 +410,7 @@ CutGlass mean_of(const CutModel& model, const EndsAndCuts& tried, double blur_px
   for (int k = static_cast<int>(std::ceil(tried.cut_from / tried.cut_apart));
        k * tried.cut_apart <= tried.cut_to; ++k) {
     for (double at = tried.from; at <= tried.to; at += tried.apart) {
-      const CutEnd end{at, k * tried.cut_apart, blur_px};
+      const CutEnd end{at, k * tried.cut_apart};
       ends.push_back({end, model.gain(end)});
       if (ends.back().gain > most) {
         most = ends.back().gain;
@@ -373,75 +450,6 @@ double outer_radius_of_glass(double half_width, double blur) {
   return (1 + kHalfOfWall) * std::max(half_width - blur, 0.6 * half_width);
 }
 
-std::optional<Bevel> bevel_of_glass(const GradientField& field, double noise, const NeedlePose& needle,
-                                    double back, double ahead) {
-  const CutModel model(field, needle, noise, std::nullopt, back, ahead);
-  if (!model.stands_out()) {
-    return std::nullopt;
-  }
-  constexpr std::array kBlurs_px = {1.4, 1.7, 2.1, 2.6, 3.2, 4.0};
-  constexpr double kSteepest = 0.9;
-  CutEnd best;
-  double most = -1e18;
-  const auto take = [&](const CutEnd& end) {
-    const double gain = model.gain(end);
-    if (gain > most) {
-      most = gain;
-      best = end;
-    }
-  };
-  const auto refine = [&](double from_step, bool turn) {
-    for (double step = from_step; step > 0.2; step /= 2) {
-      for (int round = 0; round < 2; ++round) {
-        const CutEnd from = best;
-        for (const double blur : kBlurs_px) {
-          take({from.at, from.tangent, blur});
-        }
-        for (const double sign : {-1.0, 1.0}) {
-          take({best.at + sign * 0.5 * step, best.tangent, best.blur});
-          if (turn) {
-            take({best.at, std::clamp(best.tangent + sign * 0.2 * step, -kSteepest, kSteepest), best.blur});
-          }
-        }
-      }
-    }
-    return most;
-  };
-  const auto begin_with = [&](const CutEnd& end) {
-    best = end;
-    most = model.gain(end);
-  };
-  for (double at = -ahead; at <= back; at += 1.5) {
-    for (const double tangent : {-0.5, 0.0, 0.5}) {
-      take({at, tangent, 2.1});
-    }
-  }
-  const double with_cut = refine(1, true);
-  const CutEnd cut = best;
-  // More is there than a needle's end: a speck, say.
-  constexpr double kMisfitMost = 4;
-  const double misfit = model.misfit(with_cut);
-  if (misfit > kMisfitMost || std::abs(cut.tangent) >= kSteepest) {
-    return std::nullopt;
-  }
-  begin_with({cut.at, 0, cut.blur});
-  const double straight = refine(1, false);
-  // How fast the likelihood falls, when the end follows.
-  constexpr double kApart = 0.15;
-  double curvature = 0;
-  for (const double sign : {-1.0, 1.0}) {
-    begin_with({cut.at, cut.tangent + sign * kApart, cut.blur});
-    curvature += (with_cut - refine(0.5, false)) / (kApart * kApart);
-  }
-  const double variance = 2 * misfit / std::max(curvature, 1e-3);
-  // Before anything is seen, a needle is as likely cut at right angles as anyhow up to the steepest.
-  const double times_as_likely = math::exp(std::min(0.5 * (with_cut - straight) / misfit, 50.0)) *
-                                 std::sqrt(2 * CV_PI * variance) / (2 * kSteepest);
-  const double oblique = times_as_likely / (1 + times_as_likely);
-  return Bevel{oblique * cut.tangent,
-               std::sqrt(oblique * variance + oblique * (1 - oblique) * cut.tangent * cut.tangent)};
-}
-
 std::optional<double> blur_of_shaft(const GradientField& field, const NeedlePose& needle, double back) {
   constexpr double kApart_px = 0.5, kUnexplained = 0.2;
   // What it is tried with, and the least that a needle in focus has.
@@ -473,11 +481,11 @@ std::optional<CutGlass> cut_of_glass(const GradientField& field, double noise, c
   if (!model.stands_out()) {
     return std::nullopt;
   }
-  CutEnd best{0, 0, blur_px};
+  CutEnd best;
   double most = -1e18;
   for (double at = -ahead; at <= back; at += 1) {
     for (const double tangent : {-0.6, -0.3, 0.0, 0.3, 0.6}) {
-      const CutEnd end{at, tangent, blur_px};
+      const CutEnd end{at, tangent};
       if (const double gain = model.gain(end); gain > most) {
         most = gain;
         best = end;
@@ -490,12 +498,15 @@ std::optional<CutGlass> cut_of_glass(const GradientField& field, double noise, c
   }
   // Ends far from the best one may be as likely: in noise the likelihood falls off in straight lines, not as
   // a parabola. Where they are not, it is sharp.
-  constexpr double kBeyond_px = 2, kSharp_px2 = 1,
+  constexpr double kBeyond_px = 2, kSharp_px2 = 0.1,
                    kReach_px = 1;  // of the range; variance; round the best end
   constexpr double kReachOfCut = 0.16;
   const double radius = outer_radius_of_glass(needle.half_width, blur_px);
   const EndsAndCuts all{-ahead - kBeyond_px, back + kBeyond_px, 0.5, -kSteepestCut, kSteepestCut, 0.1};
   CutGlass found = mean_of(model, all, blur_px, radius, best);
+  if (std::abs(best.tangent) > kCutMost) {
+    return std::nullopt;
+  }
   if (const double of_cut = found.bevel.sd * radius;
       found.end.sd * found.end.sd + of_cut * of_cut < kSharp_px2) {
     const EndsAndCuts near{best.at - kReach_px,        best.at + kReach_px,        0.1,

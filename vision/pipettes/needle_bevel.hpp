@@ -20,11 +20,6 @@ struct Bevel {
   double sd = 0;
 };
 
-// By likelihood, with an end from `back` px behind the tip of the pose to `ahead` px ahead of it. noise: grey
-// levels. Empty where the walls do not stand out, or something else lies there.
-[[nodiscard]] std::optional<Bevel> bevel_of_glass(const GradientField& field, double noise,
-                                                  const NeedlePose& needle, double back, double ahead);
-
 // How far a point spreads, px, by the shaft from `back` px behind the tip: it spreads as far along the needle
 // as across, and the shaft tells it from many more pixels than the end does. Empty where the shaft does not
 // look like two equal walls and a lumen, as in relief.

@@ -125,6 +125,7 @@ std::optional<NeedlePose> with_faint_wall(const GradientField& field, double noi
                                           const NeedlePose& needle) {
   constexpr std::size_t kFewest = 20;  // stations
   constexpr double kNoises = 6, kMostNoises = 4, kOneSided = 1.6, kFaint = 0.35;
+  constexpr double kOfOneWall_px = 3.5, kAlike = 0.7, kAlone = 4;
   constexpr double kNearest_px = 7, kSteepestTaper = 0.1;  // of the lines' middles
   constexpr double kHalfOfLine_px = 2.2;
   Rows rows = rows_across(field, needle);
@@ -161,8 +162,13 @@ std::optional<NeedlePose> with_faint_wall(const GradientField& field, double noi
   const Line low = beside(-1), high = beside(1);
   const Line& other = std::abs(low.contrast) > std::abs(high.contrast) ? low : high;
   const Line& opposite = &other == &low ? high : low;
-  if (std::abs(other.contrast) < least || std::abs(other.contrast) > kFaint * std::abs(wall.contrast) ||
-      std::abs(other.contrast) < kOneSided * std::abs(opposite.contrast)) {
+  const double share = other.contrast / wall.contrast;
+  const bool faint =
+      std::abs(share) <= kFaint && std::abs(other.contrast) >= kOneSided * std::abs(opposite.contrast);
+  // Both faces of one wall look like a thin needle; the other wall is then about as strong.
+  const bool alike = needle.half_width < kOfOneWall_px && share > kAlike && share < 1 / kAlike &&
+                     std::abs(other.contrast) >= kAlone * std::abs(opposite.contrast);
+  if (std::abs(other.contrast) < least || !(faint || alike)) {
     return std::nullopt;
   }
   const Point across(-needle.axis.y, needle.axis.x);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "hal/math/elementary.hpp"
+
 namespace punctum::vision {
 
 namespace {
@@ -73,7 +75,9 @@ NeedlePose TipByStage::most_likely(const NeedlePose& seen) {
     frames_ = disagreements_ = 0;
   }
   if (disagree) {
-    return seen;
+    NeedlePose doubtful = seen;
+    doubtful.sd = math::hypot(seen.sd, apart);
+    return doubtful;
   }
   // Something is taken for its end: the picture errs by as much as that.
   if (squared(apart) > squared(kMost_sd) * (of_picture + of_stage)) {
@@ -100,12 +104,13 @@ void TipByStage::learn(const NeedlePose& seen) {
     frames_ = 1;
     return;
   }
-  const double surprise = (off - off_).dot(seen.axis);
   frames_ = std::min(frames_ + 1, kStageMemory);
-  const double expected = variance_ + of_picture;
+  const double expected = variance_ + of_picture, most = kMost_sd * std::sqrt(expected + scatter_);
+  // Something may be taken for the end once: only what stays surprising is learnt.
+  const double whole = (off - off_).dot(seen.axis), surprise = std::clamp(whole, -most, most);
   scatter_ = std::max(0.0, scatter_ + (surprise * surprise - expected - scatter_) / frames_);
   const double gain = variance_ / (expected + scatter_);
-  off_ += gain * (off - off_);
+  off_ += gain * (off - off_ - (whole - surprise) * seen.axis);
   variance_ *= 1 - gain;
 }
 

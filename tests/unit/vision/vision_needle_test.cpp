@@ -12,6 +12,7 @@
 
 #include "vision/image/gradient.hpp"
 #include "vision/pipettes/backdrop.hpp"
+#include "vision/pipettes/faint_wall.hpp"
 #include "vision/pipettes/injection_pipette.hpp"
 
 namespace cone {
@@ -374,6 +375,23 @@ TEST(WideNeedle, lies_between_a_strong_wall_and_a_faint_one) {
       EXPECT_NEAR(seen.tip.x, wide.tip, kTip_px) << other << ' ' << radius;
       EXPECT_NEAR(seen.tip.y, kAxis_y, kAside_px) << other << ' ' << radius;
       EXPECT_NEAR(seen.axis.y, 0, kAxis_y_most) << other << ' ' << radius;
+    }
+  }
+}
+
+// Both faces of one wall look like a thin needle.
+TEST(WideNeedle, is_not_one_of_its_walls) {
+  for (const double radius : {5.0, 6.0}) {
+    const Wide wide{.radius = radius};
+    const GradientField field = draw(wide);
+    for (const double side : {-1.0, 1.0}) {
+      NeedlePose wall;
+      wall.half_width = 2.6;
+      wall.tip = {wide.tip, kAxis_y + side * 0.8 * radius};
+      const auto needle = with_faint_wall(field, kWideNoise, radius, wall);
+      ASSERT_TRUE(needle) << radius << ' ' << side;
+      EXPECT_NEAR(needle->tip.y, kAxis_y, 1) << radius << ' ' << side;
+      EXPECT_NEAR(needle->half_width, radius + 1, 1.5) << radius << ' ' << side;
     }
   }
 }

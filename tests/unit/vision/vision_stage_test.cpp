@@ -105,6 +105,19 @@ TEST_F(StageTip, holds_against_a_picture_that_is_drawn_aside) {
   }
 }
 
+// What crosses the tip in one frame is no sign that the stage scatters.
+TEST_F(StageTip, holds_after_one_frame_that_is_far_off) {
+  approach(20);
+  told_.begin(Point(x_ - 40, 103));
+  const NeedlePose doubtful = told_.most_likely(seen_at({x_ - 9, 100}, 0.25));
+  EXPECT_GT(doubtful.sd, 6) << "one of the two is far off";
+  told_.learn(seen_at({x_ - 9, 100}, 0.25));
+  for (int k = 0; k < 5; ++k) {
+    told_.begin(Point(x_ - 40, 103));
+    EXPECT_NEAR(told_.most_likely(seen_at({x_ + 3, 100}, 0.25)).tip.x, x_, 0.6) << k;
+  }
+}
+
 // 1.5 px from frame to frame: the picture is better where it is clear.
 TEST_F(StageTip, counts_little_where_it_scatters) {
   approach(60, 1.5);

@@ -65,8 +65,10 @@ StageLimits::StageLimits(const LimitParams& limits, const MappingParams& mapping
 void StageLimits::place(const hal::Vec3& tip_m) NONBLOCKING {
   set_point_.tip_m = tip_m;
   clear_m_ = 0;
-  low_here_m_ = low_m_.cwiseMin(tip_m);
-  high_here_m_ = high_m_.cwiseMax(tip_m);
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    low_here_m_[i] = std::min(low_m_[i], tip_m[i]);
+    high_here_m_[i] = std::max(high_m_[i], tip_m[i]);
+  }
   clear_low_m_ = low_here_m_.array() + kAtLimit_m;
   clear_high_m_ = high_here_m_.array() - kAtLimit_m;
 }

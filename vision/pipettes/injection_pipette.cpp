@@ -42,7 +42,7 @@ constexpr double kFollowed_px = 24;                   // and later, of a faint o
 constexpr double kStartKnown_px = 2.5, kUnsharpKnown_px = 1.8, kEndKnown_px = 1.2;
 // Further out of focus the lumen closes, the walls end up to 5 px from where the shape does, and the end is
 // somewhere in 3 px.
-constexpr double kSharp_px = 2.3;
+constexpr double kSharp_px = 2.3, kWallsTell_px = 1.9;
 // So far from where the walls end, a speck ended them: the end is looked for again there, so often.
 constexpr double kFar_px = 5;
 constexpr int kFurther = 8;
@@ -364,7 +364,7 @@ bool InjectionPipette::learn_end_anew(const GradientField& field, double noise) 
   const Point end_by_walls = last_.tip + walls_offset_ * last_.axis;
   learn_shape_anew(field);
   const auto shaft_blur = blur_of_shaft(field, last_, kStartReach_px);
-  walls_tell_ = !shaft_blur || *shaft_blur <= kSharp_px;
+  walls_tell_ = !shaft_blur || *shaft_blur <= kWallsTell_px;
   walls_agree_ = walls_tell_ && std::abs((end_by_walls - last_.tip).dot(last_.axis)) <= kSameEnd_px;
   if (walls_agree_) {
     last_.tip = end_by_walls;

@@ -40,8 +40,8 @@ constexpr double kFollowed_px = 24;                   // and later, of a faint o
 // an end from which more is learnt later. A tip that is less certain does more harm than one that is not
 // claimed: membranes are then taken for pushed that are free.
 constexpr double kStartKnown_px = 2.5, kUnsharpKnown_px = 1.8, kEndKnown_px = 1.2;
-// Further out of focus the lumen closes, the walls end up to 5 px from where the shape does, and the end is
-// somewhere in 3 px.
+// Further out of focus the lumen closes, and the end is somewhere in 3 px; the walls end up to 5 px from
+// where the shape does, at a blur of the shaft that looks like the second.
 constexpr double kSharp_px = 2.3, kWallsTell_px = 1.9;
 // So far from where the walls end, a speck ended them: the end is looked for again there, so often.
 constexpr double kFar_px = 5;

@@ -358,8 +358,10 @@ void Tracker::Impl::locate_needle() {
   seen_needle = n;
   wall_px = 0;
   const auto tip_told = by_stage.tip();
-  seen_needle.ok = n.ok =
-      n.ok && !(tip_told && needle.goes_on_to(picture.field, picture.noise, n, *tip_told));
+  if (n.ok && tip_told && needle.goes_on_to(picture.field, picture.noise, n, *tip_told)) {
+    n.ok = seen_needle.ok = false;
+    n.reason = "a speck looks like its end";
+  }
   if (tip_told && !n.ok) {
     n = needle.by_shaft(picture.field, picture.noise, *tip_told).value_or(n);
     n.sd = by_stage.sd();

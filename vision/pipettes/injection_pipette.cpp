@@ -372,10 +372,6 @@ bool InjectionPipette::learn_end_anew(const GradientField& field, double noise) 
   glass_ahead_ = glass_scatter_ = glass_blur_ = 0;
   glass_frames_ = 0;
   lumen_ = last_.half_width >= kLumen_px;
-  if (!lumen_) {  // once, for the memory that it takes
-    thin_end_.add(field, last_);
-    (void)thin_end_.end(noise);
-  }
   thin_end_.forget();
   const auto known = [&](const CutGlass& cut) {
     return cut.end.blur <= kMostBlur_px &&
@@ -683,11 +679,11 @@ void InjectionPipette::learn_glass(const GradientField& field, double noise, Nee
 
 void InjectionPipette::learn_thin_end(const GradientField& field, double noise, const NeedlePose& followed) {
   constexpr int kFrames = 96, kTogether = 8;
-  if (thin_end_.frames() >= kFrames) {
+  if (thin_end_.frames() >= kFrames || !thin_end_.add(field, followed) ||
+      thin_end_.frames() % kTogether != 0) {
     return;
   }
-  thin_end_.add(field, followed);
-  if (const auto end = thin_end_.frames() % kTogether == 0 ? thin_end_.end(noise) : std::nullopt) {
+  if (const auto end = thin_end_.end(noise)) {
     glass_ahead_ = end->ahead;
     glass_scatter_ = end->sd * end->sd;
     glass_blur_ = end->blur;

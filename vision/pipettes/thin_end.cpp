@@ -43,7 +43,7 @@ double gain(const Products& p, double line) {
 
 }  // namespace
 
-void ThinEnd::add(const GradientField& field, const NeedlePose& followed) {
+bool ThinEnd::add(const GradientField& field, const NeedlePose& followed) {
   if (frames_ == 0) {
     half_width_ = followed.half_width;
     taken_.assign(kRows, 0.0);
@@ -53,7 +53,7 @@ void ThinEnd::add(const GradientField& field, const NeedlePose& followed) {
   for (const double s : {kFirst_px, kFirst_px + kRow_px * (kRows - 1)}) {
     for (const int i : {-outer, outer}) {
       if (!field.shows(followed.at(s, i * kLane_px))) {
-        return;
+        return false;
       }
     }
   }
@@ -67,6 +67,7 @@ void ThinEnd::add(const GradientField& field, const NeedlePose& followed) {
     const double taken = kLane_px * (inside - beside * (2 * inner + 1) / (2.0 * (outer - inner)));
     taken_[j] += part * (taken - taken_[j]);
   }
+  return true;
 }
 
 std::optional<GlassEnd> ThinEnd::end(double noise) const {

@@ -15,9 +15,8 @@ namespace punctum::vision {
 class ThinEnd {
  public:
   void forget() { frames_ = 0; }
-  // One more frame with nothing near the end that is followed. What lies at the border of the picture tells
-  // nothing.
-  void add(const GradientField& field, const NeedlePose& followed);
+  // One more frame with nothing near the end that is followed. False, and none, at the border of the picture.
+  bool add(const GradientField& field, const NeedlePose& followed);
   [[nodiscard]] int frames() const noexcept { return frames_; }
   // The outermost glass, from the end that is followed. noise: grey levels, of a frame. Empty where that is
   // not certain to 0.45 px.

@@ -33,12 +33,15 @@ constexpr int kNeedleAtOnce = 6, kNeedleEvery = 8;  // likewise for the needle, 
 constexpr int kFirstDoubt = 5;  // frames without the inner membrane; after twice as many again, and so on
 constexpr double kNeedleMargin_px = 2.5;  // the blur reaches so far beyond the needle's edges
 constexpr double kUntouched_px = 12;      // further outside, nothing touches the tip
+constexpr double kLearnt_px = 10;         // further outside, the needle looks as it does without a cell
 constexpr double kLeastDimple_px = 0.7;   // depth from which the width of a dimple can be measured
 constexpr double kNear_px = 8;            // nearer, the needle may touch the membrane
 constexpr double kClear_px = 3;           // further away, it does not: its blur ends before
 constexpr double kContactPoint_px = 0.7;  // standard deviation of a membrane on the needle's side
 constexpr double kHaloAhead_px = 1;       // by which the tip is seen too far ahead in a halo
 constexpr double kAtMembrane_px = 0.6, kInside_px = 1.5;  // to which the picture alone shows the tip there
+constexpr double kUsualBlur_px = 1.3;                     // of a membrane in focus
+constexpr double kDrawn_px = 3.5;  // a membrane twice as blurred draws the end of the needle ahead by so much
 // The paper keeps the large variations of the gradient only. Of the usual edge of a membrane: with 0.4 needle
 // and cell merge when they are still 4 px apart, with 0.75 they part again over a deep dimple.
 constexpr double kLargeGradient = 0.6;
@@ -123,6 +126,8 @@ struct Tracker::Impl {
 
   // A needle that was seen before and is not seen now may be anywhere: it tells neither contact nor its end.
   [[nodiscard]] bool needle_hidden() const { return needle.started() && !result.needle.ok; }
+  // The outer membrane is so many times as blurred as in focus.
+  [[nodiscard]] double unsharp() const { return std::max(1.0, outer.edge.own_blur_px / kUsualBlur_px); }
   // It touches the membrane, or will by its speed.
   [[nodiscard]] bool at_membrane() const { return !punctured && (was_contact || touches_next); }
   // No needle that is not seen has dented the outer membrane, and so none has reached the inner one.
@@ -349,12 +354,14 @@ void Tracker::Impl::locate_needle() {
   n = search_needle() ? needle.as_found(picture.noise)
                       : needle.find(picture.field, picture.noise, by_stage.moved());
   if (config.method == Method::tracker && n.ok && at_membrane() && outer.known) {
-    n.tip += tip_on_membrane.ahead(picture.field, picture.noise, n).value_or(0) * n.axis;
+    const auto on = tip_on_membrane.ahead(picture.field, picture.noise, kUsualBlur_px * unsharp(), n);
+    n.tip += (on ? on->ahead : 0) * n.axis;
+    n.sd = math::hypot(n.sd, on ? on->sd : kDrawn_px * (unsharp() - 1));
   }
   // Ahead of a tip that touches it, a halo is brighter than what the end of the needle is told by.
   seen_tip_sd_px = math::hypot(n.sd, at_membrane() && outer.edge.halo ? kHaloAhead_px : 0);
   // A membrane on the tip draws its end aside, granules round it by several pixels.
-  n.sd = math::hypot(n.sd, punctured ? kInside_px : at_membrane() ? kAtMembrane_px : 0);
+  n.sd = math::hypot(n.sd, punctured ? kInside_px : at_membrane() ? kAtMembrane_px * unsharp() : 0);
   seen_needle = n;
   wall_px = 0;
   const auto tip_told = by_stage.tip();
@@ -381,7 +388,7 @@ void Tracker::Impl::learn_needle() {
   if (!seen_needle.ok || result.contact) {
     return;
   }
-  if (!result.gap_px || *result.gap_px > kUntouched_px) {
+  if (!result.gap_px || *result.gap_px > kLearnt_px) {
     needle.learn(picture.field, seen_needle, picture.noise);
   }
   if (!result.gap_px || *result.gap_px > TipOnMembrane::kClearAhead_px) {
@@ -391,7 +398,7 @@ void Tracker::Impl::learn_needle() {
       return;
     }
   }
-  if (result.gap_px && *result.gap_px > TipOnMembrane::kClearAhead_px) {
+  if (result.gap_px && *result.gap_px > TipOnMembrane::kClearAhead_px * unsharp()) {
     tip_on_membrane.learn(picture.field, result.needle);
   }
 }

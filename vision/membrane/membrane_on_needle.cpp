@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <numbers>
 
+#include "hal/math/elementary.hpp"
 #include "vision/image/blurred_step.hpp"
 #include "vision/image/parabola.hpp"
 #include "vision/membrane/undeformed.hpp"
@@ -119,13 +120,12 @@ void TipOnMembrane::learn(const GradientField& field, const NeedlePose& needle) 
 }
 
 // For every place of the tip the picture is compared with the learnt grey there, a step of any height at the
-// tip, and a level.
-std::optional<double> TipOnMembrane::ahead(const GradientField& field, double noise,
-                                           const NeedlePose& needle) const {
-  constexpr double kReach_px = 5;             // by which the tip may be wrong
-  constexpr double kFrom_px = 8, kTo_px = 3;  // of the tip: what is compared
-  constexpr double kBlur_px = 1.6;            // of a usual picture, smoothed
-  constexpr double kCertain_px = 0.7;         // standard deviation of a place that counts
+// tip, and a level. Where the picture tells little, what the pose says counts.
+std::optional<TipOnMembrane::Tip> TipOnMembrane::ahead(const GradientField& field, double noise,
+                                                       double blur_px, const NeedlePose& needle) const {
+  constexpr double kReach_px = 5, kDrawn_px = 3;  // by which the tip may be wrong: at most, and deviation
+  constexpr double kFrom_px = 8, kTo_px = 3;      // of the tip: what is compared
+  constexpr double kRounded = 0.3;                // grey levels, standard deviation of whole ones
   constexpr int kPlacesSeen = static_cast<int>((kFrom_px + kTo_px + 2 * kReach_px) / kStep_px) + 1;
   if (frames_ == 0) {
     return std::nullopt;
@@ -141,35 +141,42 @@ std::optional<double> TipOnMembrane::ahead(const GradientField& field, double no
   constexpr int kTips = static_cast<int>(2 * kReach_px / kStep_px) + 1;
   constexpr int kCompared = static_cast<int>((kFrom_px + kTo_px) / kStep_px) + 1;
   constexpr int kLearntFrom = static_cast<int>((kBack_px - kFrom_px) / kStep_px);
-  std::array<double, static_cast<std::size_t>(kTips)> square{};
+  const double blur = math::hypot(blur_px, field.sigma);
+  // Samples that are nearer than the smoothing tell the same.
+  const double grey = std::max(noise, kRounded), variance = grey * grey * kNoiseShare * kJoined_px / kStep_px;
+  std::array<double, static_cast<std::size_t>(kTips)> unlikely{};  // -2 times the log-likelihood
+  std::array<double, static_cast<std::size_t>(kCompared)> step{};
+  double s = 0, ss = 0;
+  for (int i = 0; i < kCompared; ++i) {
+    const double place = i * kStep_px - kFrom_px;  // ahead of the tip
+    const double here = step[static_cast<std::size_t>(i)] =
+        0.5 * blurred_step(place / (std::numbers::sqrt2 * blur));
+    s += here;
+    ss += here * here;
+  }
+  constexpr double n = kCompared;
   for (int t = 0; t < kTips; ++t) {  // the tip lies t steps ahead of the range's back end
-    double n = 0, s = 0, ss = 0, d = 0, sd = 0, dd = 0;
+    double d = 0, sd = 0, dd = 0;
     for (int i = 0; i < kCompared; ++i) {
-      const double place = i * kStep_px - kFrom_px;  // ahead of the tip
-      const double step = 0.5 * blurred_step(place / (std::numbers::sqrt2 * kBlur_px));
       const double rest =
           seen[static_cast<std::size_t>(t + i)] - grey_[static_cast<std::size_t>(kLearntFrom + i)];
-      n += 1;
-      s += step;
-      ss += step * step;
       d += rest;
-      sd += step * rest;
+      sd += step[static_cast<std::size_t>(i)] * rest;
       dd += rest * rest;
     }
-    const double height = (sd - s * d / n) / (ss - s * s / n);
-    square[static_cast<std::size_t>(t)] = dd - d * d / n - height * (sd - s * d / n);
+    const double height = (sd - s * d / n) / (ss - s * s / n), off = (t * kStep_px - kReach_px) / kDrawn_px;
+    unlikely[static_cast<std::size_t>(t)] =
+        (dd - d * d / n - height * (sd - s * d / n)) / variance + off * off;
   }
-  const auto best = std::min_element(square.begin() + 1, square.end() - 1);
-  const auto i = static_cast<std::size_t>(best - square.begin());
-  // Samples that are nearer than the smoothing tell the same.
-  const double variance = noise * noise * kNoiseShare * kJoined_px / kStep_px;
-  const double curvature = (square[i - 1] - 2 * *best + square[i + 1]) / (kStep_px * kStep_px);
-  if (*best > square[i - 1] || *best > square[i + 1] ||
-      2 * variance > kCertain_px * kCertain_px * curvature) {
+  const auto best = std::min_element(unlikely.begin() + 1, unlikely.end() - 1);
+  const auto i = static_cast<std::size_t>(best - unlikely.begin());
+  const double curvature = (unlikely[i - 1] - 2 * *best + unlikely[i + 1]) / (kStep_px * kStep_px);
+  if (*best > unlikely[i - 1] || *best > unlikely[i + 1] || curvature <= 0) {
     return std::nullopt;
   }
-  return (static_cast<double>(i) + vertex_offset(-square[i - 1], -*best, -square[i + 1])) * kStep_px -
-         kReach_px;
+  return Tip{(static_cast<double>(i) + vertex_offset(-unlikely[i - 1], -*best, -unlikely[i + 1])) * kStep_px -
+                 kReach_px,
+             std::sqrt(2 / curvature)};
 }
 
 }  // namespace punctum::vision

@@ -35,10 +35,14 @@ class TipOnMembrane {
   static constexpr double kClearAhead_px = 5.5;
   void learn(const GradientField& field, const NeedlePose& needle);
 
-  // px from the tip of the pose to the outermost glass. Empty before anything was learnt, or where the
-  // picture shows no place that is clearly better than the others. noise: grey levels.
-  [[nodiscard]] std::optional<double> ahead(const GradientField& field, double noise,
-                                            const NeedlePose& needle) const;
+  struct Tip {
+    double ahead;  // of the tip of the pose: the outermost glass, px
+    double sd;     // px
+  };
+  // Empty before anything was learnt, or where the tip lies far from where the pose has it. noise: grey
+  // levels. blur_px: of the membrane.
+  [[nodiscard]] std::optional<Tip> ahead(const GradientField& field, double noise, double blur_px,
+                                         const NeedlePose& needle) const;
 
  private:
   static constexpr double kStep_px = 0.25, kBack_px = 12, kAhead_px = 4;

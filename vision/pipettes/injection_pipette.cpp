@@ -6,6 +6,7 @@
 #include <iterator>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <utility>
 
 #include "hal/math/elementary.hpp"
 #include "vision/image/correlation.hpp"
@@ -371,6 +372,7 @@ bool InjectionPipette::learn_end_anew(const GradientField& field, double noise) 
   }
   glass_ahead_ = glass_scatter_ = glass_blur_ = 0;
   glass_frames_ = 0;
+  followed_ = false;
   lumen_ = last_.half_width >= kLumen_px;
   thin_end_.forget();
   const auto known = [&](const CutGlass& cut) {
@@ -394,21 +396,24 @@ bool InjectionPipette::learn_end_anew(const GradientField& field, double noise) 
   return known({*end, bevel_});
 }
 
+// The glass and its cut, with the blur of the shaft.
+std::optional<CutGlass> InjectionPipette::cut_seen(const GradientField& field, double noise,
+                                                   const NeedlePose& needle) {
+  const auto blur = blur_of_shaft(field, needle, kStartReach_px);
+  return blur && *blur < kMostBlur_px
+             ? cut_of_glass(field, noise, needle, *blur, kStartReach_px, kStartReach_px)
+             : std::nullopt;
+}
+
 // How the needle is cut, and how far ahead the glass ends. It is put where they are when that is far from the
 // end of the walls.
 std::optional<CutGlass> InjectionPipette::go_to_cut(const GradientField& field, double noise) {
   NeedlePose needle = last_;
-  const auto cut_there = [&] {
-    const auto blur = blur_of_shaft(field, needle, kStartReach_px);
-    return blur && *blur < kMostBlur_px
-               ? cut_of_glass(field, noise, needle, *blur, kStartReach_px, kStartReach_px)
-               : std::nullopt;
-  };
-  auto cut = cut_there();
+  auto cut = cut_seen(field, noise, needle);
   bool further = false;
   for (int round = 0; round < kFurther && cut && std::abs(cut->end.ahead) > kFar_px; ++round) {
     needle.tip += cut->end.ahead * needle.axis;
-    cut = cut_there();
+    cut = cut_seen(field, noise, needle);
     further = true;
   }
   if (!cut || cut->end.sd > kStartKnown_px) {
@@ -455,7 +460,9 @@ double InjectionPipette::tip_sd(double noise) const {
   constexpr double kPerBlur = 0.8;
   const double of_frame =
       (kUsualFrames * usual * usual + glass_frames_ * glass_scatter_) / (kUsualFrames + glass_frames_);
-  const double unsharp = kPerBlur * std::max(0.0, glass_blur_ - kSharp_px);
+  constexpr double kUnsettled_px = 2;  // the shape fits best so far ahead of where it was learnt
+  const bool settled = walls_tell_ || glass_frames_ > 0 || !followed_;
+  const double unsharp = settled ? kPerBlur * std::max(0.0, glass_blur_ - kSharp_px) : kUnsettled_px;
   return std::sqrt(of_frame * (1 + 1.0 / std::max(glass_frames_, 1)) + unsharp * unsharp);
 }
 
@@ -560,6 +567,9 @@ NeedlePose InjectionPipette::follow(const GradientField& field, double noise) {
     return needle;
   }
   jumps_ = 0;
+  if (!std::exchange(followed_, true) && !walls_tell_) {
+    glass_frames_ = 0;  // at the start the shape lay where it was learnt, not where it fits best
+  }
   needle.ok = true;
   velocity_ = lost_ == 0 ? needle.tip - last_.tip : Point();
   lost_ = 0;
@@ -671,7 +681,12 @@ void InjectionPipette::learn_glass(const GradientField& field, double noise, Nee
     return;
   }
   followed.tip += glass_ahead_ * followed.axis;
-  const auto end = end_of_glass(field, noise, followed, bevel_.tangent, kGlassReach_px, kGlassReach_px);
+  std::optional<GlassEnd> end;
+  if (walls_tell_) {
+    end = end_of_glass(field, noise, followed, bevel_.tangent, kGlassReach_px, kGlassReach_px);
+  } else if (const auto cut = cut_seen(field, noise, followed)) {
+    end = cut->end;
+  }
   if (end && end->sd < kEndKnown_px) {
     learn_glass(*end);
   }
@@ -701,7 +716,9 @@ void InjectionPipette::learn_glass(const GlassEnd& end) {
 }
 
 void InjectionPipette::learn(const GradientField& field, const NeedlePose& needle, double noise) {
-  if (!needle.ok || template_.empty() || view_.blur > 0) {
+  // The shape of few frames is rough, and fits a little better when it is blurred.
+  constexpr double kRough_px = 0.8;
+  if (!needle.ok || template_.empty() || NeedleShape::blur_px(view_) > (walls_tell_ ? 0 : kRough_px)) {
     return;
   }
   NeedlePose followed = needle;

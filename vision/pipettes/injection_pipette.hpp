@@ -80,6 +80,8 @@ class InjectionPipette {
   [[nodiscard]] bool find_end(const GradientField& field, double noise, NeedlePose& needle, bool& near);
   void calibrate_walls(const GradientField& field, const NeedlePose& walls, double noise);
   void learn_shape_anew(const GradientField& field);
+  [[nodiscard]] static std::optional<CutGlass> cut_seen(const GradientField& field, double noise,
+                                                        const NeedlePose& needle);
   [[nodiscard]] std::optional<CutGlass> go_to_cut(const GradientField& field, double noise);
   void learn_glass(const GradientField& field, double noise, NeedlePose followed);
   void learn_glass(const GlassEnd& end);
@@ -128,6 +130,7 @@ class InjectionPipette {
   Bevel bevel_;               // of its end, as it was found
   double glass_ahead_ = 0;    // of the end that is followed: the outermost glass, px
   int glass_frames_ = 0;      // that it was learnt from
+  bool followed_ = false;     // since it was found
   double glass_scatter_ = 0;  // variance of where the end that is followed seems to be from it, px^2
   double glass_blur_ = 0;     // px
   ThinEnd thin_end_;          // tells the same of a needle whose lumen is not seen

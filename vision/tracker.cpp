@@ -41,7 +41,9 @@ constexpr double kContactPoint_px = 0.7;  // standard deviation of a membrane on
 constexpr double kHaloAhead_px = 1;       // by which the tip is seen too far ahead in a halo
 constexpr double kAtMembrane_px = 0.6, kInside_px = 1.5;  // to which the picture alone shows the tip there
 constexpr double kUsualBlur_px = 1.3;                     // of a membrane in focus
-constexpr double kDrawn_px = 3.5;  // a membrane twice as blurred draws the end of the needle ahead by so much
+// By which it draws the end of the needle ahead: what is seen and put right; and where that is not seen, for
+// each time that it is more blurred.
+constexpr double kDrawn_px = 1.5, kDrawnBlurred_px = 3.5;
 // The paper keeps the large variations of the gradient only. Of the usual edge of a membrane: with 0.4 needle
 // and cell merge when they are still 4 px apart, with 0.75 they part again over a deep dimple.
 constexpr double kLargeGradient = 0.6;
@@ -355,8 +357,13 @@ void Tracker::Impl::locate_needle() {
                       : needle.find(picture.field, picture.noise, by_stage.moved());
   if (config.method == Method::tracker && n.ok && at_membrane() && outer.known) {
     const auto on = tip_on_membrane.ahead(picture.field, picture.noise, kUsualBlur_px * unsharp(), n);
-    n.tip += (on ? on->ahead : 0) * n.axis;
-    n.sd = math::hypot(n.sd, on ? on->sd : kDrawn_px * (unsharp() - 1));
+    if (on) {
+      n.tip += on->ahead * n.axis;
+      const double surprising = std::max(0.0, std::abs(on->ahead) - kDrawn_px * unsharp());
+      n.sd = math::hypot(math::hypot(n.sd, on->sd), surprising);
+    } else {
+      n.sd = math::hypot(n.sd, kDrawnBlurred_px * (unsharp() - 1));
+    }
   }
   // Ahead of a tip that touches it, a halo is brighter than what the end of the needle is told by.
   seen_tip_sd_px = math::hypot(n.sd, at_membrane() && outer.edge.halo ? kHaloAhead_px : 0);

@@ -33,7 +33,8 @@ constexpr int kNeedleAtOnce = 6, kNeedleEvery = 8;  // likewise for the needle, 
 constexpr int kFirstDoubt = 5;  // frames without the inner membrane; after twice as many again, and so on
 constexpr double kNeedleMargin_px = 2.5;  // the blur reaches so far beyond the needle's edges
 constexpr double kUntouched_px = 12;      // further outside, nothing touches the tip
-constexpr double kLearnt_px = 10;         // further outside, the needle looks as it does without a cell
+// Further outside, the end of the needle shows beside the membrane, and all of it as it does without a cell.
+constexpr double kEndShows_px = 2, kAlone_px = 10;
 constexpr double kLeastDimple_px = 0.7;   // depth from which the width of a dimple can be measured
 constexpr double kNear_px = 8;            // nearer, the needle may touch the membrane
 constexpr double kClear_px = 3;           // further away, it does not: its blur ends before
@@ -395,8 +396,8 @@ void Tracker::Impl::learn_needle() {
   if (!seen_needle.ok || result.contact) {
     return;
   }
-  if (!result.gap_px || *result.gap_px > kLearnt_px) {
-    needle.learn(picture.field, seen_needle, picture.noise);
+  if (!result.gap_px || *result.gap_px > kEndShows_px) {
+    needle.learn(picture.field, seen_needle, picture.noise, !result.gap_px || *result.gap_px > kAlone_px);
   }
   if (!result.gap_px || *result.gap_px > TipOnMembrane::kClearAhead_px) {
     by_stage.learn(seen_needle);
@@ -405,7 +406,7 @@ void Tracker::Impl::learn_needle() {
       return;
     }
   }
-  if (result.gap_px && *result.gap_px > TipOnMembrane::kClearAhead_px * unsharp()) {
+  if (result.gap_px && *result.gap_px > TipOnMembrane::kClearAhead_px) {
     tip_on_membrane.learn(picture.field, result.needle);
   }
 }

@@ -715,7 +715,7 @@ void InjectionPipette::learn_glass(const GlassEnd& end) {
   glass_blur_ += part * (end.blur - glass_blur_);
 }
 
-void InjectionPipette::learn(const GradientField& field, const NeedlePose& needle, double noise) {
+void InjectionPipette::learn(const GradientField& field, const NeedlePose& needle, double noise, bool alone) {
   // The shape of few frames is rough, and fits a little better when it is blurred.
   constexpr double kRough_px = 0.8;
   if (!needle.ok || template_.empty() || NeedleShape::blur_px(view_) > (walls_tell_ ? 0 : kRough_px)) {
@@ -723,7 +723,12 @@ void InjectionPipette::learn(const GradientField& field, const NeedlePose& needl
   }
   NeedlePose followed = needle;
   followed.tip -= glass_ahead_ * needle.axis;
-  learn_glass(field, noise, followed);
+  if (alone || !walls_tell_) {
+    learn_glass(field, noise, followed);
+  }
+  if (!alone) {
+    return;
+  }
   NeedlePose origin = followed;
   if (walls_agree_) {
     origin.tip = followed.tip - walls_offset_ * needle.axis;

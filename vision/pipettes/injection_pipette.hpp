@@ -54,8 +54,9 @@ class InjectionPipette {
   // Its shaft is seen behind a tip that is known otherwise; its axis and width are then as seen.
   [[nodiscard]] std::optional<NeedlePose> by_shaft(const GradientField& field, double noise,
                                                    const Point& tip);
-  // Lets the template of the tip follow slow changes of focus and light. Only while nothing touches the tip.
-  void learn(const GradientField& field, const NeedlePose& needle, double noise);
+  // Lets the template of the tip follow slow changes of focus and light. Only while nothing touches the tip;
+  // not alone: something lies near it, and out of focus only tells where the glass ends.
+  void learn(const GradientField& field, const NeedlePose& needle, double noise, bool alone = true);
 
   [[nodiscard]] bool started() const noexcept { return started_; }
   // Walls and what lies between them were told apart at the start.

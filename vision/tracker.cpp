@@ -39,9 +39,7 @@ constexpr double kLeastDimple_px = 0.7;   // depth from which the width of a dim
 constexpr double kNear_px = 8;            // nearer, the needle may touch the membrane
 constexpr double kClear_px = 3;           // further away, it does not: its blur ends before
 constexpr double kContactPoint_px = 0.7;  // standard deviation of a membrane on the needle's side
-constexpr double kHaloAhead_px = 1;       // by which the tip is seen too far ahead in a halo
 constexpr double kAtMembrane_px = 0.6, kInside_px = 1.5;  // to which the picture alone shows the tip there
-constexpr double kUsualBlur_px = 1.3;                     // of a membrane in focus
 // By which it draws the end of the needle ahead: what is seen and put right; and where that is not seen, for
 // each time that it is more blurred.
 constexpr double kDrawn_px = 1.5, kDrawnBlurred_px = 3.5;
@@ -130,7 +128,9 @@ struct Tracker::Impl {
   // A needle that was seen before and is not seen now may be anywhere: it tells neither contact nor its end.
   [[nodiscard]] bool needle_hidden() const { return needle.started() && !result.needle.ok; }
   // The outer membrane is so many times as blurred as in focus.
-  [[nodiscard]] double unsharp() const { return std::max(1.0, outer.edge.own_blur_px / kUsualBlur_px); }
+  [[nodiscard]] double unsharp() const {
+    return std::max(1.0, outer.edge.own_blur_px / TipOnMembrane::kUsualBlur_px);
+  }
   // It touches the membrane, or will by its speed.
   [[nodiscard]] bool at_membrane() const { return !punctured && (was_contact || touches_next); }
   // No needle that is not seen has dented the outer membrane, and so none has reached the inner one.
@@ -357,7 +357,7 @@ void Tracker::Impl::locate_needle() {
   n = search_needle() ? needle.as_found(picture.noise)
                       : needle.find(picture.field, picture.noise, by_stage.moved());
   if (config.method == Method::tracker && n.ok && at_membrane() && outer.known) {
-    const auto on = tip_on_membrane.ahead(picture.field, picture.noise, kUsualBlur_px * unsharp(), n);
+    const auto on = tip_on_membrane.ahead(picture.field, picture.noise, outer.edge, n);
     if (on) {
       n.tip += on->ahead * n.axis;
       const double surprising = std::max(0.0, std::abs(on->ahead) - kDrawn_px * unsharp());
@@ -366,8 +366,7 @@ void Tracker::Impl::locate_needle() {
       n.sd = math::hypot(n.sd, kDrawnBlurred_px * (unsharp() - 1));
     }
   }
-  // Ahead of a tip that touches it, a halo is brighter than what the end of the needle is told by.
-  seen_tip_sd_px = math::hypot(n.sd, at_membrane() && outer.edge.halo ? kHaloAhead_px : 0);
+  seen_tip_sd_px = n.sd;
   // A membrane on the tip draws its end aside, granules round it by several pixels.
   n.sd = math::hypot(n.sd, punctured ? kInside_px : at_membrane() ? kAtMembrane_px * unsharp() : 0);
   seen_needle = n;

@@ -213,7 +213,8 @@ void CommonShape::learn(EdgeLearnt& learnt) {
     weight += w;
   }
   pad(shape_, padded_, padded_slope_);
-  move_shape(weight > 0 ? at / weight : 0, 0);
+  learnt.face = weight > 0 ? at / weight : 0;
+  move_shape(learnt.face, 0);
   learnt.shape.assign(moved_shape_.begin(), moved_shape_.end());
   learnt.spread = spread_;
 }

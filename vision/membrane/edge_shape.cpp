@@ -88,12 +88,22 @@ std::optional<SeenOutline> shaped_once(const ClearedPicture& picture, const Cont
   }
   learnt.halo = steps->halo;
   learnt.steps = steps->unknowns;
+  learnt.inside = edge.inside;
+  learnt.face += steps->own;
   const double blurred = edge.per_blur * std::max(0.0, steps->blur_px - kFocus_px);
   return outline(base, profiles, common, steps->own, math::hypot(steps->halo ? kHalo_px : 0, blurred),
                  picture.noise, learnt);
 }
 
 }  // namespace
+
+double grey_beside_face(const EdgeLearnt& edge, double outside_px) {
+  const double last = static_cast<double>(edge.shape.size() - 1),
+               at = std::clamp((edge.inside + edge.face + outside_px) / EdgeProfiles::kStep_px, 0.0, last);
+  const auto i = static_cast<std::size_t>(std::min(at, last - 1));
+  return edge.shape[i] + (at - static_cast<double>(i)) * (edge.shape[i + 1] - edge.shape[i]) -
+         edge.shape.back();
+}
 
 std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Contour& contour,
                                        const Vector<double>& soft, const EdgeShape& edge,

@@ -119,10 +119,11 @@ void TipOnMembrane::learn(const GradientField& field, const NeedlePose& needle) 
   }
 }
 
-// For every place of the tip the picture is compared with the learnt grey there, a step of any height at the
-// tip, and a level. Where the picture tells little, what the pose says counts.
+// For every place of the tip the picture is compared with the learnt grey there, the membrane of any contrast
+// at the tip, and a level. Where the picture tells little, what the pose says counts.
 std::optional<TipOnMembrane::Tip> TipOnMembrane::ahead(const GradientField& field, double noise,
-                                                       double blur_px, const NeedlePose& needle) const {
+                                                       const EdgeLearnt& membrane,
+                                                       const NeedlePose& needle) const {
   constexpr double kReach_px = 5, kDrawn_px = 3;  // by which the tip may be wrong: at most, and deviation
   constexpr double kFrom_px = 8, kTo_px = 3;      // of the tip: what is compared
   constexpr double kRounded = 0.3;                // grey levels, standard deviation of whole ones
@@ -141,7 +142,7 @@ std::optional<TipOnMembrane::Tip> TipOnMembrane::ahead(const GradientField& fiel
   constexpr int kTips = static_cast<int>(2 * kReach_px / kStep_px) + 1;
   constexpr int kCompared = static_cast<int>((kFrom_px + kTo_px) / kStep_px) + 1;
   constexpr int kLearntFrom = static_cast<int>((kBack_px - kFrom_px) / kStep_px);
-  const double blur = math::hypot(blur_px, field.sigma);
+  const double blur = math::hypot(std::max(membrane.own_blur_px, kUsualBlur_px), field.sigma);
   // Samples that are nearer than the smoothing tell the same.
   const double grey = std::max(noise, kRounded), variance = grey * grey * kNoiseShare * kJoined_px / kStep_px;
   std::array<double, static_cast<std::size_t>(kTips)> unlikely{};  // -2 times the log-likelihood
@@ -150,7 +151,8 @@ std::optional<TipOnMembrane::Tip> TipOnMembrane::ahead(const GradientField& fiel
   for (int i = 0; i < kCompared; ++i) {
     const double place = i * kStep_px - kFrom_px;  // ahead of the tip
     const double here = step[static_cast<std::size_t>(i)] =
-        0.5 * blurred_step(place / (std::numbers::sqrt2 * blur));
+        membrane.shape.empty() ? 0.5 * blurred_step(place / (std::numbers::sqrt2 * blur))
+                               : grey_beside_face(membrane, -place);
     s += here;
     ss += here * here;
   }

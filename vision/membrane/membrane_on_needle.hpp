@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "vision/membrane/cleared_picture.hpp"
+#include "vision/membrane/edge_shape.hpp"
 
 namespace punctum::vision {
 
@@ -27,21 +28,22 @@ struct MembraneOnNeedle {
                                                   const Contour& outer, Polarity polarity, double level);
 
 // While the needle pushes, the membrane lies on its end and blurs into the ends of the walls. Across the
-// mouth of the lumen both are seen: the needle's end as it looked with nothing ahead of it, and the membrane
-// as a step of grey at the outermost glass.
+// mouth of the lumen both are seen: the needle's end as it looked with nothing ahead of it, and at the
+// outermost glass the membrane as it looks round the cell, with its halo and its inner face.
 class TipOnMembrane {
  public:
   // With nothing within kClearAhead_px ahead of the tip.
   static constexpr double kClearAhead_px = 5.5;
   void learn(const GradientField& field, const NeedlePose& needle);
 
+  static constexpr double kUsualBlur_px = 1.3;  // of a membrane in focus
   struct Tip {
     double ahead;  // of the tip of the pose: the outermost glass, px
     double sd;     // px
   };
   // Empty before anything was learnt, or where the tip lies far from where the pose has it. noise: grey
-  // levels. blur_px: of the membrane.
-  [[nodiscard]] std::optional<Tip> ahead(const GradientField& field, double noise, double blur_px,
+  // levels. membrane: where its shape is not known, it is a step.
+  [[nodiscard]] std::optional<Tip> ahead(const GradientField& field, double noise, const EdgeLearnt& membrane,
                                          const NeedlePose& needle) const;
 
  private:

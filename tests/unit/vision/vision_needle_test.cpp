@@ -302,6 +302,7 @@ struct Wide {
   double other_wall = 1;  // grey levels of the upper wall, over those of the lower one
   bool closed = false;    // by a line of glass across the lumen
   double membrane = 0;    // that the tip touches: dark ahead of it, grey levels
+  double halo = 0;        // of that membrane: bright 1.5 px outside, grey levels
   double lump_px = 0;     // dark, over all of the shaft, behind the tip
   double fringes = 0;     // bright, beside the needle, grey levels
   double blur_px = 1.1;
@@ -310,6 +311,8 @@ struct Wide {
 };
 
 constexpr double kWideRadius = 5, kWideNoise = 5;
+
+constexpr double kHalo_px = 1.5;
 
 GradientField draw(const Wide& wide, unsigned seed = 2000) {
   constexpr double kLumen = 0.72, kWidens = 0.02, kWall_grey = 46, kLumen_grey = -6;
@@ -339,6 +342,7 @@ GradientField draw(const Wide& wide, unsigned seed = 2000) {
           dark = kLump_grey;
         }
         dark += s < 0 ? wide.membrane : 0;
+        dark -= wide.halo * std::exp(-0.5 * (s - kHalo_px) * (s - kHalo_px));
         m.at<float>(y, x) -= static_cast<float>(dark / (kFine * kFine));
       }
     }
@@ -483,31 +487,52 @@ NeedlePose pose_at(const Point& tip) {
   return pose;
 }
 
-// A pose that is drawn aside by a membrane on the tip is put right, in focus and out of it.
+// A membrane as it looks all round the cell: blurred, with a halo. Without one a step of its blur says the
+// same.
+EdgeLearnt membrane_of(const Wide& wide, double smoothed_px) {
+  constexpr double kStep_px = 0.5, kOutside_px = 6;
+  EdgeLearnt out;
+  out.own_blur_px = wide.blur_px;
+  if (wide.halo > 0) {
+    out.inside = 8;
+    const double step = std::hypot(wide.blur_px, smoothed_px), line = std::hypot(1, step);
+    for (double x = -out.inside; x <= kOutside_px; x += kStep_px) {
+      const double off = (x - kHalo_px) / line;
+      out.shape.push_back(150 - 0.5 * wide.membrane * std::erfc(x / (std::sqrt(2) * step)) +
+                          wide.halo / line * std::exp(-0.5 * off * off));
+    }
+  }
+  return out;
+}
+
+// A pose that is drawn aside by a membrane on the tip is put right, in focus, in a halo, and out of focus.
 TEST(TipOnMembrane, is_where_glass_and_membrane_meet) {
   constexpr double kBias_px = 0.3, kScatter_px = 0.7;
   constexpr unsigned kLearnt = 12, kFrames = 8;
   const NeedlePose true_pose = pose_at({150.3, kAxis_y});
-  for (const double blur_px : {1.1, 2.5}) {
+  for (const auto& [blur_px, halo] : {std::pair{1.1, 0.0}, std::pair{1.1, 25.0}, std::pair{2.5, 0.0}}) {
+    const Wide clear{.closed = true, .blur_px = blur_px, .radius = 6};
+    Wide touching = clear;
+    touching.membrane = 30;
+    touching.halo = halo;
     TipOnMembrane tip;
-    EXPECT_FALSE(tip.ahead(draw({.radius = 6}), kWideNoise, blur_px, true_pose));
+    const EdgeLearnt membrane = membrane_of(touching, draw(clear).sigma);
+    EXPECT_FALSE(tip.ahead(draw(touching), kWideNoise, membrane, true_pose));
     for (unsigned frame = 1; frame <= kLearnt; ++frame) {
-      tip.learn(draw({.closed = true, .blur_px = blur_px, .radius = 6}, frame), true_pose);
+      tip.learn(draw(clear, frame), true_pose);
     }
     for (const double drawn_px : {-1.5, 0.0, 2.5}) {
       NeedlePose drawn = true_pose;
       drawn.tip += drawn_px * drawn.axis;
       double bias = 0;
       for (unsigned frame = 1; frame <= kFrames; ++frame) {
-        const GradientField field =
-            draw({.closed = true, .membrane = 30, .blur_px = blur_px, .radius = 6}, kLearnt + frame);
-        const auto seen = tip.ahead(field, kWideNoise, blur_px, drawn);
-        ASSERT_TRUE(seen) << blur_px << ' ' << drawn_px;
-        EXPECT_LT(std::abs(seen->ahead + drawn_px), 3 * seen->sd + kBias_px) << blur_px << ' ' << drawn_px;
-        EXPECT_LT(seen->sd, kScatter_px) << blur_px << ' ' << drawn_px;
+        const auto seen = tip.ahead(draw(touching, kLearnt + frame), kWideNoise, membrane, drawn);
+        ASSERT_TRUE(seen) << blur_px << ' ' << halo << ' ' << drawn_px;
+        EXPECT_LT(std::abs(seen->ahead + drawn_px), 3 * seen->sd + kBias_px) << blur_px << ' ' << halo;
+        EXPECT_LT(seen->sd, kScatter_px) << blur_px << ' ' << halo << ' ' << drawn_px;
         bias += (seen->ahead + drawn_px) / kFrames;
       }
-      EXPECT_NEAR(bias, 0, kBias_px) << blur_px << ' ' << drawn_px;
+      EXPECT_NEAR(bias, 0, kBias_px) << blur_px << ' ' << halo << ' ' << drawn_px;
     }
   }
 }
@@ -518,7 +543,7 @@ TEST(TipOnMembrane, is_left_where_it_is_by_a_picture_that_tells_nothing) {
   const NeedlePose pose = pose_at({149.3, kAxis_y});
   TipOnMembrane tip;
   tip.learn(draw({.closed = true, .radius = 6}, 1), pose);
-  const auto seen = tip.ahead(draw({.closed = true, .membrane = 30, .radius = 6}, 2), kNothing, 1.1, pose);
+  const auto seen = tip.ahead(draw({.closed = true, .membrane = 30, .radius = 6}, 2), kNothing, {}, pose);
   ASSERT_TRUE(seen);
   EXPECT_NEAR(seen->ahead, 0, 0.1);
   EXPECT_GT(seen->sd, 2);

@@ -33,6 +33,8 @@ using test::frame_of;
 
 constexpr int kFrames = 40;
 constexpr double kPixel_um = 0.825;
+constexpr double kGlassAhead_px =
+    0.65;  // the membrane is drawn through the glass, so far behind its outermost part
 constexpr double kRight_px = 2, kWrong_px = 4;  // nowhere further away; somewhere further away
 
 Contour contour_of(const nlohmann::json& points) {
@@ -130,7 +132,7 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
   std::map<std::string, Score> outer, inner;
   std::vector<double> tip_px, depth_px;        // seen minus true: along the axis before contact, in contact
   std::vector<double> told_px, told_depth_px;  // likewise in all phases, and in contact, with the pose
-  std::vector<double> touching_px;             // tip in contact
+  std::vector<double> touching_px;             // tip in contact, from the membrane
   double surest = 0;                           // tip, when the membrane gives way: deviations off
   for (int k = 0; k < frames; ++k) {
     char name[32];
@@ -160,7 +162,7 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
     if (phase == "approach" && seen.needle.ok) {
       tip_px.push_back(ahead);
     } else if (phase == "contact" && seen.needle.ok) {
-      touching_px.push_back(ahead);
+      touching_px.push_back(ahead + kGlassAhead_px);
     } else if (phase == "puncture" && seen.needle.ok) {
       surest = std::max(surest, std::abs(ahead) / seen.needle.sd);
     }
@@ -194,7 +196,7 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
     EXPECT_GE(outer["contact"].right, outer["contact"].frames - 1);
   }
   const bool sharp = GetParam().blur_px < 2;
-  expect_near_truth("tip that touches", touching_px, sharp ? 0.8 : 2);
+  expect_near_truth("tip that touches", touching_px, sharp ? 0.5 : 1.5);
   std::printf("tip when the membrane gives way: %.1f deviations off at most\n", surest);
   EXPECT_LT(surest, 3.2);
   if (!sharp) {
@@ -203,7 +205,7 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
   } else if (GetParam().noise <= 5 &&
              GetParam().halo == 0) {  // a halo draws the tip that touches it a pixel ahead
     expect_near_truth("tip", tip_px, 0.4);
-    expect_near_truth("depth of the dimple", depth_px, 0.3);
+    expect_near_truth("depth of the dimple", depth_px, 0.45);
     expect_near_truth("tip with the pose", told_px, 0.25);
     expect_near_truth("depth of the dimple with the pose", told_depth_px, 0.25);
   }

@@ -17,6 +17,7 @@
 #include "vision/membrane/membrane_on_needle.hpp"
 #include "vision/membrane/membrane_start.hpp"
 #include "vision/membrane/snakes.hpp"
+#include "vision/pipettes/gathered_frames.hpp"
 #include "vision/pipettes/holding_pipette.hpp"
 #include "vision/pipettes/injection_pipette.hpp"
 #include "vision/pipettes/tip_by_stage.hpp"
@@ -79,6 +80,7 @@ struct Tracker::Impl {
   int holder_frames = 0;  // without it
   InjectionPipette needle;
   InjectionPipette::Start needle_search = InjectionPipette::Start::failed;
+  GatheredFrames gathered;                      // while it is missing in noise
   int needle_frames = 0, needle_tries = 0;      // that failed
   bool needle_due = false, holder_due = false;  // looked for in this frame
   bool needle_before_gap = false;               // it is not known yet whether it is still the same
@@ -139,6 +141,7 @@ struct Tracker::Impl {
   void decide_searches();
   [[nodiscard]] cv::Rect area_to_search(bool starting) const;
   [[nodiscard]] Vector<Side> holder_sides() const;
+  [[nodiscard]] bool looks_again();
   [[nodiscard]] bool search_needle();
   void forget_needle();
   void recognise_needle();
@@ -313,18 +316,42 @@ cv::Rect Tracker::Impl::area_to_search(bool starting) const {
                           static_cast<int>(box.height));
 }
 
-// Whether this frame shows its end.
-bool Tracker::Impl::search_needle() {
-  if (!needle_due) {
+// Frames are kept while the needle is missing in noise, or was found in few of them. Whether there are enough
+// by now to tell its end better.
+bool Tracker::Impl::looks_again() {
+  constexpr int kSome = 4;
+  const bool told = needle.started() && !needle.doubtful(GatheredFrames::kMost);
+  if (told || was_contact || punctured || picture.noise < InjectionPipette::kNoisy_grey) {
+    gathered.forget();
     return false;
   }
+  gathered.add(picture.grey, by_stage.moved());
+  const int frames = gathered.count();
+  return frames >= kSome && needle.doubtful(frames < GatheredFrames::kMost ? kSome : frames);
+}
+
+// Whether this frame shows its end.
+bool Tracker::Impl::search_needle() {
   // A membrane at the tip of a faint needle looks like its end.
   const auto clear_at = [this](const Point& end) {
     return !outer.known || cv::norm(end - outer.centre) > median_of(outer.r) + kUntouched_px;
   };
+  if (looks_again()) {
+    by_stage.forget();
+    tip_on_membrane = {};
+    return needle.look_again(picture.field.sigma, clear_at, gathered);
+  }
+  if (!needle_due) {
+    return false;
+  }
+  // What moves otherwise than along its axis, one frame shows better than the mean.
+  constexpr int kAlone = 3;  // one try in so many
+  const bool mean = gathered.count() > 1 && needle_tries % kAlone != 0;
+  const GradientField& field = mean ? gathered.at_rest(picture.field.sigma) : picture.field;
+  const double noise = mean ? gathered.noise() : picture.noise;
   do {
-    needle_search =
-        needle.advance_start(picture.field, picture.noise, clear_at, needle_tries < kNeedleAtOnce);
+    needle_search = needle.advance_start(field, noise, clear_at, needle_tries < kNeedleAtOnce,
+                                         mean ? &gathered : nullptr);
   } while (first_picture && needle_search == InjectionPipette::Start::more_to_do);
   needle_tries += needle_search == InjectionPipette::Start::failed ? 1 : 0;
   return needle_search == InjectionPipette::Start::found;

@@ -222,6 +222,47 @@ INSTANTIATE_TEST_SUITE_P(
                     DrawnCell{"relief", {.relief = true}, {3, 4, 3, 4, 4, 1}, 4, true, 5}),
     [](const auto& one) { return std::string(one.param.name); });
 
+// A bevelled needle that moves by so many px per frame at noise 20, and is often refused in the first frame:
+// eight frames together tell it.
+class NoisyStart : public testing::TestWithParam<double> {};
+
+TEST_P(NoisyStart, shows_the_needle_within_eight_frames) {
+  constexpr int kFrames = 8;
+  constexpr double kNoise = 20;
+  VisionConfig config;
+  config.pixel_m = DrawnMicroscope::kPixel_um * 1e-6;
+  const Seeds s = seeds(9);
+  int sequences = 0, first_right = 0, right = 0, claimed = 0, wrong = 0;
+  for (unsigned seed = s.first; seed <= s.last; ++seed, ++sequences) {
+    Tracker tracker(config, DrawnMicroscope::kW, DrawnMicroscope::kH);
+    std::mt19937 random(77 + seed);
+    const double gap_px = std::uniform_real_distribution<double>(28, 59)(random);
+    for (int frame = 0; frame < kFrames; ++frame) {
+      Drawn drawn = DrawnMicroscope({.seed = seed, .noise = 0, .gap_px = gap_px - GetParam() * frame}).draw();
+      std::normal_distribution<double> noise(0, kNoise);
+      for (auto it = drawn.picture.begin<std::uint8_t>(); it != drawn.picture.end<std::uint8_t>(); ++it) {
+        *it = cv::saturate_cast<std::uint8_t>(*it + noise(random));
+      }
+      const Result& r = tracker.process(frame_of(drawn.picture, static_cast<std::uint64_t>(frame)));
+      const Errors e = errors_of(r, drawn.truth);
+      const bool is_right = std::hypot(e.tip, e.aside) < kHardTip_px && std::abs(e.axis_deg) < kAxis_deg;
+      first_right += frame == 0 && is_right ? 1 : 0;
+      right += frame + 1 == kFrames && is_right ? 1 : 0;
+      claimed += r.needle.ok ? 1 : 0;
+      wrong += r.needle.ok && !is_right ? 1 : 0;
+    }
+  }
+  std::printf(
+      "%.1f px per frame, %d needles: right in the first frame %d, in the eighth %d; %d of %d claims wrong\n",
+      GetParam(), sequences, first_right, right, wrong, claimed);
+  if (!s.measured) {
+    EXPECT_GE(right, 3);
+    EXPECT_LE(wrong, claimed / 5);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Speeds, NoisyStart, testing::Values(0.0, 1.0));
+
 // In relief the faces of the zona are bright on one side of the cell and dark on the other.
 TEST(ReliefStart, shows_both_membranes_where_they_are) {
   constexpr double kMost_um = 0.25;

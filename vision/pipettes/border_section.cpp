@@ -1,6 +1,7 @@
 #include "vision/pipettes/border_section.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <iterator>
@@ -68,12 +69,12 @@ Vector<Vector<float>> lines_of(const GradientField& field, const BorderAxes& axe
 }
 
 // Short loops, which the compiler vectorises.
-TiltedProfile profile_at(const Vector<Vector<float>>& lines, double slope) {
+TiltedProfile profile_at(const Vector<Vector<float>>& lines, int begin, int end, double slope) {
   const int h = static_cast<int>(lines.front().size());
   Vector<float> sum(static_cast<std::size_t>(h));
   TiltedProfile out;
-  out.samples = static_cast<int>(lines.size());
-  for (int c = 0; c < out.samples; ++c) {
+  out.samples = end - begin;
+  for (int c = begin; c < end; ++c) {
     const double shift = c * kLineStep_px * slope;
     const int down = static_cast<int>(std::floor(shift));
     const float after = static_cast<float>(shift - down), here = 1 - after;
@@ -128,14 +129,26 @@ EdgeGroup strongest_group(const Vector<BorderEdge>& edges, double width_min, dou
   return best;
 }
 
-// The faint ones outside of the others: specks beside the tube.
-void leave_out_faint(EdgeGroup& group) {
+// Those outside of the others that are faint, or in one half of the strip: specks beside the tube. halves:
+// the profiles of both.
+void leave_out_specks(EdgeGroup& group, const std::array<TiltedProfile, 2>& halves) {
   constexpr double kFaint = 0.35;  // of the strongest one
+  constexpr std::size_t kAside_px =
+      2;  // by which a wall lies elsewhere in one half: it is not quite parallel
   double strongest = 0;
   for (const BorderEdge& edge : group.edges) {
     strongest = std::max(strongest, edge.energy);
   }
-  const auto clear = [&](const BorderEdge& edge) { return edge.energy >= kFaint * kFaint * strongest; };
+  const double least = kFaint * std::sqrt(strongest);
+  const auto shows = [&](const TiltedProfile& half, double at) {
+    const auto k = static_cast<std::size_t>(at);
+    return std::any_of(half.edge.begin() + static_cast<std::ptrdiff_t>(k - kAside_px),
+                       half.edge.begin() + static_cast<std::ptrdiff_t>(k + kAside_px + 1),
+                       [&](float e) { return static_cast<double>(e) >= least; });
+  };
+  const auto clear = [&](const BorderEdge& edge) {
+    return edge.energy >= least * least && shows(halves[0], edge.at) && shows(halves[1], edge.at);
+  };
   const auto first = std::find_if(group.edges.begin(), group.edges.end(), clear);
   const auto last = std::find_if(group.edges.rbegin(), group.edges.rend(), clear).base();
   group.edges = Vector<BorderEdge>(first, std::max(first, last));
@@ -147,6 +160,7 @@ Vector<TubeTrace> border_sections(const GradientField& field, Border border, con
                                   double noise) {
   const BorderAxes axes = axes_of(field.area, border, wanted.inset);
   const auto lines = lines_of(field, axes, wanted.strip);
+  const int all = static_cast<int>(lines.size());
   constexpr std::size_t kLeftOut = 3;
   EdgeGroup best;
   double best_total = 0;
@@ -156,7 +170,7 @@ Vector<TubeTrace> border_sections(const GradientField& field, Border border, con
   };
   const auto look_along = [&](int degree) {
     const double slope = math::tan(degree * CV_PI / 180);
-    const TiltedProfile profile = profile_at(lines, slope);
+    const TiltedProfile profile = profile_at(lines, 0, all, slope);
     // Four standard deviations of what the noise leaves.
     const double floor = std::max({4 * field.noise_of_gradient(noise) / std::sqrt(0.6 * profile.samples),
                                    kLeastEdge, wanted.relative * profile.strongest});
@@ -183,11 +197,11 @@ Vector<TubeTrace> border_sections(const GradientField& field, Border border, con
       look_along(degree);
     }
   }
-  if (wanted.without_faint) {
-    leave_out_faint(best);
-  }
   Vector<TubeTrace> out;
   const double slope = math::tan(best_degree * CV_PI / 180);
+  if (wanted.without_specks && !best.edges.empty()) {
+    leave_out_specks(best, {profile_at(lines, 0, all / 2, slope), profile_at(lines, all / 2, all, slope)});
+  }
   const std::size_t edges = best.edges.size();
   for (std::size_t above = 0; above <= kLeftOut; ++above) {
     for (std::size_t below = 0; below <= kLeftOut && above + below + 2 <= edges; ++below) {

@@ -16,7 +16,7 @@ struct WantedTube {
   double strip;                        // from the border, px
   double relative;                     // weaker edges than this share of the strongest one do not count
   int tilt_min_deg = 0, tilt_max_deg;  // of the tube against the border's normal, to either side
-  bool without_faint = false;          // outermost edges, which may be specks beside it
+  bool without_specks = false;         // outermost edges, which may be specks beside it
   double inset = kBlack_px;            // of the border, px
 
   static constexpr double kBlack_px = 4;  // borders of recorded pictures often are

@@ -11,6 +11,7 @@
 #include "hal/math/elementary.hpp"
 #include "vision/image/correlation.hpp"
 #include "vision/pipettes/faint_wall.hpp"
+#include "vision/pipettes/moving_end.hpp"
 #include "vision/pipettes/needle_bevel.hpp"
 #include "vision/pipettes/needle_end.hpp"
 #include "vision/pipettes/needle_walls.hpp"
@@ -50,12 +51,15 @@ constexpr int kFurther = 8;
 // Where the walls go on so far behind what lies across the needle, it does not end there; so often.
 constexpr double kAcross_px = 60, kLump_px = 14, kAcrossAveraged_px = 12;
 constexpr int kAcross = 8;
+constexpr std::size_t kGathered = 4;  // frames that tell an end which one of them does not
+constexpr double kShaft_px = 180;     // of the shaft tell its direction
 constexpr double kMostBlur_px = 3.6;  // the widest blur of which the end is known
 // In a needle with a smaller half-width no lumen is left between the walls, and a line across it looks like
 // them.
 constexpr double kLumen_px = 4.5;
 // Frames in a row; then it is looked for from the border, too, in every other frame.
 constexpr int kLostMax = 3;
+constexpr const char* kEndNotClear = "the end of the needle is not clear";
 constexpr const char* kNotRecognised = "tip not recognised";
 constexpr int kWiderMost = 6;  // frames in a row; then the window for its tip grows no more
 
@@ -149,6 +153,16 @@ double sd_of(const CutGlass& cut, double half_width) {
   return math::hypot(cut.end.sd, cut.bevel.sd * outer_radius_of_glass(half_width, cut.end.blur));
 }
 
+// Of its end, what lies beside it, and so much of its shaft.
+cv::Rect area_of(const NeedlePose& needle, double shaft_px) {
+  constexpr double kOfMedium_px = 40, kClear_px = 24;
+  const Point a = needle.at(shaft_px, 0), b = needle.at(-kOfMedium_px, 0);
+  const double beside = needle.half_width_at(shaft_px) + kClear_px;
+  return {static_cast<int>(std::min(a.x, b.x) - beside), static_cast<int>(std::min(a.y, b.y) - beside),
+          static_cast<int>(std::abs(a.x - b.x) + 2 * beside),
+          static_cast<int>(std::abs(a.y - b.y) + 2 * beside)};
+}
+
 // At the end of its walls.
 void put_at_end(const GradientField& field, double noise, double back, double ahead, NeedlePose& needle) {
   if (const auto s = end_of_profile(field, needle, back, ahead, noise)) {
@@ -193,7 +207,8 @@ void InjectionPipette::forget_tubes() {
 }
 
 InjectionPipette::Start InjectionPipette::advance_start(const GradientField& field, double noise,
-                                                        const Clear& clear_at, bool keep_tube) {
+                                                        const Clear& clear_at, bool keep_tube,
+                                                        GatheredFrames* frames) {
   if (trace_next_border(field, noise)) {
     return Start::more_to_do;
   }
@@ -206,7 +221,7 @@ InjectionPipette::Start InjectionPipette::advance_start(const GradientField& fie
     return Start::more_to_do;
   }
   bool straight = false;
-  const bool found = begin_at_end(field, noise, clear_at, straight);
+  const bool found = begin_at_end(field, noise, clear_at, frames, straight);
   walls_tried_.reset();
   if (found) {
     forget_tubes();
@@ -216,7 +231,7 @@ InjectionPipette::Start InjectionPipette::advance_start(const GradientField& fie
     return Start::more_to_do;
   }
   tubes_tried_ = 0;
-  if (!keep_tube) {
+  if (!keep_tube || (!straight && frames != nullptr)) {
     forget_tubes();
   }
   return Start::failed;
@@ -245,13 +260,13 @@ bool InjectionPipette::trace_next_border(const GradientField& field, double nois
     return false;
   }
   const Border border = kBorders[sections_looked_at_ / 2];
-  const bool without_faint = sections_looked_at_++ % 2 == 1;
+  const bool without_specks = sections_looked_at_++ % 2 == 1;
   if (border == other_border(side_)) {
     return true;
   }
   const auto crossing = narrow_tube_at_border(field, border, 3, std::max(22.0, kWidest_radii * radius_px_),
-                                              noise, without_faint);
-  if (crossing && !(without_faint && crossing->half_width >= section_half_width_)) {
+                                              noise, without_specks);
+  if (crossing && !(without_specks && crossing->half_width >= section_half_width_)) {
     trace_.emplace(*crossing);
   }
   section_half_width_ = crossing ? crossing->half_width : 0;
@@ -291,7 +306,7 @@ bool InjectionPipette::fit_walls_further(const GradientField& field, double nois
 }
 
 bool InjectionPipette::begin_at_end(const GradientField& field, double noise, const Clear& clear_at,
-                                    bool& is_straight) {
+                                    GatheredFrames* frames, bool& is_straight) {
   const TubeTrace& tube = tubes_[tubes_tried_];
   if (lie_between_walls(field, noise, tube) < kStraight || last_.half_width > 2 * radius_px_ + 1 ||
       is_wall_of_wide_tube(field, tube, noise)) {
@@ -300,14 +315,48 @@ bool InjectionPipette::begin_at_end(const GradientField& field, double noise, co
   }
   found_side_ = side_of(tube);
   side_known_ = is_straight = true;
-  const bool end_known = learn_end_anew(field, noise);
-  NeedlePose plain = last_;
-  const bool faint = fit_walls(field, noise, radius_px_, plain, kShortest_px) < kStraight;
-  longest_ = faint ? kFollowed_px : kShortest_px;
-  if (faint && !(end_known && clear_at(last_.tip))) {
-    reason_ = "the end of the needle is not clear";
+  return settle(field, noise, clear_at, frames);
+}
+
+// On the line of its walls, where it ends: where a cut can be told, in the mean of the frames as it moves.
+bool InjectionPipette::settle(const GradientField& field, double noise, const Clear& clear_at,
+                              GatheredFrames* frames) {
+  if (frames == nullptr) {
+    return begin_in(field, noise, clear_at, nullptr);
+  }
+  const auto blur = blur_of_end(field);
+  if (!blur) {
+    return begin_in(frames->one(0, field.area, field.sigma), frames->noise_of_one(), clear_at, nullptr);
+  }
+  const auto end = go_to_moving_end(*blur, field.sigma, *frames);
+  if (!end) {
+    reason_ = kEndNotClear;
     return false;
   }
+  const GradientField& moving =
+      frames->moving(area_of(last_, kShaft_px), end->per_frame * last_.axis, field.sigma);
+  put_at_end(moving, noise, 2 * kStartReach_px, kStartReach_px, last_);
+  if (!begin_in(moving, noise, clear_at, &*end)) {
+    return false;
+  }
+  velocity_ = end->per_frame * last_.axis;
+  looked_at_ = frames->count();
+  return true;
+}
+
+// moving: where the field is the mean of several frames.
+bool InjectionPipette::begin_in(const GradientField& field, double noise, const Clear& clear_at,
+                                const MovingEnd* moving) {
+  const bool end_known = learn_end_anew(field, noise, moving != nullptr ? moving->motion_sd : 0);
+  NeedlePose plain = last_;
+  const bool faint = fit_walls(field, noise, radius_px_, plain, kShortest_px) < kStraight;
+  if ((moving != nullptr && !end_known) || (faint && !(end_known && clear_at(last_.tip)))) {
+    reason_ = kEndNotClear;
+    return false;
+  }
+  in_noise_ = lumen_ && glass_frames_ > 0 && (moving != nullptr || (faint && noise >= kNoisy_grey));
+  looked_at_ = 1;
+  longest_ = faint || in_noise_ ? kFollowed_px : kShortest_px;
   if (!cut_template(field)) {
     reason_ = "tip too close to the border";
     return false;
@@ -319,6 +368,40 @@ bool InjectionPipette::begin_at_end(const GradientField& field, double noise, co
   started_ = true;
   reason_.clear();
   return true;
+}
+
+// Where a cut can be told of it.
+std::optional<double> InjectionPipette::blur_of_end(const GradientField& field) const {
+  const auto blur = last_.half_width < kLumen_px ? std::nullopt : blur_of_shaft(field, last_, kStartReach_px);
+  return blur && *blur <= kMostBlur_px ? blur : std::nullopt;
+}
+
+bool InjectionPipette::look_again(double sigma_px, const Clear& clear_at, GatheredFrames& frames) {
+  const GradientField& field = frames.at_rest(sigma_px);
+  (void)fit_walls(field, frames.noise(), radius_px_, last_, kLongest_px);
+  started_ = !blur_of_end(field) || settle(field, frames.noise(), clear_at, &frames);
+  looked_at_ = frames.count();
+  return started_;
+}
+
+// In all frames together. It is put there; empty where they do not tell it, or may not be put together.
+std::optional<MovingEnd> InjectionPipette::go_to_moving_end(double blur_px, double sigma_px,
+                                                            GatheredFrames& frames) {
+  constexpr double kShaftOfEnd_px = 90;
+  const cv::Rect area = area_of(last_, kShaftOfEnd_px);
+  Vector<SeenEnds> seen;
+  for (int age = 0; age < frames.count(); ++age) {
+    if (const auto ends =
+            likely_ends(frames.one(age, area, sigma_px), frames.noise_of_one(), last_, blur_px)) {
+      seen.push_back({*ends, frames.way(age).dot(last_.axis), age});
+    }
+  }
+  if (seen.size() < kGathered) {
+    return std::nullopt;
+  }
+  const auto end = moving_end(seen, outer_radius_of_glass(last_.half_width, blur_px), frames.motion_known());
+  last_.tip -= (end ? end->behind : 0) * last_.axis;
+  return end;
 }
 
 // As the tube was traced, and up to where its walls end. Returns the share of the stations that are straight.
@@ -356,8 +439,9 @@ double InjectionPipette::lie_between_walls(const GradientField& field, double no
   return straight;
 }
 
-// Its shape, cut and glass. Whether the outermost glass is known well enough for a faint needle to begin.
-bool InjectionPipette::learn_end_anew(const GradientField& field, double noise) {
+// Its shape, cut and glass. motion_sd: of the end, px, where it is not certain how it moves. Whether the
+// outermost glass is known well enough for a faint needle to begin.
+bool InjectionPipette::learn_end_anew(const GradientField& field, double noise, double motion_sd) {
   step_sign_ = 0;
   walls_offset_ = 0.15 * last_.half_width;
   offset_frames_ = 0;
@@ -376,8 +460,8 @@ bool InjectionPipette::learn_end_anew(const GradientField& field, double noise) 
   lumen_ = last_.half_width >= kLumen_px;
   thin_end_.forget();
   const auto known = [&](const CutGlass& cut) {
-    return cut.end.blur <= kMostBlur_px &&
-           sd_of(cut, last_.half_width) <= (cut.end.blur > kSharp_px ? kUnsharpKnown_px : kStartKnown_px);
+    return cut.end.blur <= kMostBlur_px && math::hypot(sd_of(cut, last_.half_width), motion_sd) <=
+                                               (cut.end.blur > kSharp_px ? kUnsharpKnown_px : kStartKnown_px);
   };
   if (const auto cut = lumen_ ? go_to_cut(field, noise) : std::nullopt;
       cut && (known(*cut) || cut->end.blur > kSharp_px)) {
@@ -432,7 +516,24 @@ std::optional<CutGlass> InjectionPipette::go_to_cut(const GradientField& field, 
 NeedlePose InjectionPipette::find(const GradientField& field, double noise,
                                   const std::optional<Point>& moved) {
   velocity_ = moved.value_or(velocity_);
-  return told(follow(field, noise), noise);
+  NeedlePose needle = told(follow(field, noise), noise);
+  if (needle.ok && in_noise_ && noise >= kNoisy_grey) {
+    weigh_end(field, noise, needle);
+  }
+  return needle;
+}
+
+// In noise the shape errs by several px, where the likelihood of the glass with its cut, which is known, does
+// not.
+void InjectionPipette::weigh_end(const GradientField& field, double noise, NeedlePose& needle) const {
+  constexpr double kReach_px = 6;
+  NeedlePose middle = needle;
+  middle.tip -=
+      std::abs(bevel_.tangent) * outer_radius_of_glass(needle.half_width, glass_blur_) * needle.axis;
+  if (const auto end = end_of_known_cut(field, noise, middle, bevel_.tangent, glass_blur_, kReach_px)) {
+    needle.tip += end->ahead * needle.axis;
+    needle.sd = std::max(needle.sd, math::hypot(end->sd, needle.constant_sd));
+  }
 }
 
 NeedlePose InjectionPipette::as_found(double noise) const { return told(last_, noise); }

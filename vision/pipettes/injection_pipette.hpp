@@ -13,6 +13,8 @@
 #include "vision/image/gradient.hpp"
 #include "vision/image/kept_vector.hpp"
 #include "vision/pipettes/backdrop.hpp"
+#include "vision/pipettes/gathered_frames.hpp"
+#include "vision/pipettes/moving_end.hpp"
 #include "vision/pipettes/narrow_tube.hpp"
 #include "vision/pipettes/needle_bevel.hpp"
 #include "vision/pipettes/needle_end.hpp"
@@ -37,8 +39,9 @@ class InjectionPipette {
   // then its end. keep_tube: where that end is not a needle's or not clear, the next part looks at it once
   // more.
   enum class Start : std::uint8_t { more_to_do, failed, found };
+  // frames: where `field` is their mean at rest.
   [[nodiscard]] Start advance_start(const GradientField& field, double noise, const Clear& clear_at,
-                                    bool keep_tube);
+                                    bool keep_tube, GatheredFrames* frames = nullptr);
   // moved: what the manipulator has moved it by since the last frame, px, where that is known.
   [[nodiscard]] NeedlePose find(const GradientField& field, double noise, const std::optional<Point>& moved);
   // Where advance_start found it, in the frame that showed its end.
@@ -58,6 +61,15 @@ class InjectionPipette {
   // not alone: something lies near it, and out of focus only tells where the glass ends.
   void learn(const GradientField& field, const NeedlePose& needle, double noise, bool alone = true);
 
+  // In more noise one frame hardly shows its end.
+  static constexpr double kNoisy_grey = 6;
+  // It was found in noise, in fewer frames than that.
+  [[nodiscard]] bool doubtful(int frames) const noexcept {
+    return started_ && in_noise_ && looked_at_ < frames;
+  }
+  // Its end in all those frames, the last of which it was followed to. False, and to be found anew, where
+  // they do not tell it.
+  [[nodiscard]] bool look_again(double sigma_px, const Clear& clear_at, GatheredFrames& frames);
   [[nodiscard]] bool started() const noexcept { return started_; }
   // Walls and what lies between them were told apart at the start.
   [[nodiscard]] bool shows_lumen() const noexcept { return lumen_; }
@@ -70,10 +82,18 @@ class InjectionPipette {
   [[nodiscard]] bool trace_next_border(const GradientField& field, double noise);
   [[nodiscard]] bool fit_walls_further(const GradientField& field, double noise);
   [[nodiscard]] bool begin_at_end(const GradientField& field, double noise, const Clear& clear_at,
-                                  bool& is_straight);
+                                  GatheredFrames* frames, bool& is_straight);
+  [[nodiscard]] bool settle(const GradientField& field, double noise, const Clear& clear_at,
+                            GatheredFrames* frames);
+  [[nodiscard]] bool begin_in(const GradientField& field, double noise, const Clear& clear_at,
+                              const MovingEnd* moving);
+  [[nodiscard]] std::optional<double> blur_of_end(const GradientField& field) const;
+  [[nodiscard]] std::optional<MovingEnd> go_to_moving_end(double blur_px, double sigma_px,
+                                                          GatheredFrames& frames);
   [[nodiscard]] double lie_between_walls(const GradientField& field, double noise, const TubeTrace& tube);
-  [[nodiscard]] bool learn_end_anew(const GradientField& field, double noise);
+  [[nodiscard]] bool learn_end_anew(const GradientField& field, double noise, double motion_sd);
   bool cut_template(const GradientField& field);
+  void weigh_end(const GradientField& field, double noise, NeedlePose& needle) const;
   [[nodiscard]] double aside(const GradientField& field, double noise, const NeedlePose& predicted,
                              double correlated) const;
   // Along the needle its shaft looks the same everywhere, so there its end tells its place.
@@ -127,6 +147,8 @@ class InjectionPipette {
   double shape_offset_ = 0;   // from where the learnt shape has its origin to the end face, px
   double walls_offset_ = 0;   // from where the profile of the walls ends to the end face, px
   int offset_frames_ = 0;     // that walls_offset_ was learnt from
+  bool in_noise_ = false;     // it was found there
+  int looked_at_ = 0;         // frames that its end was found in
   bool lumen_ = true;         // shows between the walls, in focus
   Bevel bevel_;               // of its end, as it was found
   double glass_ahead_ = 0;    // of the end that is followed: the outermost glass, px

@@ -53,7 +53,7 @@ double normalise(Vector<double>& v) {
 
 // At a corner only a part of it crosses the border: there the whole is seen further inside.
 std::optional<TubeTrace> narrow_tube_at_border(const GradientField& field, Border border, double width_min,
-                                               double width_max, double noise, bool without_faint) {
+                                               double width_max, double noise, bool without_specks) {
   constexpr int kLeast_px = 48;
   constexpr double kCorner_px = 60;
   const cv::Rect& a = field.area;
@@ -67,7 +67,7 @@ std::optional<TubeTrace> narrow_tube_at_border(const GradientField& field, Borde
                     .relative = 0.12,
                     .tilt_min_deg = upright ? 0 : 30,
                     .tilt_max_deg = upright ? 45 : 66,
-                    .without_faint = without_faint};
+                    .without_specks = without_specks};
   auto sections = border_sections(field, border, wanted, noise);
   if (sections.empty()) {
     return std::nullopt;

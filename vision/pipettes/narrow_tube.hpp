@@ -12,10 +12,10 @@
 namespace punctum::vision {
 
 // What crosses the border with a total width of width_min .. width_max px. noise: grey levels.
-// without_faint: its outermost edges where they are faint.
+// without_specks: its outermost edges where they are faint, or in a half of the strip.
 [[nodiscard]] std::optional<TubeTrace> narrow_tube_at_border(const GradientField& field, Border border,
                                                              double width_min, double width_max, double noise,
-                                                             bool without_faint);
+                                                             bool without_specks);
 
 // Follows a tube by its cross profile, which it learns on the way; in parts, each in the picture of its
 // frame.

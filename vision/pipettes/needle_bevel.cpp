@@ -104,6 +104,13 @@ double unexplained(const Vector<double>& profile, double apart_px, double middle
   return square - g.dot(a.inv() * g);
 }
 
+// A granule is about as wide as a wall, and not drawn anew in every pixel as noise is: over an end its sum
+// varies so many times as much as that of noise that leaves as much.
+double with_granules(double misfit) {
+  constexpr double kOfGranules = 4;
+  return 1 + kOfGranules * (misfit - 1);
+}
+
 struct CutEnd {
   double at = 0, tangent = 0;  // behind the tip of the pose, px; of the cut
 };
@@ -418,10 +425,7 @@ CutGlass mean_of(const CutModel& model, const EndsAndCuts& tried, double blur_px
       }
     }
   }
-  // A granule is about as wide as a wall, and not drawn anew in every pixel as noise is: over an end its sum
-  // varies so many times as much as that of noise that leaves as much.
-  constexpr double kOfGranules = 4;
-  const double misfit = 1 + kOfGranules * (model.misfit(most) - 1);
+  const double misfit = with_granules(model.misfit(most));
   // Of the end, of the cut, and of the end where the cut is known.
   Moments outermost, tangents, of_cut;
   double where_cut_is_known = 0;
@@ -514,6 +518,51 @@ std::optional<CutGlass> cut_of_glass(const GradientField& field, double noise, c
     found = mean_of(model, near, blur_px, radius, best);
   }
   return found;
+}
+
+std::optional<LikelyEnds> likely_ends(const GradientField& field, double noise, const NeedlePose& needle,
+                                      double blur_px) {
+  constexpr int kReach = LikelyEnds::kReach_px;
+  const CutModel model(field, needle, noise, blur_px, kReach, kReach);
+  if (!model.stands_out()) {
+    return std::nullopt;
+  }
+  LikelyEnds out;
+  double most = -1e18;
+  for (std::size_t cut = 0; cut < LikelyEnds::kCuts; ++cut) {
+    auto& of_cut = out.gain[cut];
+    for (std::size_t k = 0; k < of_cut.size(); ++k) {
+      of_cut[k] = model.gain({static_cast<double>(k) - kReach, LikelyEnds::tangent(cut)});
+      most = std::max(most, of_cut[k]);
+    }
+  }
+  const double misfit = with_granules(model.misfit(most));
+  for (auto& of_cut : out.gain) {
+    for (double& g : of_cut) {
+      g /= misfit;
+    }
+  }
+  return out;
+}
+
+std::optional<GlassEnd> end_of_known_cut(const GradientField& field, double noise, const NeedlePose& needle,
+                                         double tangent, double blur_px, double reach) {
+  constexpr double kApart_px = 0.5;
+  const CutModel model(field, needle, noise, blur_px, reach, reach);
+  if (!model.stands_out()) {
+    return std::nullopt;
+  }
+  Vector<double> gains;
+  for (double at = -reach; at <= reach; at += kApart_px) {
+    gains.push_back(model.gain({at, tangent}));
+  }
+  const double most = *std::max_element(gains.begin(), gains.end()),
+               misfit = with_granules(model.misfit(most));
+  Moments ends;
+  for (std::size_t k = 0; k < gains.size(); ++k) {
+    ends.add(math::exp(0.5 * (gains[k] - most) / misfit), reach - kApart_px * static_cast<double>(k));
+  }
+  return GlassEnd{ends.mean(), std::sqrt(ends.variance()), blur_px};
 }
 
 }  // namespace punctum::vision

@@ -1,6 +1,8 @@
 // How obliquely the injection pipette is cut, and where a glass that is cut so ends.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <optional>
 
 #include "vision/image/gradient.hpp"
@@ -38,5 +40,24 @@ struct CutGlass {
 [[nodiscard]] std::optional<CutGlass> cut_of_glass(const GradientField& field, double noise,
                                                    const NeedlePose& needle, double blur_px, double back,
                                                    double ahead);
+
+// Coarsely, for every end within kReach_px of the tip of the pose and every cut: log likelihood over no
+// needle, twice, of what granules leave.
+struct LikelyEnds {
+  static constexpr int kReach_px = 12;
+  static constexpr std::size_t kCuts = 5;
+  [[nodiscard]] static constexpr double tangent(std::size_t cut) {
+    return 0.3 * (static_cast<double>(cut) - 2);
+  }
+  std::array<std::array<double, 2 * kReach_px + 1>, kCuts>
+      gain{};  // of ends from ahead to behind, 1 px apart
+};
+[[nodiscard]] std::optional<LikelyEnds> likely_ends(const GradientField& field, double noise,
+                                                    const NeedlePose& needle, double blur_px);
+
+// Where a glass ends whose cut is known: the middle of its end, within `reach` px of the tip of the pose.
+[[nodiscard]] std::optional<GlassEnd> end_of_known_cut(const GradientField& field, double noise,
+                                                       const NeedlePose& needle, double tangent,
+                                                       double blur_px, double reach);
 
 }  // namespace punctum::vision

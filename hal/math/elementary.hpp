@@ -8,6 +8,9 @@
 // not be flushed. Real-time safe: no heap, no lock, no system call, no loop without a bound.
 #pragma once
 
+#include <array>
+#include <cstddef>
+
 #include "hal/realtime.hpp"
 
 namespace punctum::math {
@@ -19,6 +22,9 @@ struct SinCos {
 // Angles in rad; any finite argument, however large.
 [[nodiscard]] double sin(double x) NONBLOCKING;
 [[nodiscard]] double cos(double x) NONBLOCKING;
+// Each becomes its sine: the bits of sin(x) in half the time.
+inline constexpr std::size_t kTogether = 8;
+void sines(std::array<double, kTogether>& angles) NONBLOCKING;
 [[nodiscard]] SinCos sin_cos(double x)
     NONBLOCKING;  // the bits of sin(x) and cos(x) for little more than one of them
 [[nodiscard]] double tan(double x) NONBLOCKING;

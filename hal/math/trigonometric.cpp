@@ -10,7 +10,7 @@ __extension__ typedef unsigned __int128 Wide;
 // x = quarter * pi/2 + angle, |angle| <= pi/4 (and a rounding); quarter counts modulo 4.
 struct Reduced {
   Two angle;
-  unsigned quarter;
+  std::uint64_t quarter;
 };
 
 constexpr double kQuarterPi = 0x1.921fb54442d18p-1;
@@ -24,7 +24,7 @@ constexpr double kFewQuarters = 0x1.921fp20;  // below: fewer than 2^20 quarters
   const Two second = sum(first, -(n.value * kHalfPiParts[1]));
   const Two third = sum(second.high, -(n.value * kHalfPiParts[2]));
   return {ordered_sum(third.high, second.low + third.low - n.value * kHalfPiParts[3]),
-          static_cast<unsigned>(n.number) & 3U};
+          static_cast<std::uint64_t>(n.number) & 3U};
 }
 
 // Payne and Hanek, in integers. |x| = m 2^e: bits of 2/pi that make whole turns are left out, the next 192
@@ -83,7 +83,7 @@ constexpr double kFewQuarters = 0x1.921fp20;  // below: fewer than 2^20 quarters
 }
 
 // Of an angle of at most pi/4 (and a rounding), as head and rest.
-[[nodiscard]] Two sin_parts(Two t) NONBLOCKING {
+[[nodiscard, gnu::always_inline]] inline Two sin_parts(Two t) NONBLOCKING {
   const double z = t.high * t.high;
   const double head = leading<17>(t.high);
   const double cube = head * head * head;  // exact
@@ -91,7 +91,7 @@ constexpr double kFewQuarters = 0x1.921fp20;  // below: fewer than 2^20 quarters
   return {t.high, cube * (-1.0 / 6) + (other_cube * (-1.0 / 6) + t.high * z * z * polynomial(kSin, z) +
                                        (t.low - 0.5 * z * t.low))};
 }
-[[nodiscard]] Two cos_parts(Two t) NONBLOCKING {
+[[nodiscard, gnu::always_inline]] inline Two cos_parts(Two t) NONBLOCKING {
   const double z = t.high * t.high;
   const double head = leading<26>(t.high);
   const double half_square = 0.5 * head * head;  // exact
@@ -113,6 +113,26 @@ double sin(double x) NONBLOCKING {
   const Reduced r = reduce(x);
   const double s = rounded((r.quarter & 1U) != 0 ? cos_parts(r.angle) : sin_parts(r.angle));
   return (r.quarter & 2U) != 0 ? -s : s;
+}
+
+// As sin, without a branch: the processor takes two or more at once.
+void sines(std::array<double, kTogether>& angles) NONBLOCKING {
+  bool ordinary = true;
+  for (const double a : angles) {
+    ordinary = ordinary && std::fabs(a) >= kTiny && std::fabs(a) < kFewQuarters;
+  }
+  if (!ordinary) {
+    for (double& a : angles) {
+      a = sin(a);
+    }
+    return;
+  }
+  for (double& a : angles) {
+    const Reduced r = reduce_few(a);
+    const std::uint64_t s = bits_of(rounded(sin_parts(r.angle))), c = bits_of(rounded(cos_parts(r.angle)));
+    const std::uint64_t odd = 0U - (r.quarter & 1U);
+    a = double_of(((s & ~odd) | (c & odd)) ^ ((r.quarter & 2U) << 62));
+  }
 }
 
 double cos(double x) NONBLOCKING {

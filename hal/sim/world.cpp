@@ -87,7 +87,7 @@ void World::step(std::int64_t to_ns) NONBLOCKING {
   // Pieces no longer than a millisecond; after a long halt of the process fewer, longer ones.
   const std::int64_t piece_ns = std::max(kPiece_ns, (to_ns - t_ns_) / kMostPieces);
   while (t_ns_ < to_ns) {
-    step_piece(std::min(to_ns, t_ns_ + piece_ns));
+    step_piece(to_ns - t_ns_ <= piece_ns + kRest_ns ? to_ns : t_ns_ + piece_ns);
   }
   ++snapshot_.tick;
   take_snapshot();

@@ -77,7 +77,8 @@ class World {
 
  private:
   static constexpr std::int64_t kPiece_ns = 1'000'000;  // the plant is stepped in pieces no longer than this
-  static constexpr std::int64_t kMostPieces = 2000;     // per step
+  static constexpr std::int64_t kRest_ns = 100'000;  // the last one takes a rest along: a tick a little late
+  static constexpr std::int64_t kMostPieces = 2000;  // per step
 
   void step_piece(std::int64_t to_ns) NONBLOCKING;
   void move_hand(std::int64_t to_ns, double dt_s, bool power, const Failing& failure) NONBLOCKING;

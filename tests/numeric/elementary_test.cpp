@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <functional>
 #include <limits>
 #include <numbers>
@@ -340,6 +341,30 @@ TEST(Elementary, symmetries_hold_to_the_bit) {
     }
     EXPECT_EQ(bits(atan2(-y, x)), bits(-atan2(y, x)));
     EXPECT_EQ(bits(hypot(x, y)), bits(hypot(y, -x)));
+  }
+}
+
+TEST(Elementary, sines_are_those_that_sin_gives_one_by_one) {
+  GridRandom random(23);
+  const auto same = [](std::array<double, kTogether> x) {
+    auto each = x;
+    for (double& a : each) {
+      a = sin(a);
+    }
+    sines(x);
+    return std::memcmp(x.data(), each.data(), sizeof x) == 0;
+  };
+  for (int i = 0; i < 100'000; ++i) {
+    std::array<double, kTogether> x;
+    for (double& a : x) {
+      a = random.number(-26, 19, true);
+    }
+    EXPECT_TRUE(same(x)) << x[0];
+    x.back() = random.number(-1074, 1023, true);
+    EXPECT_TRUE(same(x)) << x.back();
+  }
+  for (const double odd : {0.0, -0.0, 0x1p-27, 0x1.921fb54442d18p-1, 0x1.921fp20, 1e300, -HUGE_VAL}) {
+    EXPECT_TRUE(same({1, odd, 2, -odd, 3, 4, 5, odd})) << odd;
   }
 }
 

@@ -382,6 +382,18 @@ std::optional<std::uint64_t> rise(const std::optional<std::uint64_t>& before,
 
 constexpr std::int64_t kMs_ns = 1'000'000, kShort_ns = 100 * kMs_ns;
 
+// Taken from the processor on which the loop was before and after.
+std::int64_t stolen_ns(const Counters& before, const Counters& after) {
+  if (before.cpu != after.cpu) {
+    return 0;
+  }
+  const auto steps_ms = static_cast<std::int64_t>(rise(before.stolen_ms, after.stolen_ms).value_or(0));
+  return static_cast<std::int64_t>(
+      rise(before.stolen_ns, after.stolen_ns).value_or(static_cast<std::uint64_t>(steps_ms * kMs_ns)));
+}
+
+std::string told_as_stolen(std::int64_t ns) { return fmt::format("{} us counted as steal", ns / kNs); }
+
 // Time in which the processor did nothing that its kernel knows of.
 Verdict explain_silence(std::int64_t silent_ns, const Counters& before, const Counters& after,
                         const Surroundings& surroundings) {
@@ -394,17 +406,22 @@ Verdict explain_silence(std::int64_t silent_ns, const Counters& before, const Co
     return v;
   }
   // In a long interval it may have been another tick's.
-  const std::uint64_t stolen_ms = rise(before.stolen_ms, after.stolen_ms).value_or(0);
-  if (stolen_ms > 0 && after.t_ns - before.t_ns <= kShort_ns) {
+  const std::int64_t stolen = stolen_ns(before, after);
+  if (2 * stolen >= silent_ns && after.t_ns - before.t_ns <= kShort_ns) {
     v.cause = Cause::stolen_time;
-    v.what = fmt::format("{} ms counted as steal", stolen_ms);
+    v.what = told_as_stolen(stolen);
     v.proof = Proof::counted;
     return v;
   }
-  v.what = fmt::format("{:.0f} us in which the processor took no interrupt: {}", v.us,
-                       surroundings.virtual_machine
-                           ? "the hypervisor, which counted no stolen time, or interrupts switched off"
-                           : "interrupts switched off, the firmware or the way out of a sleep");
+  v.what = fmt::format("{:.0f} us in which the processor took no interrupt: ", v.us);
+  if (!surroundings.virtual_machine) {
+    v.what += "interrupts switched off, the firmware or the way out of a sleep";
+  } else if (after.stolen_ns) {
+    v.what += fmt::format("work of the hypervisor, or interrupts switched off; {} within {} ms around it",
+                          told_as_stolen(stolen), (after.t_ns - before.t_ns) / kMs_ns);
+  } else {
+    v.what += "the hypervisor, whose stolen time is counted in steps of 10 ms, or interrupts switched off";
+  }
   return v;
 }
 
@@ -510,8 +527,7 @@ Verdict explain(const Episode& tick, const std::vector<TraceEvent>& events, cons
   v.us = 1e-3 * static_cast<double>(most->second);
   v.proof = Proof::traced;
   // A trace cannot tell a tick that computes from one whose processor was taken away.
-  const std::uint64_t stolen_ms = rise(before.stolen_ms, after.stolen_ms).value_or(0);
-  if (v.cause == Cause::own_computing && static_cast<std::int64_t>(stolen_ms) * kMs_ns * 2 >= most->second) {
+  if (v.cause == Cause::own_computing && 2 * stolen_ns(before, after) >= most->second) {
     return explain_silence(most->second, before, after, surroundings);
   }
   return v;
@@ -525,7 +541,7 @@ Verdict explain(const Episode& tick, const Counters& before, const Counters& aft
   const std::uint64_t faults =
       after.minor_faults + after.major_faults - before.minor_faults - before.major_faults;
   const auto waited = static_cast<std::int64_t>(rise(before.waited_ns, after.waited_ns).value_or(0));
-  const auto stolen_ms = static_cast<std::int64_t>(rise(before.stolen_ms, after.stolen_ms).value_or(0));
+  const std::int64_t stolen = stolen_ns(before, after);
   // Or it waited in the kernel.
   const bool did_run =
       static_cast<std::int64_t>(rise(before.ran_ns, after.ran_ns).value_or(0)) * 10 >= computed * 8;
@@ -538,9 +554,9 @@ Verdict explain(const Episode& tick, const Counters& before, const Counters& aft
   }
   if (rise(before.smis, after.smis).value_or(0) > 0) {
     v.cause = Cause::smi;
-  } else if (stolen_ms > 0 && at_least_half(stolen_ms * kMs_ns)) {
+  } else if (at_least_half(stolen)) {
     v.cause = Cause::stolen_time;
-    v.what = fmt::format("{} ms counted as steal", stolen_ms);
+    v.what = told_as_stolen(stolen);
   } else if (waited > 0 && at_least_half(waited)) {
     v.cause = Cause::preemption;
     v.what =
@@ -592,9 +608,39 @@ std::optional<std::uint64_t> smi_count() {
   return read ? std::optional(count & 0xffffffffU) : std::nullopt;
 }
 
+// What stands after "NAME   : " in ms with six decimals, from `at` on.
+std::optional<std::uint64_t> clock_ns(std::string_view text, std::size_t at, std::string_view name) {
+  at = text.find(name, at);
+  at = at == std::string_view::npos ? at : text.find(": ", at);
+  if (at == std::string_view::npos) {
+    return std::nullopt;
+  }
+  text.remove_prefix(at + 2);
+  std::uint64_t ms = 0, ns = 0;
+  if (!take(text, ms) || !text.starts_with('.')) {
+    return std::nullopt;
+  }
+  text.remove_prefix(1);
+  return take(text, ns) ? std::optional(ms * kMs_ns + ns) : std::nullopt;
+}
+
+// The clock of a processor's tasks stands still while the hypervisor has the processor.
+std::optional<std::uint64_t> between_clocks_ns(std::string_view text, int cpu) {
+  const std::string title = fmt::format("\ncpu#{}", cpu);
+  std::size_t at = text.find(title);
+  while (at != std::string_view::npos &&
+         text.find_first_not_of("0123456789", at + title.size()) != at + title.size()) {
+    at = text.find(title, at + 1);
+  }
+  if (at == std::string_view::npos) {
+    return std::nullopt;
+  }
+  return rise(clock_ns(text, at, "  .clock_task "), clock_ns(text, at, "  .clock "));
+}
+
 }  // namespace
 
-Counters read_counters(int pid, int tid, const std::string& proc) {
+Counters read_counters(int pid, int tid, const std::string& proc, const std::string& scheduler) {
   Counters c;
   c.t_ns = std::chrono::steady_clock::now().time_since_epoch().count();
   const std::string task = fmt::format("{}/{}/task/{}/", proc, pid, tid);
@@ -604,25 +650,34 @@ Counters read_counters(int pid, int tid, const std::string& proc) {
     c.ran_ns = ran;
     c.waited_ns = waited;
   }
-  // The name in brackets may hold anything; field 10 is minflt, 12 majflt.
+  // The name in brackets may hold anything; field 10 is minflt, 12 majflt, 39 the processor.
   const std::string stat = whole_text(task + "stat");
   std::istringstream fields(stat.substr(std::min(stat.rfind(')') + 1, stat.size())));
   std::string field;
-  for (int i = 3; i <= 12 && fields >> field; ++i) {
+  for (int i = 3; i <= 39 && fields >> field; ++i) {
     if (i == 10 || i == 12) {
       (i == 10 ? c.minor_faults : c.major_faults) = std::strtoull(field.c_str(), nullptr, 10);
+    } else if (i == 39) {
+      c.cpu = static_cast<int>(std::strtol(field.c_str(), nullptr, 10));
     }
   }
-  std::istringstream cpu(whole_text(proc + "/stat"));
-  std::array<std::uint64_t, 8> spent{};  // user nice system idle iowait irq softirq steal
-  if (cpu >> field && field == "cpu") {
-    for (std::uint64_t& one : spent) {
-      cpu >> one;
+  const std::string processors_spent = whole_text(proc + "/stat");
+  const std::size_t mine = processors_spent.find(fmt::format("\ncpu{} ", c.cpu));
+  if (mine != std::string::npos) {
+    std::istringstream spent(
+        processors_spent.substr(mine));  // user nice system idle iowait irq softirq steal
+    std::uint64_t steal = 0;
+    spent >> field;
+    for (int i = 0; i < 8; ++i) {
+      spent >> steal;
     }
     const long per_s = sysconf(_SC_CLK_TCK);
-    if (cpu) {
-      c.stolen_ms = spent[7] * 1000 / static_cast<std::uint64_t>(per_s > 0 ? per_s : 100);
+    if (spent) {
+      c.stolen_ms = steal * 1000 / static_cast<std::uint64_t>(per_s > 0 ? per_s : 100);
     }
+  }
+  if (!scheduler.empty()) {
+    c.stolen_ns = between_clocks_ns(whole_text(scheduler), c.cpu);
   }
   c.smis = smi_count();
   std::istringstream lines(whole_text(proc + "/interrupts"));

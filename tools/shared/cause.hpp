@@ -63,11 +63,16 @@ struct Counters {
   std::int64_t t_ns = 0;  // CLOCK_MONOTONIC
   std::uint64_t minor_faults = 0, major_faults = 0;
   std::optional<std::uint64_t> ran_ns, waited_ns;   // on a processor; runnable, but another ran: schedstat
-  std::optional<std::uint64_t> stolen_ms, smis;     // all processors together
+  int cpu = -1;                                     // where it ran last
+  std::optional<std::uint64_t> stolen_ms;           // of that processor, in steps of 10 ms
+  std::optional<std::uint64_t> stolen_ns;           // the same to the nanosecond
+  std::optional<std::uint64_t> smis;                // of processor 0
   std::map<std::string, std::uint64_t> interrupts;  // by name, all processors together
 };
-// Below `proc` ("/proc"). Takes some 0.1 ms: for an ordinary thread.
-[[nodiscard]] Counters read_counters(int pid, int tid, const std::string& proc = "/proc");
+// Below `proc` ("/proc"). Takes some 0.1 ms: for an ordinary thread. `scheduler`: the kernel's account of its
+// run queues, whose two clocks differ by the stolen time; root's, and another 0.6 ms. Empty: it is not asked.
+[[nodiscard]] Counters read_counters(int pid, int tid, const std::string& proc = "/proc",
+                                     const std::string& scheduler = "");
 
 // What does not change while one looks.
 struct Surroundings {

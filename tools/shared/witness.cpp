@@ -8,6 +8,8 @@
 namespace punctum::tools::late {
 namespace {
 
+constexpr const char* kProc = "/proc";
+constexpr const char* kScheduler = "/sys/kernel/debug/sched/debug";
 constexpr std::size_t kMostExplained = 256, kCountersKept = 64;
 constexpr std::int64_t kLookAgain_ns = 20'000'000;
 constexpr std::int64_t kBetweenTraces_ns = 100'000'000;  // reading one takes a while
@@ -31,23 +33,24 @@ Witness::Witness(const rt::CoreStatus& status, int pid, int tid, bool traced)
     auto trace = KernelTrace::start(tid);
     if (trace) {
       trace_.emplace(std::move(*trace));
+      scheduler_ = surroundings_.virtual_machine ? kScheduler : "";
     } else {
       untraced_ = trace.error();
     }
   }
-  counters_.push_back(read_counters(pid_, tid_));
+  counters_.push_back(read_counters(pid_, tid_, kProc, scheduler_));
 }
 
 void Witness::look() {
   const std::int64_t now_ns = std::chrono::steady_clock::now().time_since_epoch().count();
   if (now_ns >= next_look_ns_) {
     next_look_ns_ = now_ns + kLookAgain_ns;
-    look_at(read_counters(pid_, tid_), false);
+    look_at(read_counters(pid_, tid_, kProc, scheduler_), false);
   }
 }
 
 Explanations Witness::end() {
-  look_at(read_counters(pid_, tid_), true);
+  look_at(read_counters(pid_, tid_, kProc, scheduler_), true);
   found_.more += late_.lost();
   return std::move(found_);
 }

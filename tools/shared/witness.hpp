@@ -46,6 +46,7 @@ class Witness {
   const rt::CoreStatus& status_;
   int pid_, tid_;
   Surroundings surroundings_;
+  std::string scheduler_;  // where it tells the stolen time to the nanosecond
   std::optional<KernelTrace> trace_;
   std::string untraced_;
   hal::Follower<rt::LateRing> late_;

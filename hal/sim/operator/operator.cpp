@@ -55,19 +55,19 @@ double minimum_jerk_rate(double x) NONBLOCKING {
 Tremor::Tremor(std::uint64_t seed, double rms_m, const HandParams& hand, double K, double B) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const Noise noise(seed, Noise::Stream::tremor, axis);
-    for (std::size_t i = 0; i < kLines; ++i) {
-      Line& line = lines_[axis][i];
+    for (std::size_t i = 0; i < Waves::kCount; ++i) {
+      Waves& lines = lines_[axis];
       // One frequency in each eighth of the band.
-      const double part = (static_cast<double>(i) + noise.uniform(2 * i)) / kLines;
-      line.omega = kTwoPi * (8 + 4 * part);
-      line.phase = kTwoPi * noise.uniform(2 * i + 1);
+      const double part = (static_cast<double>(i) + noise.uniform(2 * i)) / Waves::kCount;
+      lines.omega[i] = kTwoPi * (8 + 4 * part);
+      lines.phase[i] = kTwoPi * noise.uniform(2 * i + 1);
       // |(B s + K) / (m s^2 + (B + b) s + K)| at s = j omega: how much of the intention reaches the handle.
-      const double w = line.omega;
+      const double w = lines.omega[i];
       const double through = B * w * (B * w) + K * K;
       const double inertia = K - hand.mass_kg * w * w;
       const double loss = (B + hand.damping_Ns_m) * w;
       const double gain = K > 0 || B > 0 ? std::sqrt(through / (inertia * inertia + loss * loss)) : 1.0;
-      line.amplitude_m = rms_m * std::sqrt(2.0 / kLines) / gain;
+      lines.amplitude[i] = rms_m * std::sqrt(2.0 / Waves::kCount) / gain;
     }
   }
 }
@@ -75,8 +75,8 @@ Tremor::Tremor(std::uint64_t seed, double rms_m, const HandParams& hand, double 
 Vec3 Tremor::at(double t_s) const NONBLOCKING {
   Vec3 sum = Vec3::Zero();
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    for (const Line& line : lines_[axis]) {
-      sum[static_cast<Eigen::Index>(axis)] += line.amplitude_m * math::sin(line.omega * t_s + line.phase);
+    for (const double x_m : lines_[axis].at(t_s)) {
+      sum[static_cast<Eigen::Index>(axis)] += x_m;
     }
   }
   return sum;
@@ -95,33 +95,24 @@ Operator::Operator(const SimConfig& config)
   depth_axis_.normalize();
   sideways_axis_ = depth_axis_.cross(inward);
   const Noise drift(config.seed, Noise::Stream::drift);
-  std::uint64_t n = 0;
-  for (auto& direction : drift_) {
-    for (Wave& w : direction) {
-      w.omega = kTwoPi * (0.03 + 0.12 * drift.uniform(n++));
-      w.phase = kTwoPi * drift.uniform(n++);
-      // So that the velocities of the three add up to drift_m_s rms.
-      w.amplitude = config.operator_params.drift_m_s * std::sqrt(2.0 / 3.0) / w.omega;
-    }
+  for (std::size_t i = 0; i < 2 * kDrifts; ++i) {
+    wander_.omega[i] = kTwoPi * (0.03 + 0.12 * drift.uniform(2 * i));
+    wander_.phase[i] = kTwoPi * drift.uniform(2 * i + 1);
+    // So that the velocities of the three add up to drift_m_s rms.
+    wander_.amplitude[i] = config.operator_params.drift_m_s * std::sqrt(2.0 / 3.0) / wander_.omega[i];
   }
   const Noise tilt(config.seed, Noise::Stream::tilt);
   for (std::size_t i = 0; i < 2; ++i) {
     tilt_mean_rad_[i] = config.operator_params.tilt_rad * tilt.gaussian(i);
-    tilt_[i] = {kTwoPi * (0.05 + 0.1 * tilt.uniform(100 + i)), kTwoPi * tilt.uniform(200 + i),
-                0.15 * config.operator_params.tilt_rad};
+    const std::size_t at = 2 * kDrifts + i;
+    wander_.omega[at] = kTwoPi * (0.05 + 0.1 * tilt.uniform(100 + i));
+    wander_.phase[at] = kTwoPi * tilt.uniform(200 + i);
+    wander_.amplitude[at] = 0.15 * config.operator_params.tilt_rad;
   }
+  wander_.taken_off = wander_.phase;
+  math::sines(wander_.taken_off);
   state_.wanted_tip_m = config.stage.start_m;
   state_.line = inward;
-}
-
-Vec3 Operator::drift_at(double t_s) const NONBLOCKING {
-  std::array<double, 2> d{};
-  for (std::size_t i = 0; i < 2; ++i) {
-    for (const Wave& w : drift_[i]) {
-      d[i] += w.amplitude * (math::sin(w.omega * t_s + w.phase) - math::sin(w.phase));
-    }
-  }
-  return d[0] * sideways_axis_ + d[1] * depth_axis_;
 }
 
 // Index of the picture that the operator reacts to: visual delay old.
@@ -437,12 +428,18 @@ void Operator::step(double from_s, double to_s, const OperatorView& view) NONBLO
       follow_path(dt_s, view);
     }
   }
-  const Vec3 shake = tremor_.at(to_s) + config_.position_scale * hand_from_world(drift_at(to_s));
+  const auto wander = wander_.at(to_s);
+  std::array<double, 2> drift_m{};
+  for (std::size_t i = 0; i < kDrifts; ++i) {
+    drift_m[0] += wander[i];
+    drift_m[1] += wander[kDrifts + i];
+  }
+  const Vec3 drift = drift_m[0] * sideways_axis_ + drift_m[1] * depth_axis_;
+  const Vec3 shake = tremor_.at(to_s) + config_.position_scale * hand_from_world(drift);
   s.arm_target_m = Vec3(s.intention_m.vec() + shake);
+  const double taken_up = -math::expm1(-to_s);
   for (std::size_t i = 0; i < 2; ++i) {
-    s.tilt_rad[i] =
-        tilt_mean_rad_[i] * -math::expm1(-to_s) +
-        tilt_[i].amplitude * (math::sin(tilt_[i].omega * to_s + tilt_[i].phase) - math::sin(tilt_[i].phase));
+    s.tilt_rad[i] = tilt_mean_rad_[i] * taken_up + wander[2 * kDrifts + i];
   }
 }
 

@@ -13,6 +13,7 @@
 #include <array>
 #include <cstdint>
 
+#include "hal/math/elementary.hpp"
 #include "hal/realtime.hpp"
 #include "hal/sim/config.hpp"
 #include "hal/sim/noise.hpp"
@@ -24,6 +25,26 @@ namespace punctum::sim {
 [[nodiscard]] double minimum_jerk(double x) NONBLOCKING;
 [[nodiscard]] double minimum_jerk_rate(double x) NONBLOCKING;
 
+// Sinusoids, computed together.
+struct Waves {
+  static constexpr std::size_t kCount = math::kTogether;
+  using Each = std::array<double, kCount>;
+  Each omega{}, phase{}, amplitude{};
+  Each taken_off{};  // of each sine
+
+  [[nodiscard]] Each at(double t_s) const NONBLOCKING {
+    Each x;
+    for (std::size_t i = 0; i < kCount; ++i) {
+      x[i] = omega[i] * t_s + phase[i];
+    }
+    math::sines(x);
+    for (std::size_t i = 0; i < kCount; ++i) {
+      x[i] = amplitude[i] * (x[i] - taken_off[i]);
+    }
+    return x;
+  }
+};
+
 // Tremor of 8 to 12 Hz: a sum of sinusoids. Their amplitudes are divided by the gain of the arm, so that a
 // handle without friction shakes by rms_m on each axis.
 class Tremor {
@@ -33,13 +54,7 @@ class Tremor {
   [[nodiscard]] Vec3 at(double t_s) const NONBLOCKING;
 
  private:
-  static constexpr int kLines = 8;
-  struct Line {
-    double omega = 0;
-    double phase = 0;
-    double amplitude_m = 0;
-  };
-  std::array<std::array<Line, kLines>, 3> lines_{};
+  std::array<Waves, 3> lines_;
 };
 
 // The truth at this instant. The delay and the misjudgement of what is seen are the operator's own.
@@ -135,23 +150,18 @@ class Operator {
   void strokes(double dt_s) NONBLOCKING;
   void hold_to_run(double dt_s, const OperatorView& view) NONBLOCKING;
   void follow_path(double dt_s, const OperatorView& view) NONBLOCKING;
-  [[nodiscard]] Vec3 drift_at(double t_s) const NONBLOCKING;
   [[nodiscard]] std::size_t seen_slot() const NONBLOCKING;
   [[nodiscard]] Vec3 direction() const NONBLOCKING;  // unit vector of the intended motion
   [[nodiscard]] bool moving() const NONBLOCKING;
   [[nodiscard]] bool refused() const NONBLOCKING;
 
-  struct Wave {
-    double omega = 0;
-    double phase = 0;
-    double amplitude = 0;
-  };
-
   SimConfig config_;
   Tremor tremor_;
   Noise aim_;
-  std::array<std::array<Wave, 3>, 2> drift_{};  // across the needle, at the needle, metres
-  std::array<Wave, 2> tilt_{};                  // phase unused: omega, phase and size of the sway
+  static constexpr std::size_t kDrifts = 3;
+  static_assert(2 * kDrifts + 2 == Waves::kCount);
+  // In two directions across the needle, at the needle, in metres; then of the tilt. They begin at zero.
+  Waves wander_;
   std::array<double, 2> tilt_mean_rad_{};
   Vec3 sideways_axis_, depth_axis_;  // unit, perpendicular to the mounted axis; depth_axis_ is mostly z
   OperatorState state_;

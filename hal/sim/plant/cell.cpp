@@ -158,7 +158,7 @@ Cell::Pose Cell::pose(const CellState& state, const TipMotion& motion, double s)
 // Dimples at a pose reached after dt_s without events. Intact ones follow what pushes them; punctured ones
 // recoil exponentially, to a lip while the needle is in the hole.
 void Cell::relax(CellState& state, const Pose& p, double dt_s) const NONBLOCKING {
-  const double keep = math::exp(-dt_s / params_.recoil_s);
+  const auto keep = [&]() NONBLOCKING { return math::exp(-dt_s / params_.recoil_s); };
   const bool inside = p.outer.hit && p.outer.depth > 0;
   const auto aim = [&](MembraneState& membrane, const Chord& c) {
     put(membrane.axis_m, c.normal);
@@ -166,12 +166,12 @@ void Cell::relax(CellState& state, const Pose& p, double dt_s) const NONBLOCKING
   };
   const auto recoil = [&](MembraneState& membrane, bool plugged) {
     const double lip = plugged ? std::min(kLip_m, membrane.puncture_depth_m) : 0;
-    membrane.dimple_m = lip + (membrane.dimple_m - lip) * keep;
+    membrane.dimple_m = lip + (membrane.dimple_m - lip) * keep();
   };
   if (state.outer.punctured) {
     recoil(state.outer, inside);
   } else if (!state.attached) {
-    state.outer.dimple_m *= keep;
+    state.outer.dimple_m *= keep();
   } else {
     state.outer.dimple_m = inside ? p.normal_depth : 0;
     if (p.outer.hit) {
@@ -186,7 +186,7 @@ void Cell::relax(CellState& state, const Pose& p, double dt_s) const NONBLOCKING
   } else {
     // After its puncture the zona no longer pushes the inner membrane, which recoils until it meets the tip.
     const double pushed = inside && p.inner.hit && state.attached ? std::max(0.0, p.inner_normal_depth) : 0;
-    const double left = state.outer.punctured || !state.attached ? state.inner.dimple_m * keep : 0;
+    const double left = state.outer.punctured || !state.attached ? state.inner.dimple_m * keep() : 0;
     if (pushed > 0) {
       aim(state.inner, p.inner);
     }
@@ -287,9 +287,8 @@ double Cell::locate(const CellState& state, const TipMotion& motion, Event event
 }
 
 // The first event on the way from `at` to the end, and where on it; Event::none when there is none.
-Cell::Occurrence Cell::first_event(const CellState& state, const TipMotion& motion, double at) const
-    NONBLOCKING {
-  const Pose end = pose(state, motion, 1);
+Cell::Occurrence Cell::first_event(const CellState& state, const TipMotion& motion, double at,
+                                   const Pose& end) const NONBLOCKING {
   Occurrence first;
   for (const Event event :
        {Event::touch, Event::outer_gives, Event::inner_gives, Event::far_wall, Event::rip, Event::leave}) {
@@ -350,9 +349,10 @@ CellForce Cell::step(CellState& state, const TipMotion& motion, double dt_s) con
     put(state.hole_m, vec(state.hole_m) + moved);
   }
 
+  Pose end = pose(state, motion, 1);
   double at = 0, time = 0;  // parts of the way and of the time
   for (int handled = 0; handled < kEventsPerStep; ++handled) {
-    const Occurrence first = first_event(state, motion, at);
+    const Occurrence first = first_event(state, motion, at, end);
     if (first.event == Event::none) {
       break;
     }
@@ -362,14 +362,14 @@ CellForce Cell::step(CellState& state, const TipMotion& motion, double dt_s) con
     relax(state, p, (time_now - time) * dt_s);
     time = time_now;
     happen(state, first.event, p, state.time_s + time * dt_s);
+    end = pose(state, motion, 1);
   }
-  const Pose p = pose(state, motion, 1);
-  relax(state, p, (1 - time) * dt_s);
+  relax(state, end, (1 - time) * dt_s);
   state.time_s += dt_s;
   if (state.torn || state.far_wall_pierced) {
     state.leak = 1 - (1 - state.leak) * math::exp(-dt_s / kLeak_s);
   }
-  return force(state, p, motion, dt_s);
+  return force(state, end, motion, dt_s);
 }
 
 // What the needle feels and what there is to see where the step ends; a force too large tears the cell off.

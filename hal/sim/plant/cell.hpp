@@ -130,8 +130,8 @@ class Cell {
   [[nodiscard]] double past(const CellState& state, Event event, const Pose& pose) const NONBLOCKING;
   [[nodiscard]] double locate(const CellState& state, const TipMotion& motion, Event event, double before,
                               double past_end) const NONBLOCKING;
-  [[nodiscard]] Occurrence first_event(const CellState& state, const TipMotion& motion, double at) const
-      NONBLOCKING;
+  [[nodiscard]] Occurrence first_event(const CellState& state, const TipMotion& motion, double at,
+                                       const Pose& end) const NONBLOCKING;
   void happen(CellState& state, Event event, const Pose& pose, double now_s) const NONBLOCKING;
   [[nodiscard]] CellForce force(CellState& state, const Pose& pose, const TipMotion& motion,
                                 double dt_s) const NONBLOCKING;

@@ -13,11 +13,56 @@ namespace {
 constexpr double kAtRest_m_s = 1e-12;  // slower is at rest as far as friction is concerned
 constexpr int kMaxPieces = 256;        // per call; a handle comes to rest long before
 
+// How m y'' + c y' + K y = 0 moves. The axes of a handle share it, and mostly the time that it is asked for.
+class Swing {
+ public:
+  struct Modes {
+    double C;  // e^(-alpha t) cosh(sqrt(D) t)
+    double S;  // e^(-alpha t) sinh(sqrt(D) t) / sqrt(D)
+  };
+
+  // y'' + 2 alpha y' + w2 y = 0.
+  Swing(double m, double c, double K) NONBLOCKING : alpha(c / (2 * m)),
+                                                    w2(K / m),
+                                                    D(alpha* alpha - w2),
+                                                    root(std::sqrt(std::abs(D))) {}
+
+  [[nodiscard]] const Modes& modes(double t) NONBLOCKING {
+    if (t != asked_s_) {
+      asked_s_ = t;
+      modes_ = modes_at(t);
+    }
+    return modes_;
+  }
+
+  const double alpha, w2, D, root;
+
+ private:
+  [[nodiscard]] Modes modes_at(double t) const NONBLOCKING {
+    if (root * t < 1e-9) {
+      const double e = math::exp(-alpha * t);
+      return {e, e * t};
+    }
+    if (D < 0) {
+      const double e = math::exp(-alpha * t);
+      const math::SinCos turn = math::sin_cos(root * t);
+      return {e * turn.cos, e * turn.sin / root};
+    }
+    const double slow = math::exp(-w2 / (alpha + root) * t);  // alpha - sqrt(D) without cancellation
+    const double fast = math::exp(-(alpha + root) * t);
+    return {(slow + fast) / 2, -slow * math::expm1(-2 * root * t) / (2 * root)};
+  }
+
+  double asked_s_ = -1;
+  Modes modes_{};
+};
+
 // m x'' + c x' + K x = g0 + K u t, from x0, v0 at t = 0.
 class Slide {
  public:
-  Slide(double m, double c, double K, double g0, double u, double x0, double v0) NONBLOCKING
-      : u_(u),
+  Slide(Swing& swing, double m, double c, double K, double g0, double u, double x0, double v0) NONBLOCKING
+      : swing_(swing),
+        u_(u),
         x0_(x0),
         v0_(v0),
         with_spring_(K > 0) {
@@ -27,17 +72,13 @@ class Slide {
       a0_ = std::abs(g_) + rate_ * std::abs(v0);
       return;
     }
-    // Particular solution A + u t; y = x - A - u t obeys y'' + 2 alpha y' + w2 y = 0.
-    alpha_ = c / (2 * m);
-    w2_ = K / m;
-    D_ = alpha_ * alpha_ - w2_;
-    root_ = std::sqrt(std::abs(D_));
+    // Particular solution A + u t; y = x - A - u t swings.
     A_ = (g0 - c * u) / K;
     y0_ = x0 - A_;
     P_ = v0 - u;
-    Q_ = -(w2_ * y0_ + alpha_ * P_);
-    a0_ = Q_ - alpha_ * P_;
-    a1_ = P_ * D_ - alpha_ * Q_;
+    Q_ = -(swing.w2 * y0_ + swing.alpha * P_);
+    a0_ = Q_ - swing.alpha * P_;
+    a1_ = P_ * swing.D - swing.alpha * Q_;
   }
 
   [[nodiscard]] HandAxis at(double t) const NONBLOCKING {
@@ -47,8 +88,8 @@ class Slide {
       const double phi2 = z > 1e-2 ? (1 - phi1) / z : 0.5 - z / 6 + z * z / 24 - z * z * z / 120;
       return {x0_ + t * (v0_ * phi1 + g_ * t * phi2), v0_ * math::exp(-z) + g_ * t * phi1};
     }
-    const auto [C, S] = modes(t);
-    return {A_ + u_ * t + y0_ * C + (P_ + alpha_ * y0_) * S, u_ + P_ * C + Q_ * S};
+    const auto [C, S] = swing_.modes(t);
+    return {A_ + u_ * t + y0_ * C + (P_ + swing_.alpha * y0_) * S, u_ + P_ * C + Q_ * S};
   }
 
   // First time in (0, end] at which sign * velocity becomes negative, or end.
@@ -70,24 +111,6 @@ class Slide {
   }
 
  private:
-  struct Modes {
-    double C;  // e^(-alpha t) cosh(sqrt(D) t)
-    double S;  // e^(-alpha t) sinh(sqrt(D) t) / sqrt(D)
-  };
-  [[nodiscard]] Modes modes(double t) const NONBLOCKING {
-    if (root_ * t < 1e-9) {
-      const double e = math::exp(-alpha_ * t);
-      return {e, e * t};
-    }
-    if (D_ < 0) {
-      const double e = math::exp(-alpha_ * t);
-      return {e * math::cos(root_ * t), e * math::sin(root_ * t) / root_};
-    }
-    const double slow = math::exp(-w2_ / (alpha_ + root_) * t);  // alpha - sqrt(D) without cancellation
-    const double fast = math::exp(-(alpha_ + root_) * t);
-    return {(slow + fast) / 2, -slow * math::expm1(-2 * root_ * t) / (2 * root_)};
-  }
-
   // The first zero of the acceleration a0 C + a1 S after `from`.
   [[nodiscard]] double next_turn(double from) const NONBLOCKING {
     constexpr double never = 1e300;
@@ -95,20 +118,20 @@ class Slide {
       return never;
     }
     const double after = from * (1 + 1e-12) + 1e-15;
-    if (D_ < 0) {
-      if (root_ <= 0) {
+    if (swing_.D < 0) {
+      if (swing_.root <= 0) {
         return never;
       }
-      double turn = math::atan2(-a0_, a1_ / root_) / root_;
-      const double half_turn = std::numbers::pi / root_;
+      double turn = math::atan2(-a0_, a1_ / swing_.root) / swing_.root;
+      const double half_turn = std::numbers::pi / swing_.root;
       turn += half_turn * std::ceil((after - turn) / half_turn);
       return turn > from ? turn : turn + half_turn;
     }
     double turn = never;
-    if (root_ > 0) {
-      const double tanh_turn = -a0_ * root_ / a1_;
+    if (swing_.root > 0) {
+      const double tanh_turn = -a0_ * swing_.root / a1_;
       if (a1_ != 0 && tanh_turn > 0 && tanh_turn < 1) {
-        turn = math::atanh(tanh_turn) / root_;
+        turn = math::atanh(tanh_turn) / swing_.root;
       }
     } else if (a1_ != 0) {
       turn = -a0_ / a1_;
@@ -151,17 +174,20 @@ class Slide {
     return a;
   }
 
+  Swing& swing_;
   double u_, x0_, v0_;
   bool with_spring_;
   double rate_ = 0, g_ = 0;
-  double alpha_ = 0, w2_ = 0, D_ = 0, root_ = 0, A_ = 0, y0_ = 0, P_ = 0, Q_ = 0;
+  double A_ = 0, y0_ = 0, P_ = 0, Q_ = 0;
   double a0_ = 0, a1_ = 0;  // acceleration a0 C + a1 S; without a spring a0 bounds it
 };
 
-}  // namespace
+[[nodiscard]] Swing swing_of(const HandParams& hand, const ArmImpedance& arm) NONBLOCKING {
+  return {hand.mass_kg, arm.damping_Ns_m + hand.damping_Ns_m, arm.stiffness_N_m};
+}
 
-void advance(HandAxis& axis, const HandParams& hand, const ArmImpedance& arm, double force_N, double p0_m,
-             double u_m_s, double dt_s) NONBLOCKING {
+void advance(HandAxis& axis, Swing& swing, const HandParams& hand, const ArmImpedance& arm, double force_N,
+             double p0_m, double u_m_s, double dt_s) NONBLOCKING {
   const double m = hand.mass_kg;
   const double K = arm.stiffness_N_m;
   const double B = arm.damping_Ns_m;
@@ -199,7 +225,7 @@ void advance(HandAxis& axis, const HandParams& hand, const ArmImpedance& arm, do
         sign = pull > 0 ? 1 : -1;
       }
     }
-    const Slide slide(m, c, K, drive - sign * friction, u_m_s, axis.x_m, axis.v_m_s);
+    const Slide slide(swing, m, c, K, drive - sign * friction, u_m_s, axis.x_m, axis.v_m_s);
     const double until = sign == 0 ? left : slide.stops_at(sign, left);
     axis = slide.at(until);
     if (until < left) {
@@ -207,6 +233,14 @@ void advance(HandAxis& axis, const HandParams& hand, const ArmImpedance& arm, do
     }
     t += until;
   }
+}
+
+}  // namespace
+
+void advance(HandAxis& axis, const HandParams& hand, const ArmImpedance& arm, double force_N, double p0_m,
+             double u_m_s, double dt_s) NONBLOCKING {
+  Swing swing = swing_of(hand, arm);
+  advance(axis, swing, hand, arm, force_N, p0_m, u_m_s, dt_s);
 }
 
 SimHand::SimHand(const HandParams& params, const ArmImpedance& arm, std::uint64_t seed)
@@ -231,9 +265,10 @@ void SimHand::step(std::int64_t t_ns, double dt_s, const Vec3& p0, const Vec3& p
   Vec3 x = state_.position_m;
   Vec3 v = state_.velocity_m_s;
   const Vec3 before = x;
+  Swing swing = swing_of(params_, arm_);
   for (int i = 0; i < 3; ++i) {
     HandAxis axis{x[i], v[i]};
-    advance(axis, params_, arm_, f[i], p0[i], u[i], dt_s);
+    advance(axis, swing, params_, arm_, f[i], p0[i], u[i], dt_s);
     x[i] = axis.x_m;
     v[i] = axis.v_m_s;
   }

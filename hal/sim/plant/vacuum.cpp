@@ -14,7 +14,9 @@ SimVacuum::SimVacuum(const HolderParams& params, std::uint64_t seed)
 
 void SimVacuum::step(std::int64_t t_ns, double dt_s, const Failing& failure) NONBLOCKING {
   const double target = failure == Failure::saturate ? 0.0 : target_Pa_;
-  state_.pressure_Pa += (target - state_.pressure_Pa) * -math::expm1(-dt_s / kLeak_s);
+  if (state_.pressure_Pa != target) {
+    state_.pressure_Pa += (target - state_.pressure_Pa) * -math::expm1(-dt_s / kLeak_s);
+  }
   const double rms_Pa = kNoise_Pa + (failure == Failure::noise ? kInterference_Pa : 0.0);
   state_.reading_Pa = state_.pressure_Pa + rms_Pa * noise_.gaussian(static_cast<std::uint64_t>(t_ns));
   failure_ = failure;

@@ -838,6 +838,18 @@ TEST(CauseOfALateTick, is_silence_that_only_a_counter_names) {
   EXPECT_EQ(cause_of(late(490, 495), trace, at(99.99), after).cause, Cause::stolen_time);
   EXPECT_EQ(cause_of(late(490, 495), trace, at(99.8), after).cause, Cause::unknown)
       << "another tick's, perhaps";
+  after.cpu = 1;
+  EXPECT_EQ(cause_of(late(490, 495), trace, at(99.99), after).cause, Cause::unknown)
+      << "another processor's, perhaps";
+  after = at(100.01);
+  Counters before = at(99.99);
+  before.stolen_ns = 7'000;
+  after.stolen_ns = 7'000 + 460'000;
+  EXPECT_EQ(cause_of(late(490, 495), trace, before, after).cause, Cause::stolen_time) << "less than a step";
+  after.stolen_ns = 7'000 + 160'000;
+  after.stolen_ms = 10;
+  EXPECT_EQ(cause_of(late(490, 495), trace, before, after).cause, Cause::unknown)
+      << "a step of earlier ticks";
   after.smis = 1;
   EXPECT_EQ(cause_of(late(490, 495), trace, at(99.99), after).cause, Cause::smi);
 }
@@ -882,18 +894,28 @@ TEST(CountersOfAThread, are_read_where_the_kernel_keeps_them) {
   const fs::path proc = fs::temp_directory_path() / ("punctum_jitter_counters_" + std::to_string(getpid()));
   fs::create_directories(proc / "7/task/8");
   std::ofstream(proc / "7/task/8/schedstat") << "500 40 3\n";
-  std::ofstream(proc / "7/task/8/stat") << "8 (a) b) R 1 1 1 0 -1 4194304 11 12 13 14 0 0\n";
-  std::ofstream(proc / "stat") << "cpu  1 2 3 4 5 6 7 80 0 0\ncpu0 1 2 3 4 5 6 7 80 0 0\n";
+  std::ofstream(proc / "7/task/8/stat")
+      << "8 (a) b) R 1 1 1 0 -1 4194304 11 12 13 14 0 0 17 18 19 20 21 22 23 24 "
+         "25 26 27 28 29 30 31 32 33 34 35 36 37 38 17 1 40\n";
+  std::ofstream(proc / "stat")
+      << "cpu  1 2 3 4 5 6 7 80 0 0\ncpu0 1 2 3 4 5 6 7 70 0 0\ncpu1 1 2 3 4 5 6 7 10 0 0\n";
+  std::ofstream(proc / "scheduler")
+      << "Version\ncpu#10, 2596.1 MHz\n  .clock        : 9.000000\n  .clock_task   : 1.000000\n"
+         "cpu#1, 2596.1 MHz\n  .clock        : 130.133713\n  .clock_task   : 90.991233\n";
   std::ofstream(proc / "interrupts")
       << "           CPU0       CPU1\n 24:          1          2  IO-APIC   5-edge      "
          "eth0\nLOC:         10         20   Local timer interrupts\nERR:          0\n";
-  const Counters c = read_counters(7, 8, proc.string());
+  const Counters c = read_counters(7, 8, proc.string(), proc / "scheduler"),
+                 unasked = read_counters(7, 8, proc.string());
   fs::remove_all(proc);
   EXPECT_EQ(c.waited_ns, 40U);
   EXPECT_EQ(c.ran_ns, 500U);
   EXPECT_EQ(c.minor_faults, 11U);
   EXPECT_EQ(c.major_faults, 13U);
-  EXPECT_EQ(c.stolen_ms, 80U * 1000U / static_cast<std::uint64_t>(sysconf(_SC_CLK_TCK)));
+  EXPECT_EQ(c.cpu, 1);
+  EXPECT_EQ(c.stolen_ms, 10U * 1000U / static_cast<std::uint64_t>(sysconf(_SC_CLK_TCK)));
+  EXPECT_EQ(c.stolen_ns, 39'142'480U);
+  EXPECT_EQ(unasked.stolen_ns, std::nullopt);
   EXPECT_EQ(c.interrupts.at("irq 24: eth0"), 3U);
   EXPECT_EQ(c.interrupts.at("LOC:"), 30U);
 }

@@ -40,7 +40,7 @@ constexpr double kLeastDimple_px = 0.7;   // depth from which the width of a dim
 constexpr double kNear_px = 8;            // nearer, the needle may touch the membrane
 constexpr double kClear_px = 3;           // further away, it does not: its blur ends before
 constexpr double kContactPoint_px = 0.7;  // standard deviation of a membrane on the needle's side
-constexpr double kAtMembrane_px = 0.6, kInside_px = 1.5;  // to which the picture alone shows the tip there
+constexpr double kAtMembrane_px = 0.45, kInside_px = 1.5;  // to which the picture alone shows the tip there
 // By which it draws the end of the needle ahead: what is seen and put right; and where that is not seen, for
 // each time that it is more blurred.
 constexpr double kDrawn_px = 1.5, kDrawnBlurred_px = 3.5;
@@ -99,7 +99,8 @@ struct Tracker::Impl {
   bool first_picture = true;    // of it everything is searched at once; later each frame bears a part
   LearntUndeformed undeformed;  // of the outer one
   bool was_contact = false;
-  bool touches_next = false;  // it was outside, and will not be in this frame, by its speed
+  bool touches_next =
+      false;  // it was outside or just within, and will not be outside in this frame, by its speed
   ContactTest contact;
   Puncture puncture;
   InnerPuncture inner_puncture;
@@ -142,6 +143,7 @@ struct Tracker::Impl {
   [[nodiscard]] cv::Rect area_to_search(bool starting) const;
   [[nodiscard]] Vector<Side> holder_sides() const;
   [[nodiscard]] bool looks_again();
+  void learn_tip_again();
   [[nodiscard]] bool search_needle();
   void forget_needle();
   void recognise_needle();
@@ -330,6 +332,21 @@ bool Tracker::Impl::looks_again() {
   return frames >= kSome && needle.doubtful(frames < GatheredFrames::kMost ? kSome : frames);
 }
 
+// From the frames in which the end is told now.
+void Tracker::Impl::learn_tip_again() {
+  constexpr int kBeside_px = 24;
+  const NeedlePose now = needle.as_found(picture.noise);
+  for (int age = gathered.count() - 1; age > 0 && outer.known; --age) {
+    NeedlePose then = now;
+    then.tip -= gathered.way(age) + age * needle.velocity();
+    const auto entry = entry_point(outer.contour(), then.tip, then.axis);
+    if (entry && (*entry - then.tip).dot(then.axis) > TipOnMembrane::kClearAhead_px) {
+      tip_on_membrane.learn(
+          gathered.one(age, cv::Rect(square_round(then.tip, kBeside_px)), picture.field.sigma), then);
+    }
+  }
+}
+
 // Whether this frame shows its end.
 bool Tracker::Impl::search_needle() {
   // A membrane at the tip of a faint needle looks like its end.
@@ -339,7 +356,11 @@ bool Tracker::Impl::search_needle() {
   if (looks_again()) {
     by_stage.forget();
     tip_on_membrane = {};
-    return needle.look_again(picture.field.sigma, clear_at, gathered);
+    const bool found = needle.look_again(picture.field.sigma, clear_at, gathered);
+    if (found) {
+      learn_tip_again();
+    }
+    return found;
   }
   if (!needle_due) {
     return false;
@@ -840,7 +861,7 @@ void Tracker::Impl::reconstruct_surfaces() {
 void Tracker::Impl::decide_phase() {
   tip.update(result.needle);
   touches_next =
-      result.gap_px && *result.gap_px >= 0 && *result.gap_px < kNear_px && *result.gap_px < tip.speed;
+      result.gap_px && *result.gap_px > -kClear_px && *result.gap_px < kNear_px && *result.gap_px < tip.speed;
   if (needle_hidden()) {
     return;
   }

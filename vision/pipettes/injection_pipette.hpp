@@ -70,6 +70,8 @@ class InjectionPipette {
   // Its end in all those frames, the last of which it was followed to. False, and to be found anew, where
   // they do not tell it.
   [[nodiscard]] bool look_again(double sigma_px, const Clear& clear_at, GatheredFrames& frames);
+  // By which it is expected to move in a frame, px.
+  [[nodiscard]] const Point& velocity() const noexcept { return velocity_; }
   [[nodiscard]] bool started() const noexcept { return started_; }
   // Walls and what lies between them were told apart at the start.
   [[nodiscard]] bool shows_lumen() const noexcept { return lumen_; }

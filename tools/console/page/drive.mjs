@@ -576,7 +576,13 @@ async function all() {
     };
     await until('it is over', async () => {
       const next = await text('hand-step');
-      if (/press it anew/i.test(next) || /press it again\.$/.test(next) && /left button/.test(next)) {
+      if (/^Take the hand/.test(next)) {  // a page that stands still for longer than it is lent loses it
+        await go('');
+        await hold('left', false);
+        await hold('right', false);
+        await page.keyboard.press('h');
+        await page.waitForTimeout(300);
+      } else if (/press it anew/i.test(next) || /press it again\.$/.test(next) && /left button/.test(next)) {
         await go('');
         await hold('left', false);
         await page.waitForTimeout(700);

@@ -40,6 +40,8 @@ constexpr double kLeastDimple_px = 0.7;   // depth from which the width of a dim
 constexpr double kNear_px = 8;            // nearer, the needle may touch the membrane
 constexpr double kClear_px = 3;           // further away, it does not: its blur ends before
 constexpr double kContactPoint_px = 0.7;  // standard deviation of a membrane on the needle's side
+constexpr double kWall_px =
+    0.4;  // from the membrane, which is what is seen on the tip, to the outermost glass
 constexpr double kAtMembrane_px = 0.45, kInside_px = 1.5;  // to which the picture alone shows the tip there
 // By which it draws the end of the needle ahead: what is seen and put right; and where that is not seen, for
 // each time that it is more blurred.
@@ -428,6 +430,7 @@ void Tracker::Impl::locate_needle() {
     n = needle.by_shaft(picture.field, picture.noise, *tip_told).value_or(n);
     n.sd = by_stage.sd();
   } else if (tip_told) {
+    n.sd = math::hypot(n.sd, at_membrane() ? kWall_px : 0);
     n = by_stage.most_likely(n);
     needle.put(n.tip);
     // In contact the picture shows where the membrane is, on the tip; of a thin needle it draws the end back.

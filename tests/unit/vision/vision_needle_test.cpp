@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <random>
@@ -424,25 +425,36 @@ TEST(WideNeedle, does_not_end_where_something_lies_across_it) {
   }
 }
 
+// A needle out of focus, found and then followed as it moves on by a pixel per frame. each(frame, by how much
+// it is told too far ahead, pose); frame 0 is the one in which it is found.
+void follow_out_of_focus(unsigned seed, unsigned frames,
+                         const std::function<void(unsigned, double, const NeedlePose&)>& each) {
+  InjectionPipette needle(Side::right, kWideRadius);
+  Wide wide{.closed = true, .blur_px = 2.6, .radius = 6};
+  ASSERT_TRUE(needle.start(draw(wide, 100 * seed), kWideNoise, kClear)) << seed;
+  const NeedlePose found = needle.as_found(kWideNoise);
+  each(0, wide.tip - found.tip.x, found);
+  for (unsigned frame = 1; frame <= frames; ++frame) {
+    wide.tip -= 1;
+    const GradientField field = draw(wide, 100 * seed + frame);
+    const NeedlePose seen = needle.find(field, kWideNoise, std::nullopt);
+    ASSERT_TRUE(seen.ok) << seed << ' ' << frame << ": " << seen.reason;
+    needle.learn(field, seen, kWideNoise);
+    each(frame, wide.tip - seen.tip.x, seen);
+  }
+}
+
 // There its shape and its walls end several pixels apart.
 TEST(WideNeedle, is_followed_where_it_was_found_though_it_is_out_of_focus) {
   constexpr double kUsual_px = 1.5;
-  constexpr unsigned kFrames = 6;
+  constexpr unsigned kSeeds = 6, kFrames = 6;
   double shifts = 0;
-  const std::vector<unsigned> seeds{1, 2, 3, 4, 5, 6};
-  for (const unsigned seed : seeds) {
-    InjectionPipette needle(Side::right, kWideRadius);
-    Wide wide{.closed = true, .blur_px = 2.6, .radius = 6};
-    ASSERT_TRUE(needle.start(draw(wide, 100 * seed), kWideNoise, kClear)) << seed;
-    const double off = needle.as_found(kWideNoise).tip.x - wide.tip;
-    for (unsigned frame = 1; frame <= kFrames; ++frame) {
-      wide.tip -= 1;
-      const GradientField field = draw(wide, 100 * seed + frame);
-      const NeedlePose seen = needle.find(field, kWideNoise, std::nullopt);
-      ASSERT_TRUE(seen.ok) << seed << ' ' << frame << ": " << seen.reason;
-      shifts += std::abs(seen.tip.x - wide.tip - off) / static_cast<double>(kFrames * seeds.size());
-      needle.learn(field, seen, kWideNoise);
-    }
+  for (unsigned seed = 1; seed <= kSeeds; ++seed) {
+    double off = 0;
+    follow_out_of_focus(seed, kFrames, [&](unsigned frame, double ahead, const NeedlePose&) {
+      off = frame == 0 ? ahead : off;
+      shifts += std::abs(ahead - off) / (kFrames * kSeeds);
+    });
   }
   EXPECT_LT(shifts, kUsual_px);
 }
@@ -451,29 +463,18 @@ TEST(WideNeedle, is_followed_where_it_was_found_though_it_is_out_of_focus) {
 // frame by frame.
 TEST(WideNeedle, is_the_more_certain_the_longer_it_is_seen_out_of_focus) {
   constexpr double kAtFirst_px = 1.5, kBias_px = 0.4, kCovers = 3;
-  constexpr unsigned kFrames = 10;
+  constexpr unsigned kSeeds = 6, kFrames = 10;
   double bias = 0;
-  const std::vector<unsigned> seeds{1, 2, 3, 4, 5, 6};
-  for (const unsigned seed : seeds) {
-    InjectionPipette needle(Side::right, kWideRadius);
-    Wide wide{.closed = true, .blur_px = 2.6, .radius = 6};
-    ASSERT_TRUE(needle.start(draw(wide, 100 * seed), kWideNoise, kClear)) << seed;
-    double sd_at_first = 0;
-    for (unsigned frame = 1; frame <= kFrames; ++frame) {
-      wide.tip -= 1;
-      const GradientField field = draw(wide, 100 * seed + frame);
-      const NeedlePose seen = needle.find(field, kWideNoise, std::nullopt);
-      ASSERT_TRUE(seen.ok) << seed << ' ' << frame << ": " << seen.reason;
-      needle.learn(field, seen, kWideNoise);
-      const double ahead = wide.tip - seen.tip.x;
+  for (unsigned seed = 1; seed <= kSeeds; ++seed) {
+    double sd_at_first = 0, sd = 0;
+    follow_out_of_focus(seed, kFrames, [&](unsigned frame, double ahead, const NeedlePose& seen) {
       EXPECT_LT(std::abs(ahead), kCovers * seen.sd) << seed << ' ' << frame;
       sd_at_first = frame == 1 ? seen.sd : sd_at_first;
-      if (frame == kFrames) {
-        EXPECT_GT(sd_at_first, kAtFirst_px) << seed;
-        EXPECT_LT(seen.sd, sd_at_first / 1.5) << seed;
-      }
-      bias += frame > kFrames / 2 ? ahead / (kFrames / 2 * static_cast<double>(seeds.size())) : 0;
-    }
+      sd = seen.sd;
+      bias += frame > kFrames / 2 ? ahead / (kFrames / 2 * kSeeds) : 0;
+    });
+    EXPECT_GT(sd_at_first, kAtFirst_px) << seed;
+    EXPECT_LT(sd, sd_at_first / 1.5) << seed;
   }
   EXPECT_NEAR(bias, 0, kBias_px);
 }

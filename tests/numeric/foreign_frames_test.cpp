@@ -133,6 +133,7 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
   std::vector<double> tip_px, depth_px;        // seen minus true: along the axis before contact, in contact
   std::vector<double> told_px, told_depth_px;  // likewise in all phases, and in contact, with the pose
   std::vector<double> touching_px;             // tip in contact, from the membrane
+  double furthest_px = 0;                      // of those
   double surest = 0;                           // tip, when the membrane gives way: deviations off
   for (int k = 0; k < frames; ++k) {
     char name[32];
@@ -163,6 +164,7 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
       tip_px.push_back(ahead);
     } else if (phase == "contact" && seen.needle.ok) {
       touching_px.push_back(ahead + kGlassAhead_px);
+      furthest_px = std::max(furthest_px, std::abs(touching_px.back()));
     } else if (phase == "puncture" && seen.needle.ok) {
       surest = std::max(surest, std::abs(ahead) / seen.needle.sd);
     }
@@ -197,6 +199,10 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
   }
   const bool sharp = GetParam().blur_px < 2;
   expect_near_truth("tip that touches", touching_px, sharp ? 0.5 : 1.5);
+  if (sharp) {
+    EXPECT_LT(furthest_px, 0.5);
+  }
+  std::printf("tip that touches: at most %.2f px off\n", furthest_px);
   std::printf("tip when the membrane gives way: %.1f deviations off at most\n", surest);
   EXPECT_LT(surest, 3.2);
   if (!sharp) {

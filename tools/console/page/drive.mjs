@@ -511,11 +511,14 @@ async function all() {
     await page.waitForFunction(() => punctum.drawn.live.tip && punctum.parameters.length > 4);
     const note = () => text('target-note');
     // So deep past the membrane, which is the gap that vision measured ahead of the tip; without a depth the tip itself. The gap.
-    const at = async (depth_um) => {
-      const [x, y, scale, gap_um] = await page.evaluate(() => [...punctum.drawn.live.tip, punctum.drawn.live.pixel, 1e6 * punctum.newest.obs_gap_m]);
+    // Again where the picture that was clicked is one that vision found no needle in, or has not looked at.
+    const at = (depth_um) => until('a picture with a needle in it is clicked', async () => {
+      const seen = await page.evaluate(() => punctum.drawn.live.tip && [...punctum.drawn.live.tip, punctum.drawn.live.pixel, 1e6 * punctum.newest.obs_gap_m]);
+      if (!seen) return;
+      const [x, y, scale, gap_um] = seen;
       await page.locator('#live').click({position: {x: depth_um === undefined ? x : x - 1e-6 * (gap_um + depth_um) * scale, y}, timeout: 3000});
-      return gap_um;
-    };
+      return !/^No depth is known/.test(await note()) && gap_um;
+    });
     await at(30);
     assert.match(await note(), /Take control first/);
     assert.ok(!await page.locator('#target-set').isVisible());

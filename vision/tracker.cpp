@@ -592,6 +592,7 @@ Surroundings Tracker::Impl::surroundings() {
   membrane_needle.tip += wall_px * result.needle.axis;
   return {.needle = membrane_needle,
           .last_tip = tip.last,
+          .expected_px = by_stage.moved() ? by_stage.moved()->dot(result.needle.axis) : tip.speed,
           .punctured = punctured,
           .dents_seen = result.needle.ok || !config.needle || round_as_if_untouched(),
           .undeformed = undeformed.shape() ? &*undeformed.shape() : nullptr};
@@ -761,7 +762,7 @@ void Tracker::Impl::classify_contact(const std::optional<double>& membrane_behin
   PunctureInput in;
   in.t_ns = result.exposure_ns;
   if (result.gap_px) {
-    result.contact = contact.update(*result.gap_px, result.gap_sd_px);
+    result.contact = contact.update(*result.gap_px, result.gap_sd_px, touches_next);
   }
   // A frame that does not show needle and cell changes nothing; a needle that points past the cell is off it.
   const bool unseen = !(result.needle.ok && result.outer.ok);

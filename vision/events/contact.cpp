@@ -80,12 +80,12 @@ bool needle_merges_with_cell(const ClearedPicture& picture, const NeedlePose& ne
   return merge_classes(picture.strong, needle_pixels, cell_pixels, rows).merged;
 }
 
-bool ContactTest::update(double gap_px, double sd_px) {
+bool ContactTest::update(double gap_px, double sd_px, bool expected) {
   constexpr double kChanges = 0.05;  // probability that the state changes in a frame: a visit takes some 20
   constexpr double kSystematic_px = 0.2;  // by which the tip and the outline may be off alike in all frames
   constexpr double kFarthest = 4;         // standard deviations: what is further off is as certain
-  const double odds = math::exp(log_odds_), stays = 1 - kChanges;
-  const double before = math::log((kChanges + stays * odds) / (stays + kChanges * odds));
+  const double odds = math::exp(log_odds_), begins = expected ? 0.5 : kChanges;
+  const double before = math::log((begins + (1 - kChanges) * odds) / (1 - begins + kChanges * odds));
   // While apart any gap > 0 is as likely as another, while touching any < 0; both scatter as the measurement
   // does. The ratio of the likelihoods is then that of the normal distribution function at -z and at z. Its
   // logarithm is this cubic, within 6 % up to kFarthest (Bowling et al. 2009).

@@ -28,8 +28,9 @@ struct Classes {
 // all gaps so far (the forward filter of a hidden Markov chain).
 class ContactTest {
  public:
-  // gap_px > 0 outside; any number, and sd_px is at least 0. True while touching is likelier.
-  bool update(double gap_px, double sd_px);
+  // gap_px > 0 outside; any number, and sd_px is at least 0. expected: by the needle's speed it touches in
+  // this frame. True while touching is likelier.
+  bool update(double gap_px, double sd_px, bool expected);
 
  private:
   double log_odds_ = -2.9;  // of touching, after many frames apart

@@ -31,6 +31,8 @@ constexpr double kSinks_px = 3;    // by which a free membrane may seem to sink 
 constexpr double kSinking = 4;     // log odds against each px of it
 constexpr double kThrough = 12;    // log odds that a membrane is not on the tip that went through it
 constexpr double kStays = 3;       // log odds that it stays on the tip, or off it, for a frame
+constexpr double kHand_px = 1;     // by which a hand changes the needle's speed in a frame
+constexpr double kJumped = 5;      // log odds at most, by a jump of the tip, that it is off it
 constexpr double kSteepest = 1.8;  // slope of a wall that ends at its width; the needle hides a steeper one
 constexpr double kBandHalf_px = 7;    // half-width of the band
 constexpr double kWithinHalf_px = 4;  // of an inner membrane's: granules are near
@@ -285,6 +287,14 @@ std::optional<double> Dimples::evidence(std::size_t step) const {
          (kModel + noise * noise);
 }
 
+// Log odds that the membrane has left the tip: it draws the end of the needle back while it slides off, and
+// the end then jumps ahead, further than a hand moves it.
+double odds_of_jump(const Surroundings& s) {
+  const NeedlePose& n = s.needle;
+  const double jump = s.last_tip ? (n.tip - *s.last_tip).dot(n.axis) - s.expected_px : 0;
+  return jump > 0 ? std::min(kJumped, 0.5 * jump * jump / (kHand_px * kHand_px + n.sd * n.sd)) : 0;
+}
+
 }  // namespace
 
 std::optional<SeenDimple> likeliest_dimple(const MembraneSearch& search) {
@@ -336,7 +346,10 @@ std::optional<SeenDimple> likeliest_dimple(const MembraneSearch& search) {
     }
   }
   const bool through = punctured && !(within && m.held);
-  const double on_tip = through ? -kThrough : m.held && !punctured ? kStays : -kStays;
+  double on_tip = through ? -kThrough : m.held && !punctured ? kStays : -kStays;
+  if (on_tip > 0 && !within) {
+    on_tip -= odds_of_jump(search.surroundings);
+  }
   if (!pushed || (free && pushed->evidence + on_tip < free->evidence)) {
     return free;
   }

@@ -21,6 +21,7 @@ constexpr std::array kLumen = {-0.4, -0.2, 0.0, 0.2, 0.4};  // of the half-width
 // Of the variance of the picture's noise, once it is smoothed and averaged across the lumen; and how far
 // along the axis neighbours tell the same.
 constexpr double kNoiseShare = 0.05, kJoined_px = 3;
+constexpr double kUnlike = 0.2;  // of what a membrane on the tip explains, left beyond the noise: it is none
 
 // Grey levels per px along the needle's axis; > 0 for the outer face of a membrane of that polarity.
 double face_strength(double along_axis, Polarity polarity) {
@@ -146,6 +147,7 @@ std::optional<TipOnMembrane::Tip> TipOnMembrane::ahead(const GradientField& fiel
   // Samples that are nearer than the smoothing tell the same.
   const double grey = std::max(noise, kRounded), variance = grey * grey * kNoiseShare * kJoined_px / kStep_px;
   std::array<double, static_cast<std::size_t>(kTips)> unlikely{};  // -2 times the log-likelihood
+  std::array<bool, static_cast<std::size_t>(kTips)> explained{};
   std::array<double, static_cast<std::size_t>(kCompared)> step{};
   double s = 0, ss = 0;
   for (int i = 0; i < kCompared; ++i) {
@@ -167,11 +169,16 @@ std::optional<TipOnMembrane::Tip> TipOnMembrane::ahead(const GradientField& fiel
       dd += rest * rest;
     }
     const double height = (sd - s * d / n) / (ss - s * s / n), off = (t * kStep_px - kReach_px) / kDrawn_px;
-    unlikely[static_cast<std::size_t>(t)] =
-        (dd - d * d / n - height * (sd - s * d / n)) / variance + off * off;
+    const double by_membrane = height * (sd - s * d / n), left = dd - d * d / n - by_membrane;
+    unlikely[static_cast<std::size_t>(t)] = left / variance + off * off;
+    explained[static_cast<std::size_t>(t)] =
+        left < n * kNoiseShare * grey * grey + kUnlike * kUnlike * by_membrane;
   }
   const auto best = std::min_element(unlikely.begin() + 1, unlikely.end() - 1);
   const auto i = static_cast<std::size_t>(best - unlikely.begin());
+  if (!explained[i]) {
+    return Tip{};
+  }
   const double curvature = (unlikely[i - 1] - 2 * *best + unlikely[i + 1]) / (kStep_px * kStep_px);
   if (*best > unlikely[i - 1] || *best > unlikely[i + 1] || curvature <= 0) {
     return std::nullopt;

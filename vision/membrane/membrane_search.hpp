@@ -15,6 +15,7 @@ namespace punctum::vision {
 struct Surroundings {
   const NeedlePose& needle;
   std::optional<Point> last_tip;  // one frame ago
+  double expected_px = 0;         // by which it has moved since, along the axis
   bool punctured = false;
   bool dents_seen = true;                    // no needle that is not seen may dent it
   bool outermost = true;                     // the membrane is the outer one

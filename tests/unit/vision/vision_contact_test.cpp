@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "vision/events/contact.hpp"
@@ -67,56 +68,64 @@ TEST(Contact, joins_over_as_many_rows_as_the_element_is_high_less_one) {
   }
 }
 
-// A tip that comes by `step` px a frame, measured with a scatter that is as large as it says.
+// A tip that comes by `step` px a frame. It is measured with a scatter of `sd` px, and said to be known to
+// `told_sd`.
 struct Approach {
   std::mt19937 random;
-  double sd, step;
-  explicit Approach(unsigned seed, double sd_px, double step_px) : random(seed), sd(sd_px), step(step_px) {}
+  double sd, told_sd, step;
+  Approach(unsigned seed, double sd_px, double told_px, double step_px)
+      : random(seed), sd(sd_px), told_sd(told_px), step(step_px) {}
   // Frames from the one in which the tip passes the membrane to that in which contact is told.
   int told_after() {
     std::normal_distribution<double> scatter(0, sd);
     ContactTest contact;
     const double from = 20 * step + std::uniform_real_distribution<double>(0, step)(random);
+    double last = from + step;
     for (int k = 0; k < 60; ++k) {
-      const double gap = from - step * k;
-      if (contact.update(gap + scatter(random), sd)) {
+      const double gap = from - step * k + scatter(random);
+      if (contact.update(gap, told_sd, last < step)) {
         return k - static_cast<int>(std::ceil(from / step));
       }
+      last = gap;
     }
     return 60;
   }
 };
 
 TEST(Contact, is_told_within_a_frame_of_a_needle_that_moves_a_pixel_a_frame) {
-  for (const double sd : {0.1, 0.2, 0.3}) {
+  for (const auto& [sd, told_sd] : {std::pair(0.1, 0.1), {0.2, 0.2}, {0.3, 0.3}, {0.3, 0.8}}) {
     int within = 0;
     for (unsigned seed = 0; seed < 1000; ++seed) {
-      const int after = Approach(seed, sd, 1).told_after();
+      const int after = Approach(seed, sd, told_sd, 1).told_after();
       within += after >= -1 && after <= 1;
     }
-    EXPECT_GE(within, 990) << sd;
+    EXPECT_GE(within, 990) << sd << " " << told_sd;
   }
 }
 
 TEST(Contact, is_not_told_of_a_needle_that_waits_outside) {
-  for (const double sd : {0.1, 0.5, 2.0}) {
-    std::mt19937 random(3);
-    std::normal_distribution<double> scatter(0, sd);
-    ContactTest contact;
-    int told = 0;
-    for (int k = 0; k < 10000; ++k) {  // three deviations away
-      told += contact.update(3 * sd + scatter(random), sd);
+  for (const bool expected : {false, true}) {
+    for (const double sd : {0.1, 0.5, 2.0}) {
+      std::mt19937 random(3);
+      std::normal_distribution<double> scatter(0, sd);
+      ContactTest contact;
+      int told = 0;
+      constexpr double kSystematic_px = 0.2;
+      const double away = 3 * std::hypot(sd, kSystematic_px);
+      for (int k = 0; k < 10000; ++k) {  // one gap in 740 may be seen inside
+        told += contact.update(away + scatter(random), sd, expected);
+      }
+      EXPECT_LE(told, expected ? 20 : 0) << sd;
     }
-    EXPECT_EQ(told, 0) << sd;
   }
 }
 
 TEST(Contact, needs_more_frames_where_the_gap_is_less_certain_and_one_frame_may_be_wrong) {
   const auto frames_until_told = [](double sd) {
     ContactTest contact;
-    contact.update(20, sd);
+    contact.update(20, sd, false);
     int n = 1;
-    while (n < 100 && !contact.update(-1.5, sd)) {
+    while (n < 100 && !contact.update(-1.5, sd, false)) {
       ++n;
     }
     return n;
@@ -126,11 +135,11 @@ TEST(Contact, needs_more_frames_where_the_gap_is_less_certain_and_one_frame_may_
   EXPECT_LT(frames_until_told(2), 20);
   ContactTest contact;
   for (int k = 0; k < 20; ++k) {
-    contact.update(-6, 1);
+    contact.update(-6, 1, false);
   }
-  EXPECT_TRUE(contact.update(1.2, 1));  // a glitch
-  EXPECT_TRUE(contact.update(-6, 1));
-  EXPECT_FALSE(contact.update(8, 1));  // and this is none
+  EXPECT_TRUE(contact.update(1.2, 1, false));  // a glitch
+  EXPECT_TRUE(contact.update(-6, 1, false));
+  EXPECT_FALSE(contact.update(8, 1, false));  // and this is none
 }
 
 TEST(Contact, is_not_found_in_empty_pictures) {

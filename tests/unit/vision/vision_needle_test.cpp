@@ -538,6 +538,22 @@ TEST(TipOnMembrane, is_where_glass_and_membrane_meet) {
   }
 }
 
+// Something dark over the end looks neither like glass nor like a membrane.
+TEST(TipOnMembrane, is_left_where_it_is_by_what_is_no_membrane) {
+  const NeedlePose pose = pose_at({150.3, kAxis_y});
+  TipOnMembrane tip;
+  for (unsigned frame = 1; frame <= 12; ++frame) {
+    tip.learn(draw({.closed = true, .radius = 6}, frame), pose);
+  }
+  for (const double lump_px : {0.5, 2.0, 4.0, 6.0}) {
+    const auto seen =
+        tip.ahead(draw({.closed = true, .lump_px = lump_px, .radius = 6}, 20), kWideNoise, {}, pose);
+    ASSERT_TRUE(seen) << lump_px;
+    EXPECT_EQ(seen->ahead, 0) << lump_px;
+    EXPECT_EQ(seen->sd, 0) << lump_px;
+  }
+}
+
 // Where noise hides both, the pose counts, and the deviation says so.
 TEST(TipOnMembrane, is_left_where_it_is_by_a_picture_that_tells_nothing) {
   constexpr double kNothing = 1000;  // grey levels of noise

@@ -762,7 +762,7 @@ void Tracker::Impl::classify_contact(const std::optional<double>& membrane_behin
   PunctureInput in;
   in.t_ns = result.exposure_ns;
   if (result.gap_px) {
-    result.contact = contact.update(*result.gap_px, result.gap_sd_px, touches_next);
+    result.contact = contact.update(*result.gap_px, result.gap_sd_px, tip.speed);
   }
   // A frame that does not show needle and cell changes nothing; a needle that points past the cell is off it.
   const bool unseen = !(result.needle.ok && result.outer.ok);

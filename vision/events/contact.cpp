@@ -80,11 +80,13 @@ bool needle_merges_with_cell(const ClearedPicture& picture, const NeedlePose& ne
   return merge_classes(picture.strong, needle_pixels, cell_pixels, rows).merged;
 }
 
-bool ContactTest::update(double gap_px, double sd_px, bool expected) {
+bool ContactTest::update(double gap_px, double sd_px, double speed_px) {
   constexpr double kChanges = 0.05;  // probability that the state changes in a frame: a visit takes some 20
   constexpr double kSystematic_px = 0.2;  // by which the tip and the outline may be off alike in all frames
   constexpr double kFarthest = 4;         // standard deviations: what is further off is as certain
-  const double odds = math::exp(log_odds_), begins = expected ? 0.5 : kChanges;
+  const bool due = last_gap_px_ < speed_px;  // touching is then as likely as not
+  last_gap_px_ = gap_px;
+  const double odds = math::exp(log_odds_), begins = due ? 0.5 : kChanges;
   const double before = math::log((begins + (1 - kChanges) * odds) / (1 - begins + kChanges * odds));
   // While apart any gap > 0 is as likely as another, while touching any < 0; both scatter as the measurement
   // does. The ratio of the likelihoods is then that of the normal distribution function at -z and at z. Its

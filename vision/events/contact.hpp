@@ -3,6 +3,7 @@
 // by the gap.
 #pragma once
 
+#include <limits>
 #include <opencv2/core.hpp>
 
 #include "vision/membrane/cleared_picture.hpp"
@@ -28,12 +29,13 @@ struct Classes {
 // all gaps so far (the forward filter of a hidden Markov chain).
 class ContactTest {
  public:
-  // gap_px > 0 outside; any number, and sd_px is at least 0. expected: by the needle's speed it touches in
-  // this frame. True while touching is likelier.
-  bool update(double gap_px, double sd_px, bool expected);
+  // gap_px > 0 outside; any number, and sd_px is at least 0. speed_px: by which it became less in the last
+  // frames. True while touching is likelier.
+  bool update(double gap_px, double sd_px, double speed_px);
 
  private:
   double log_odds_ = -2.9;  // of touching, after many frames apart
+  double last_gap_px_ = std::numeric_limits<double>::infinity();
 };
 
 }  // namespace punctum::vision

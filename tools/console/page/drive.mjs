@@ -577,8 +577,9 @@ async function all() {
       if (key) await page.keyboard.down(key);
       way = key;
     };
+    let asked = '';
     await until('it is over', async () => {
-      const next = await text('hand-step');
+      const next = asked = await text('hand-step');
       if (/^Take the hand/.test(next)) {  // a page that stands still for longer than it is lent loses it
         await go('');
         await hold('left', false);
@@ -610,7 +611,7 @@ async function all() {
         await go('ArrowRight');
       }
       return await over();
-    });
+    }).catch((error) => { throw new Error(`${error.message}; the page asks for: ${asked}`); });
     await go('');
     for (const button of [...pressed]) await hold(button, false);
   };

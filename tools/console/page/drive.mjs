@@ -602,6 +602,11 @@ async function all() {
           await go('ArrowLeft');
           await page.waitForTimeout(200);
         }
+      } else if (/^Let inject go/.test(next)) {
+        await hold('right', false);
+        await page.waitForTimeout(300);
+        await hold('right', true);
+        await page.waitForTimeout(300);
       } else if (/^Move left|^Push on/.test(next)) await go('ArrowLeft');
       else if (/inject/.test(next)) {
         await go('');
@@ -682,6 +687,16 @@ async function all() {
     await other.close();
   });
 
+  await step('a press of inject that opened nothing is to be let go; what was kept back, or given, is not asked for like a first press', async () => {
+    const {text: code} = (await build({entryPoints: [join(here, 'src/hand.ts')], bundle: true, format: 'esm', write: false, logLevel: 'error'})).outputFiles[0];
+    const {nextStep} = await import(`data:text/javascript,${encodeURIComponent(code)}`);
+    const kRefused = 1 << 14;
+    const says = (alarms, injects, opened) => nextStep({stop: 0, alarms, phase: 4, injector_open: false}, true, true, injects, opened);
+    assert.match(says(0, false, false), /^Press inject/);
+    assert.match(says(0, true, false), /^Let inject go and press it again/);
+    assert.match(says(kRefused, true, false), /^Not yet/);
+    assert.match(says(0, true, true), /^Draw back/);
+  });
   await step("a hand of one's own, by what the page says, injects a cell", async () => {
     const own = await ownHand('own', page);
     assert.equal(await page.evaluate(() => punctum.state.control), 'yours');

@@ -15,8 +15,8 @@ const kWays: Record<string, [axis: number, sign: number]> = {
 const kPad: Record<number, Button> = {5: 'hold', 0: 'inject', 4: 'clutch', 3: 'next'};
 
 // What to do next, for somebody who does it for the first time.
-// opened: the injector was open since the membranes gave way.
-export function nextStep(t: Telemetry, taken: boolean, holds: boolean, opened: boolean): string {
+// holds, injects: so long pressed that the station must know. opened: the injector was open since the membranes gave way.
+export function nextStep(t: Telemetry, taken: boolean, holds: boolean, injects: boolean, opened: boolean): string {
   const kNotEnabled = 1 << 13, kRefused = 1 << 14;
   if (!taken) return 'Take the hand: click the button or press H. Then the mouse moves the needle, in the directions of the picture.';
   const kReleased = 17;
@@ -29,7 +29,9 @@ export function nextStep(t: Telemetry, taken: boolean, holds: boolean, opened: b
     case 3: case 4:
       if (t.injector_open) return 'Keep inject pressed.';
       if (opened) return 'Draw back to the right.';
-      return t.alarms & kRefused ? 'Not yet: let inject go, push on a little, and press it again.' : 'Press inject: the right button, or I.';
+      if (t.alarms & kRefused) return 'Not yet: let inject go, push on a little, and press it again.';
+      // A press asks for one dose, which late vision may have kept back.
+      return injects ? 'Let inject go and press it again.' : 'Press inject: the right button, or I.';
     case 5: return 'Draw back to the right, out of the cell.';
     default: return 'Done: the run ends by itself.';
   }
@@ -111,12 +113,12 @@ export class Hand {
     return true;
   }
 
-  // For long enough that the station must know.
-  get holds(): boolean { return [...this.pressed.values()].includes('hold') && performance.now() - this.heldAt > 500; }
-  private heldAt = 0;
+  // For so long that the station must know.
+  presses(button: Button): boolean { return [...this.pressed.values()].includes(button) && performance.now() - (this.pressedAt.get(button) ?? 0) > 500; }
+  private pressedAt = new Map<Button, number>();
   private press(by: string, button?: Button): void {
     if (!button || this.pressed.has(by)) return;
-    if (button === 'hold') this.heldAt = performance.now();
+    this.pressedAt.set(button, performance.now());
     this.pressed.set(by, button);
     this.step();
   }

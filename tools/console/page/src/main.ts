@@ -243,7 +243,7 @@ function showHand(): void {
   by('take-hand').setAttribute('aria-pressed', String(hand.taken));
   by('take-hand').firstChild!.textContent = hand.taken ? 'Give the hand back' : 'Take the hand';
   by<HTMLButtonElement>('take-hand').disabled = state.role !== 'operate' || state.control === "another's";
-  say('hand-step', newest ? nextStep(newest, hand.taken, hand.holds, opened) : '');
+  say('hand-step', newest ? nextStep(newest, hand.taken, hand.presses('hold'), hand.presses('inject'), opened) : '');
   if (state.control === "another's") say('hand-note', `${state.in_control} has it.`);
 }
 by('take-hand').addEventListener('click', takeHand);

@@ -259,4 +259,12 @@ Membrane follow(FollowedMembrane& m, const ClearedPicture& picture, const Vision
   return out;
 }
 
+double Membrane::rms_sd_px() const {
+  double square = 0;
+  for (const double v : sd_px) {
+    square += v * v / static_cast<double>(sd_px.size());
+  }
+  return std::sqrt(square);
+}
+
 }  // namespace punctum::vision

@@ -20,6 +20,8 @@ struct Membrane {
   double visible = 0;      // share of the angles that neither pipettes nor the border of the picture hide
   double residual_px = 0;  // robust standard deviation of the single edges about the contour
   std::string reason;      // when not ok
+
+  [[nodiscard]] double rms_sd_px() const;
 };
 
 [[nodiscard]] Membrane follow(FollowedMembrane& m, const ClearedPicture& picture, const VisionConfig& config,

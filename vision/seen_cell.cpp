@@ -1,0 +1,236 @@
+#include "vision/seen_cell.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "hal/math/elementary.hpp"
+#include "vision/image/median.hpp"
+#include "vision/image/polar_contour.hpp"
+#include "vision/membrane/contact_points.hpp"
+#include "vision/membrane/snakes.hpp"
+
+namespace punctum::vision {
+
+namespace {
+
+constexpr double kMayTouch_px = 8;  // nearer, the needle may touch the membrane
+constexpr double kClear_px = 3;     // further away, it does not: its blur ends before
+
+}  // namespace
+
+// Empty while there is more to do.
+std::optional<StartedMembranes> SeenCell::search(const ClearedPicture& picture, bool at_once) {
+  if (config_.method == Method::paper) {
+    return start_snakes(picture, config_, seed_);
+  }
+  if (!search_) {
+    const FollowedMembrane& lost = outermost();
+    search_.emplace(seed_, lost.known ? std::optional(Circle{lost.centre, median_of(lost.r)}) : std::nullopt);
+  }
+  auto begun = search_->advance(picture, config_);
+  while (!begun && at_once) {
+    begun = search_->advance(picture, config_);
+  }
+  if (begun) {
+    search_.reset();
+  }
+  return begun;
+}
+
+bool SeenCell::start(const ClearedPicture& picture, const Touch& touch, bool at_once, Result& result) {
+  auto begun = search(picture, at_once);
+  if (!begun) {
+    result.outer.reason = "not found yet";
+    return false;
+  }
+  result.outer.reason = begun->reason;
+  take(std::move(*begun), touch, result);
+  return outer_.known || inner_.known;
+}
+
+// Both membranes as found anew. The learnt rest shape is kept if this is the same cell in the same place. It
+// is learnt anew if only a few frames told it, or if nothing touches the cell now.
+void SeenCell::take(StartedMembranes&& begun, const Touch& touch, const Result& result) {
+  const RestOutline outer_rest = std::move(outer_.rest), inner_rest = std::move(inner_.rest);
+  outer_ = std::move(begun.outer);
+  inner_ = std::move(begun.inner);
+  const bool needed = touch.contact || touch.punctured || result.phase != rt::Phase::free;
+  if (outer_.known && needed && outer_rest.reliable() &&
+      undeformed_.same_cell(outer_.contour(), outer_.centre, result.needle)) {
+    outer_.rest = outer_rest;
+    inner_.rest = inner_rest;
+  } else {
+    undeformed_.forget();
+  }
+}
+
+// What is followed as the outer membrane may be another edge for a part of the way, or all of it. Then no
+// inner one is seen; a start in the present picture may show both.
+void SeenCell::doubt_outer(const ClearedPicture& picture, const Touch& touch, const Result& result) {
+  if (!config_.inner || !outer_.known || (inner_.known && !inner_.lost())) {
+    inner_missing_ = 0;
+    next_doubt_ = kFirstDoubt;
+    return;
+  }
+  if (++inner_missing_ < next_doubt_) {
+    return;
+  }
+  inner_missing_ = 0;
+  next_doubt_ *= 2;
+  CellSearch again(std::nullopt, Circle{outer_.centre, median_of(outer_.r)});
+  if (auto begun = again.advance(picture, config_); begun && begun->outer.known && begun->inner.known) {
+    take(std::move(*begun), touch, result);
+  }
+}
+
+void SeenCell::follow(const ClearedPicture& picture, const SeenNeedle& needle, const Touch& touch,
+                      Result& result, Stopwatch& watch) {
+  if (config_.method == Method::paper) {
+    follow_snakes(picture, result, watch);
+    return;
+  }
+  doubt_outer(picture, touch, result);
+  NeedlePose on_membrane = result.needle;  // its tip where the membrane on it is seen
+  on_membrane.tip += needle.wall_px() * result.needle.axis;
+  const auto surroundings = [&] {
+    return Surroundings{
+        .needle = on_membrane,
+        .last_tip = needle.motion().last,
+        .expected_px = needle.expected_px(result.needle),
+        .punctured = touch.punctured,
+        .dents_seen = result.needle.ok || !config_.needle || round_as_if_untouched(picture, touch, result),
+        .undeformed = undeformed_.shape() ? &*undeformed_.shape() : nullptr};
+  };
+  Surroundings around_outer = surroundings();
+  around_outer.within = &inner_;
+  result.outer = vision::follow(outer_, picture, config_, around_outer);
+  result.us.outer = watch.lap_us();
+  if (config_.inner) {
+    const bool outer_seen = outer_.known && result.outer.ok;
+    Surroundings around_inner = surroundings();
+    if (outer_seen && (!inner_.known || inner_.lost())) {
+      if (auto begun = start_inner(picture, config_, outer_, around_inner.dents_seen)) {
+        begun->rest = std::move(inner_.rest);
+        inner_ = std::move(*begun);
+      }
+    }
+    around_inner.outermost = false;
+    around_inner.around = outer_seen ? &outer_ : nullptr;
+    result.inner = vision::follow(inner_, picture, config_, around_inner);
+    result.us.inner = watch.lap_us();
+  }
+}
+
+void SeenCell::follow_snakes(const ClearedPicture& picture, Result& result, Stopwatch& watch) {
+  if (result.needle.ok && outer_.known) {
+    result.points = contact_points(picture, result.needle, outer_.contour(), outer_.level);
+  }
+  result.outer = follow_snake(outer_, picture, config_, result.points);
+  result.us.outer = watch.lap_us();
+  if (config_.inner) {
+    result.inner = follow_snake(inner_, picture, config_, {});
+    result.us.inner = watch.lap_us();
+  }
+}
+
+// No needle that is not seen has dented the outer membrane, and so none has reached the inner one.
+bool SeenCell::round_as_if_untouched(const ClearedPicture& picture, const Touch& touch,
+                                     const Result& result) const {
+  constexpr double kDent = 0.04;  // of the radius
+  if (touch.punctured || !outer_.known || !result.outer.ok) {
+    return false;
+  }
+  const auto weights =
+      undeformed_weights(result.outer.contour, picture, std::nullopt,
+                         result.holder.ok ? std::optional(result.holder.mouth) : std::nullopt);
+  const auto now = fit_undeformed(result.outer.contour, weights);
+  if (!now || !now->round) {
+    return false;
+  }
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    const double off = cv::norm(result.outer.contour[i] - now->circle.centre) - now->circle.r;
+    if (weights[i] > 0 && std::abs(off) > kDent * now->circle.r) {
+      return false;
+    }
+  }
+  return true;
+}
+
+void SeenCell::measure(const ClearedPicture& picture, const Touch& touch, bool needle_hidden,
+                       bool holder_found, Result& result) {
+  if (inner_.known && result.inner.ok) {
+    result.inner_radius_px = mean_radius(result.inner.contour);
+  }
+  if (!outer_.known || !result.outer.ok) {
+    return;
+  }
+  const int fitted = fit_undeformed_membrane(picture, touch, needle_hidden, holder_found, result);
+  if (fitted > 0 && result.needle.ok) {
+    measure_gap(fitted, result);
+  }
+}
+
+// Returns the number of contour points that tell the undeformed membrane.
+int SeenCell::fit_undeformed_membrane(const ClearedPicture& picture, const Touch& touch, bool needle_hidden,
+                                      bool holder_found, Result& result) {
+  const Contour& contour = result.outer.contour;
+  const NeedlePose& n = result.needle;
+  std::optional<Point> entry;  // if the needle is near
+  bool clear = !n.ok;
+  if (n.ok) {
+    entry = entry_point(undeformed_.known() ? undeformed_.at_rest().shape : contour, n.tip, n.axis);
+    const double gap = entry ? (*entry - n.tip).dot(n.axis) : kMayTouch_px;
+    clear = gap >= kClear_px;
+    if (gap >= kMayTouch_px) {
+      entry.reset();
+    }
+  }
+  std::optional<Point> mouth;
+  if (result.holder.ok) {
+    mouth = result.holder.mouth;
+  }
+  const auto weights = undeformed_weights(contour, picture, entry, holder_found ? mouth : std::nullopt);
+  const auto now = fit_undeformed(contour, weights);
+  if (!now) {
+    return 0;
+  }
+  const bool touched_before = touch.contact || touch.punctured || needle_hidden;
+  const bool touched = entry || touched_before;
+  constexpr double kCertainMotion_px = 0.25;  // a less certain motion of the holding pipette is none
+  const bool certain = result.holder.sd < kCertainMotion_px;
+  const Point shift = undeformed_.update(*now, touched, certain ? mouth : std::nullopt);
+  for (FollowedMembrane* m : {&outer_, &inner_}) {
+    m->rest.centre += shift;
+  }
+  if (clear && !touched_before) {
+    outer_.rest.learn(outer_.centre, outer_.r);
+    undeformed_.learn_outline(contour, outer_.centre);
+    if (inner_.known && result.inner.ok) {
+      inner_.rest.learn(inner_.centre, inner_.r);
+    }
+  } else if (outer_.rest.r.empty()) {  // it was never seen without the needle
+    outer_.rest.r = polar_radii(undeformed_.shape()->shape, outer_.centre, config_.contour_points);
+    outer_.rest.centre = outer_.centre;
+  }
+  if (inner_.rest.r.empty() && inner_.known && result.inner.ok && entry) {
+    inner_.rest = outline_within(outer_.rest, inner_.centre, inner_.r, *entry);
+  }
+  result.undeformed = undeformed_.shape()->circle;
+  double& r_sd = result.undeformed->r_sd;
+  r_sd = math::hypot(r_sd, result.outer.rms_sd_px() / std::sqrt(Circle::kPieces));
+  return static_cast<int>(std::count_if(weights.begin(), weights.end(), [](double w) { return w > 0; }));
+}
+
+void SeenCell::measure_gap(int fitted_points, Result& result) {
+  const NeedlePose& n = result.needle;
+  result.entry = entry_point(undeformed_.at_rest().shape, n.tip, n.axis);
+  if (!result.entry) {
+    return;
+  }
+  result.gap_px = (*result.entry - n.tip).dot(n.axis);
+  entry_sd_px_ = 3 * result.outer.residual_px / std::sqrt(fitted_points);
+  result.gap_sd_px = math::hypot(n.sd, entry_sd_px_);
+}
+
+}  // namespace punctum::vision

@@ -1,0 +1,66 @@
+// The cell from frame to frame: both membranes are looked for and followed, and the outer one compared with
+// what it is without the needle.
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <optional>
+
+#include "vision/membrane/membrane_start.hpp"
+#include "vision/result.hpp"
+#include "vision/seen_needle.hpp"
+#include "vision/stopwatch.hpp"
+
+namespace punctum::vision {
+
+class SeenCell {
+ public:
+  explicit SeenCell(const VisionConfig& config) : config_(config) {}
+
+  void seed(const Circle& circle) { seed_ = circle; }  // it replaces the Hough transform
+  // No frame was seen for a while: it may be anywhere.
+  void go_on_from(const SeenCell& before) { seed_ = before.seed_; }
+
+  [[nodiscard]] const FollowedMembrane& outer() const noexcept { return outer_; }
+  [[nodiscard]] const FollowedMembrane& inner() const noexcept { return inner_; }
+  // The outermost one that is known.
+  [[nodiscard]] const FollowedMembrane& outermost() const noexcept { return outer_.known ? outer_ : inner_; }
+  // What is seen of it against the holding pipette and the needle is compared with this.
+  [[nodiscard]] Undeformed at_rest() const { return undeformed_.at_rest(); }
+  // Standard deviation of where the needle's axis meets it at rest, px.
+  [[nodiscard]] double entry_sd_px() const noexcept { return entry_sd_px_; }
+
+  [[nodiscard]] bool must_start() const {
+    return outer_.known ? outer_.lost() : !inner_.known || inner_.lost();
+  }
+  // at_once: all of the search is done in this frame. False while no membrane is known.
+  [[nodiscard]] bool start(const ClearedPicture& picture, const Touch& touch, bool at_once, Result& result);
+  // Sets the membranes of the result.
+  void follow(const ClearedPicture& picture, const SeenNeedle& needle, const Touch& touch, Result& result,
+              Stopwatch& watch);
+  // Sets its undeformed membrane, its entry and its gap. needle_hidden: it may touch the cell.
+  void measure(const ClearedPicture& picture, const Touch& touch, bool needle_hidden, bool holder_found,
+               Result& result);
+
+ private:
+  [[nodiscard]] std::optional<StartedMembranes> search(const ClearedPicture& picture, bool at_once);
+  void take(StartedMembranes&& begun, const Touch& touch, const Result& result);
+  void doubt_outer(const ClearedPicture& picture, const Touch& touch, const Result& result);
+  void follow_snakes(const ClearedPicture& picture, Result& result, Stopwatch& watch);
+  [[nodiscard]] bool round_as_if_untouched(const ClearedPicture& picture, const Touch& touch,
+                                           const Result& result) const;
+  [[nodiscard]] int fit_undeformed_membrane(const ClearedPicture& picture, const Touch& touch,
+                                            bool needle_hidden, bool holder_found, Result& result);
+  void measure_gap(int fitted_points, Result& result);
+
+  static constexpr int kFirstDoubt = 5;  // frames without the inner membrane; after twice as many again, ..
+
+  const VisionConfig& config_;
+  std::optional<Circle> seed_;
+  FollowedMembrane outer_, inner_;
+  std::optional<CellSearch> search_;                  // while there is more to do
+  int inner_missing_ = 0, next_doubt_ = kFirstDoubt;  // frames
+  LearntUndeformed undeformed_;                       // of the outer one
+  double entry_sd_px_ = 0;
+};
+
+}  // namespace punctum::vision

@@ -1,0 +1,62 @@
+#include "vision/seen_holder.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "vision/membrane/undeformed.hpp"
+
+namespace punctum::vision {
+
+void SeenHolder::use_template(const cv::Mat& pattern) {
+  pipette_.use_template(pattern);
+  template_given_ = true;
+}
+
+void SeenHolder::go_on_from(SeenHolder& before) {
+  if (before.template_given_) {
+    pipette_ = std::move(before.pipette_);
+    template_given_ = true;
+  }
+}
+
+void SeenHolder::begin() {
+  constexpr int kEvery = 8;  // frames between two searches for a tube that was not found
+  due_ = config_.holder && !tube_ && frames_++ % kEvery == 0;
+}
+
+HolderPose SeenHolder::locate(ClearedPicture& picture, std::span<const Side> sides) {
+  HolderPose holder;
+  if (due_) {
+    tube_ =
+        find_holder_tube(picture.field, sides, picture.grey.rows, config_.px(config_.R_max_m), picture.noise);
+  }
+  if (!pipette_.has_template()) {
+    holder.reason = tube_ ? pipette_.cut_template(picture.grey, *tube_, picture.noise)
+                          : "no wide tube enters through the border";
+  }
+  if (pipette_.has_template()) {
+    holder = pipette_.find(picture.grey);
+    if (config_.method == Method::tracker) {
+      pipette_.refine(picture.grey, holder);
+    }
+  }
+  if (tube_) {
+    // The middle of a given template need not be the mouth.
+    const Point mouth = holder.ok && !template_given_ ? holder.mouth : tube_->end();
+    picture.holder_face = {mouth, tube_->axis, tube_->end_half_width};
+  }
+  return holder;
+}
+
+Polygon SeenHolder::polygon(const ClearedPicture& picture, const FollowedMembrane& outer) const {
+  constexpr double kInto_px = 2;  // the blur of the pipette's face reaches so far
+  Point end = picture.holder_face->mouth;
+  if (config_.method == Method::paper && outer.known) {
+    if (const auto membrane = entry_point(outer.contour(), end, tube_->axis)) {
+      end -= std::max(0.0, (end - *membrane).dot(tube_->axis) - kInto_px) * tube_->axis;
+    }
+  }
+  return holder_polygon(*tube_, end, picture.grey.size(), 2, -1);
+}
+
+}  // namespace punctum::vision

@@ -1,0 +1,211 @@
+#include "vision/seen_needle.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "hal/math/elementary.hpp"
+#include "vision/image/median.hpp"
+#include "vision/membrane/undeformed.hpp"
+
+namespace punctum::vision {
+
+namespace {
+
+constexpr int kNeedleAtOnce = 6, kNeedleEvery = 8;  // frames between two tries, after so many of them
+constexpr double kUntouched_px = 12;                // further outside, nothing touches the tip
+// Further outside, the end of the needle shows beside the membrane, and all of it as it does without a cell.
+constexpr double kEndShows_px = 2, kAlone_px = 10;
+constexpr double kWall_px =
+    0.4;  // from the membrane, which is what is seen on the tip, to the outermost glass
+constexpr double kAtMembrane_px = 0.45, kInside_px = 1.5;  // to which the picture alone shows the tip there
+// By which the membrane draws the end of the needle ahead: what is seen and put right; and where that is not
+// seen, for each time that it is more blurred.
+constexpr double kDrawn_px = 1.5, kDrawnBlurred_px = 3.5;
+
+// The outer membrane is so many times as blurred as in focus.
+double unsharp(const FollowedMembrane& outer) {
+  return std::max(1.0, outer.edge.own_blur_px / TipOnMembrane::kUsualBlur_px);
+}
+
+cv::Rect square_round(const Point& p, double half) {
+  return cv::Rect(cv::Rect2d(p.x - half, p.y - half, 2 * half, 2 * half));
+}
+
+}  // namespace
+
+void SeenNeedle::go_on_from(SeenNeedle& before) {
+  if (before.started()) {
+    pipette_ = std::move(before.pipette_);
+    tip_on_membrane_ = before.tip_on_membrane_;
+    by_stage_ = before.by_stage_;
+    by_stage_.after_gap();
+    before_gap_ = true;
+  }
+}
+
+bool SeenNeedle::recognised(const ClearedPicture& picture) {
+  if (!std::exchange(before_gap_, false)) {
+    return true;
+  }
+  const auto told = by_stage_.tip();
+  if (!told || !pipette_.go_on_at(picture.field, picture.noise, *told)) {
+    forget();
+    due_ = true;
+    return false;
+  }
+  return true;
+}
+
+// Of a faint needle not every frame shows the end: the first tries follow each other.
+void SeenNeedle::begin(const std::optional<Point>& stage) {
+  by_stage_.begin(config_.method == Method::tracker ? stage : std::nullopt);
+  due_ = config_.needle && !pipette_.started() &&
+         (tries_ < kNeedleAtOnce || frames_++ % kNeedleEvery == 0 ||
+          start_ == InjectionPipette::Start::more_to_do);
+}
+
+void SeenNeedle::forget() {
+  pipette_ = {config_.needle_from, config_.px(config_.c_m)};
+  tries_ = 0;
+  by_stage_.forget();
+  tip_on_membrane_ = {};
+}
+
+// Frames are kept while the needle is missing in noise, or was found in few of them. Whether there are enough
+// by now to tell its end better.
+bool SeenNeedle::looks_again(const ClearedPicture& picture, const Touch& touch) {
+  constexpr int kSome = 4;
+  const bool told = pipette_.started() && !pipette_.doubtful(GatheredFrames::kMost);
+  if (told || touch.contact || touch.punctured || picture.noise < InjectionPipette::kNoisy_grey) {
+    gathered_.forget();
+    return false;
+  }
+  gathered_.add(picture.grey, by_stage_.moved());
+  const int frames = gathered_.count();
+  return frames >= kSome && pipette_.doubtful(frames < GatheredFrames::kMost ? kSome : frames);
+}
+
+// From the frames in which the end is told now.
+void SeenNeedle::learn_tip_again(const ClearedPicture& picture, const FollowedMembrane& outer) {
+  constexpr int kBeside_px = 24;
+  const NeedlePose now = pipette_.as_found(picture.noise);
+  for (int age = gathered_.count() - 1; age > 0 && outer.known; --age) {
+    NeedlePose then = now;
+    then.tip -= gathered_.way(age) + age * pipette_.velocity();
+    const auto entry = entry_point(outer.contour(), then.tip, then.axis);
+    if (entry && (*entry - then.tip).dot(then.axis) > TipOnMembrane::kClearAhead_px) {
+      tip_on_membrane_.learn(gathered_.one(age, square_round(then.tip, kBeside_px), picture.field.sigma),
+                             then);
+    }
+  }
+}
+
+// Whether this frame shows its end.
+bool SeenNeedle::search(const ClearedPicture& picture, const FollowedMembrane& outer, const Touch& touch,
+                        bool at_once) {
+  // A membrane at the tip of a faint needle looks like its end.
+  const auto clear_at = [&outer](const Point& end) {
+    return !outer.known || cv::norm(end - outer.centre) > median_of(outer.r) + kUntouched_px;
+  };
+  if (looks_again(picture, touch)) {
+    by_stage_.forget();
+    tip_on_membrane_ = {};
+    const bool found = pipette_.look_again(picture.field.sigma, clear_at, gathered_);
+    if (found) {
+      learn_tip_again(picture, outer);
+    }
+    return found;
+  }
+  if (!due_) {
+    return false;
+  }
+  // What moves otherwise than along its axis, one frame shows better than the mean.
+  constexpr int kAlone = 3;  // one try in so many
+  const bool mean = gathered_.count() > 1 && tries_ % kAlone != 0;
+  const GradientField& field = mean ? gathered_.at_rest(picture.field.sigma) : picture.field;
+  const double noise = mean ? gathered_.noise() : picture.noise;
+  do {
+    start_ =
+        pipette_.advance_start(field, noise, clear_at, tries_ < kNeedleAtOnce, mean ? &gathered_ : nullptr);
+  } while (at_once && start_ == InjectionPipette::Start::more_to_do);
+  tries_ += start_ == InjectionPipette::Start::failed ? 1 : 0;
+  return start_ == InjectionPipette::Start::found;
+}
+
+NeedlePose SeenNeedle::locate(const ClearedPicture& picture, const FollowedMembrane& outer,
+                              const Touch& touch, bool at_once) {
+  NeedlePose n = search(picture, outer, touch, at_once)
+                     ? pipette_.as_found(picture.noise)
+                     : pipette_.find(picture.field, picture.noise, by_stage_.moved());
+  if (config_.method == Method::tracker && n.ok && touch.at_membrane() && outer.known) {
+    put_right_by_membrane(picture, outer, n);
+  }
+  seen_tip_sd_px_ = n.sd;
+  // A membrane on the tip draws its end aside, granules round it by several pixels.
+  n.sd = math::hypot(n.sd, touch.punctured       ? kInside_px
+                           : touch.at_membrane() ? kAtMembrane_px * unsharp(outer)
+                                                 : 0);
+  seen_ = n;
+  wall_px_ = 0;
+  put_right_by_stage(picture, touch, n);
+  return n;
+}
+
+void SeenNeedle::put_right_by_membrane(const ClearedPicture& picture, const FollowedMembrane& outer,
+                                       NeedlePose& n) {
+  const auto on = tip_on_membrane_.ahead(picture.field, picture.noise, outer.edge, n);
+  if (on) {
+    n.tip += on->ahead * n.axis;
+    const double surprising = std::max(0.0, std::abs(on->ahead) - kDrawn_px * unsharp(outer));
+    n.sd = math::hypot(math::hypot(n.sd, on->sd), surprising);
+  } else {
+    n.sd = math::hypot(n.sd, kDrawnBlurred_px * (unsharp(outer) - 1));
+  }
+}
+
+void SeenNeedle::put_right_by_stage(const ClearedPicture& picture, const Touch& touch, NeedlePose& n) {
+  const auto told = by_stage_.tip();
+  if (!told) {
+    return;
+  }
+  if (n.ok && pipette_.goes_on_to(picture.field, picture.noise, n, *told)) {
+    n.ok = seen_.ok = false;
+    n.reason = "a speck looks like its end";
+  }
+  if (!n.ok) {
+    n = pipette_.by_shaft(picture.field, picture.noise, *told).value_or(n);
+    n.sd = by_stage_.sd();
+    return;
+  }
+  n.sd = math::hypot(n.sd, touch.at_membrane() ? kWall_px : 0);
+  n = by_stage_.most_likely(n);
+  pipette_.put(n.tip);
+  // In contact the picture shows where the membrane is, on the tip; of a thin needle it draws the end back.
+  if (touch.at_membrane() && pipette_.shows_lumen()) {
+    constexpr double kThick_px = 1;
+    wall_px_ = std::clamp((seen_.tip - n.tip).dot(n.axis), -kThick_px, kThick_px);
+  }
+}
+
+void SeenNeedle::learn(const ClearedPicture& picture, const NeedlePose& now,
+                       const std::optional<double>& gap_px) {
+  if (!seen_.ok) {
+    return;
+  }
+  if (!gap_px || *gap_px > kEndShows_px) {
+    pipette_.learn(picture.field, seen_, picture.noise, !gap_px || *gap_px > kAlone_px);
+  }
+  if (!gap_px || *gap_px > TipOnMembrane::kClearAhead_px) {
+    by_stage_.learn(seen_);
+    if (by_stage_.picture_stays()) {
+      forget();
+      return;
+    }
+  }
+  if (gap_px && *gap_px > TipOnMembrane::kClearAhead_px) {
+    tip_on_membrane_.learn(picture.field, now);
+  }
+}
+
+}  // namespace punctum::vision

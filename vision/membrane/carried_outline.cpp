@@ -13,8 +13,10 @@ namespace punctum::vision {
 
 namespace {
 
-// Of the whole cell, per frame: sd of the drift in either direction, and of the turn at its circumference.
-constexpr double kDrift_px = 0.15;
+// Of the whole cell, per frame: sd of the turn at its circumference; of the drift in either direction, at
+// first, within which it is learnt, and how fast.
+constexpr double kTurn_px = 0.15;
+constexpr double kDrift_px = 0.15, kLeastDrift_px = 0.02, kMostDrift_px = 0.3, kDriftLearnt = 0.1;
 constexpr double kJoined = 10;      // angles that tell the same: the contour of a frame is smooth
 constexpr double kBroken = 3;       // mean squared surprise, over its variance, that is none of noise
 constexpr double kFar = 9;          // a larger surprise is no noise
@@ -24,7 +26,7 @@ constexpr double kChange_px = 0.05, kLeastChange_px = 0.01, kMostChange_px = 0.3
 
 }  // namespace
 
-void CarriedOutline::update(const SeenOutline& seen, const Vector<double>& pushed) {
+void CarriedOutline::update(const SeenOutline& seen, const Change& pushed) {
   const std::size_t n = seen.contour.size();
   const Vector<double> now =
       r_.size() == n ? polar_radii(seen.contour, centre_, static_cast<int>(n)) : Vector<double>();
@@ -34,12 +36,16 @@ void CarriedOutline::update(const SeenOutline& seen, const Vector<double>& pushe
     r_ = polar_radii(seen.contour, centre_, static_cast<int>(n));
     variance_.resize(n);
     change_ = kChange_px * kChange_px;
+    drift_ = kDrift_px * kDrift_px;
     for (std::size_t i = 0; i < n; ++i) {
       variance_[i] = seen.variance[i] - seen.lasting[i];
     }
     return;
   }
-  move_with_cell(now, seen, pushed);
+  for (std::size_t i = 0; i < n; ++i) {
+    r_[i] += pushed.by[i];
+  }
+  move_with_cell(now, seen, pushed.sd);
   const Vector<double> moved = polar_radii(seen.contour, centre_, static_cast<int>(n));
   if (moved.empty()) {
     return;
@@ -49,9 +55,9 @@ void CarriedOutline::update(const SeenOutline& seen, const Vector<double>& pushe
   double more_than_expected = 0, still = 0;
   for (std::size_t i = 0; i < n; ++i) {
     told[i] = seen.variance[i] - seen.lasting[i];
-    variance_[i] += change_ + pushed[i] * pushed[i];
+    variance_[i] += change_ + pushed.sd[i] * pushed.sd[i];
     surprise[i] = std::pow(moved[i] - r_[i], 2) / (variance_[i] + told[i]);
-    if (pushed[i] < kPushed_px) {
+    if (pushed.sd[i] < kPushed_px) {
       more_than_expected += (std::min(surprise[i], kFar) - 1) * (variance_[i] + told[i]);
       still += 1;
     }
@@ -80,7 +86,7 @@ void CarriedOutline::update(const SeenOutline& seen, const Vector<double>& pushe
 
 // Weighted least squares for drift and turn, from what the needle does not change.
 void CarriedOutline::move_with_cell(const Vector<double>& now, const SeenOutline& seen,
-                                    const Vector<double>& pushed) {
+                                    const Vector<double>& pushed_sd) {
   const std::size_t n = now.size();
   cv::Vec3d motion = cv::Vec3d::all(0);
   cv::Matx33d a;
@@ -96,11 +102,13 @@ void CarriedOutline::move_with_cell(const Vector<double>& now, const SeenOutline
     variance[i] = variance_[i] + seen.variance[i] - seen.lasting[i];
     twice_sd[i] = 2 * std::sqrt(variance[i]);
   }
+  double drift = drift_;  // with what this frame shows
   for (int round = 0; round < 3; ++round) {
-    a = cv::Matx33d::eye() * (1 / (kDrift_px * kDrift_px));
+    constexpr double kAny_px = 10;
+    a = cv::Matx33d::diag({1 / (kAny_px * kAny_px), 1 / (kAny_px * kAny_px), 1 / (kTurn_px * kTurn_px)});
     cv::Vec3d b = cv::Vec3d::all(0);
     for (std::size_t i = 0; i < n; ++i) {
-      if (pushed[i] > kPushed_px) {
+      if (pushed_sd[i] > kPushed_px) {
         continue;
       }
       const cv::Vec3d& f = effect[i];
@@ -109,8 +117,17 @@ void CarriedOutline::move_with_cell(const Vector<double>& now, const SeenOutline
       a += w * f * f.t();
       b += w * e * f;
     }
+    const cv::Vec3d alone = a.solve(b, cv::DECOMP_CHOLESKY);
+    const cv::Matx33d told = a.inv(cv::DECOMP_CHOLESKY);
+    const double shown = 0.5 * (alone[0] * alone[0] + alone[1] * alone[1]),
+                 by_noise = 0.5 * (told(0, 0) + told(1, 1));
+    drift = std::clamp(drift_ + kDriftLearnt * (shown - by_noise - drift_), kLeastDrift_px * kLeastDrift_px,
+                       kMostDrift_px * kMostDrift_px);
+    a(0, 0) += 1 / drift;
+    a(1, 1) += 1 / drift;
     motion = a.solve(b, cv::DECOMP_CHOLESKY);
   }
+  drift_ = drift;
   const cv::Matx33d covariance = a.inv(cv::DECOMP_CHOLESKY);
   Vector<double> turned(n);
   for (std::size_t i = 0; i < n; ++i) {

@@ -9,16 +9,20 @@ namespace punctum::vision {
 
 class CarriedOutline {
  public:
-  // pushed: sd of what a needle may change since the last frame, px per point.
-  void update(const SeenOutline& seen, const Vector<double>& pushed);
+  // By a needle, since the last frame; px outwards, per point.
+  struct Change {
+    Vector<double> by, sd;  // expected, and how far that may err
+  };
+  void update(const SeenOutline& seen, const Change& pushed);
 
   [[nodiscard]] Contour contour() const;
   [[nodiscard]] Vector<double> sd() const;  // px, per point of the contour
 
  private:
-  void move_with_cell(const Vector<double>& now, const SeenOutline& seen, const Vector<double>& pushed);
+  void move_with_cell(const Vector<double>& now, const SeenOutline& seen, const Vector<double>& pushed_sd);
 
   Point centre_;
+  double drift_ = 0;   // variance of its drift in a frame in either direction, px^2
   double change_ = 0;  // variance by which the shape changes in a frame where no needle pushes, px^2
   Vector<double> r_, variance_, lasting_;  // per angle
 };

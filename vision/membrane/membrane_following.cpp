@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 #include <utility>
 
+#include "hal/math/elementary.hpp"
 #include "vision/image/median.hpp"
 #include "vision/membrane/edge_shape.hpp"
 
@@ -140,16 +141,43 @@ std::optional<SeenOutline> refined(const MembraneSearch& search, const EdgePath&
   return seen_by_path(search, path, std::move(contour));
 }
 
-// By how much a needle that touches it may change its shape in a frame, px per angle.
-Vector<double> pushed_per_frame(const MembraneSearch& search) {
-  constexpr double kNearNeedle_px = 2;
-  constexpr double kDentHalf = 0.8, kBlend = 0.4;  // rad to either side of the entry
-  constexpr double kNear_px = 3;                   // of the tip above the outline at rest
-  const bool near = search.needle && (search.rest.empty() || search.depth_of_tip() > -kNear_px);
-  Vector<double> out(static_cast<std::size_t>(search.angles), 0.0);
-  for (int i = 0; i < search.angles && near; ++i) {
-    out[static_cast<std::size_t>(i)] =
-        kNearNeedle_px * std::clamp((kDentHalf - search.from_needle(i)) / kBlend, 0.0, 1.0);
+// What a needle is expected to have changed of its shape since the last frame. Where it pushes the membrane,
+// the dimple deepens by what the tip has moved; once it is through and the dimple is gone, hardly anything
+// changes.
+CarriedOutline::Change change_by_needle(const MembraneSearch& search, const EdgeFound& found) {
+  // Above the outline at rest, from where the tip may touch: and in its deviations.
+  constexpr double kMayTouch_px = 0.5, kMayTouch_sd = 2;
+  constexpr double kAnything_px = 2, kSettled_px = 0.3;    // sd
+  constexpr double kPushed_px = 0.6, kPushedShare = 0.25;  // sd; of what the tip has moved
+  constexpr double kRecoil_px =
+      2.5;                           // by which a dimple that it pushes does not differ from what is expected
+  constexpr double kDentHalf = 0.8;  // rad to either side of the entry
+  // Of depth and radius of the needle together: to where the dimple may change, and to where it does by 1/e.
+  constexpr double kChanges = 4, kFallen = 1.5;
+  const std::size_t n = static_cast<std::size_t>(search.angles);
+  CarriedOutline::Change out{Vector<double>(n, 0.0), Vector<double>(n, 0.0)};
+  const NeedlePose& needle = search.surroundings.needle;
+  const bool at_rest_known = !search.rest.empty();
+  const double depth = at_rest_known && search.needle ? search.depth_of_tip() : 0;
+  if (!search.needle || (at_rest_known && depth < -kMayTouch_px - kMayTouch_sd * needle.sd)) {
+    return out;
+  }
+  const FollowedMembrane& last = search.m;
+  const bool settled = !found.held && found.dimple_px == 0 && !last.held && last.dimple_px == 0;
+  const bool on_tip =
+      search.surroundings.outermost && found.held && depth > 0 && !search.surroundings.punctured;
+  const double moved = std::min(search.surroundings.expected_px, depth);
+  const bool pushed = on_tip && std::abs(found.dimple_px - last.dimple_px - moved) < kRecoil_px;
+  const double by = pushed ? moved : 0;
+  const double sd = settled ? kSettled_px : pushed ? kPushed_px + kPushedShare * std::abs(by) : kAnything_px;
+  const double size = (std::max(depth, 0.0) + needle.half_width) / search.usual_r;
+  const double half = at_rest_known ? std::min(kDentHalf, kChanges * size) : kDentHalf;
+  for (int i = 0; i < search.angles; ++i) {
+    const std::size_t k = static_cast<std::size_t>(i);
+    const double off = search.from_needle(i);
+    out.sd[k] = sd * std::clamp(2 * (half - off) / half, 0.0, 1.0);
+    out.by[k] = by * needle.axis.dot(on_ray(Point(0, 0), i, search.angles, 1)) *
+                math::exp(-off * off / (kFallen * size * kFallen * size));
   }
   return out;
 }
@@ -246,7 +274,7 @@ Membrane follow(FollowedMembrane& m, const ClearedPicture& picture, const Vision
     ++m.lost_frames;
     return out;
   }
-  m.carried.update(seen, pushed_per_frame(search));
+  m.carried.update(seen, change_by_needle(search, found));
   out.contour = m.carried.contour();
   out.sd_px = m.carried.sd();
   out.ok = true;

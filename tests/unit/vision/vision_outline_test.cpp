@@ -55,12 +55,16 @@ SeenOutline seen(const Cell& cell, const Vector<double>& off, double variance, d
 struct Judged {
   double square = 0;
   int points = 0, within_one = 0, within_two = 0, wrong = 0;
+  double half = 4;  // rad to either side of the dent: where it is judged
   void take(const CarriedOutline& outline, const Cell& cell) {
     const Contour c = outline.contour();
     const Vector<double> sd = outline.sd();
     ASSERT_EQ(c.size(), sd.size());
     for (std::size_t i = 0; i < c.size(); ++i) {
       const Point d = c[i] - cell.centre;
+      if (angle_between(std::atan2(d.y, d.x), 0.4) > half) {
+        continue;
+      }
       const double off = std::abs(cv::norm(d) - cell.r(std::atan2(d.y, d.x)));
       square += off * off;
       ++points;
@@ -73,7 +77,7 @@ struct Judged {
   [[nodiscard]] double share(int n) const { return static_cast<double>(n) / points; }
 };
 
-const Vector<double> kStill(kRays, 0.0);
+const CarriedOutline::Change kStill{Vector<double>(kRays, 0.0), Vector<double>(kRays, 0.0)};
 
 TEST(CarriedOutline, is_better_than_its_frames_while_the_cell_drifts_and_turns) {
   for (const double sd : {0.06, 0.1, 0.2, 0.4}) {
@@ -122,10 +126,10 @@ TEST(CarriedOutline, follows_at_once_what_changes_its_shape) {
   constexpr double kSd = 0.1;
   std::mt19937 random(3);
   for (const bool expected : {true, false}) {
-    Vector<double> pushed = kStill;
+    CarriedOutline::Change pushed = kStill;
     for (int i = 0; i < kRays && expected; ++i) {
       if (angle_between(polar_angle(i, kRays), 0.4) < 0.6) {
-        pushed[static_cast<std::size_t>(i)] = 2;
+        pushed.sd[static_cast<std::size_t>(i)] = 2;
       }
     }
     CarriedOutline outline;
@@ -139,6 +143,75 @@ TEST(CarriedOutline, follows_at_once_what_changes_its_shape) {
       EXPECT_EQ(judged.wrong, 0) << frame;
     }
   }
+}
+
+// Where the needle tells by how much a dimple deepens, the frames before tell its shape; a recoil that was
+// not told is seen all the same.
+TEST(CarriedOutline, carries_a_dimple_along_as_far_as_its_change_is_told) {
+  constexpr double kSd = 0.2, kDeepens = 1;
+  CarriedOutline::Change anything = kStill, told = kStill;
+  for (std::size_t i = 0; i < kRays; ++i) {
+    const double u = angle_between(polar_angle(static_cast<int>(i), kRays), 0.4) / 0.15;
+    if (u < 4) {
+      anything.sd[i] = 2;
+      told.sd[i] = 0.2;
+    }
+    told.by[i] = -kDeepens * std::exp(-u * u / 2);
+  }
+  Judged with{.half = 0.4}, without{.half = 0.4};
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    std::mt19937 random(seed);
+    CarriedOutline outline, other;
+    Cell cell;
+    for (int frame = 0; frame < 15; ++frame) {
+      cell.dent += kDeepens;
+      const SeenOutline now = seen(cell, errors(kSd, random), kSd * kSd, 0);
+      outline.update(now, told);
+      other.update(now, anything);
+      if (frame > 4) {
+        with.take(outline, cell);
+        without.take(other, cell);
+      }
+    }
+    cell.dent = 6;
+    outline.update(seen(cell, errors(kSd, random), kSd * kSd, 0), told);
+    Judged recoiled;
+    recoiled.take(outline, cell);
+    EXPECT_EQ(recoiled.wrong, 0) << seed;
+  }
+  EXPECT_LT(with.rms(), 0.75 * without.rms());
+  EXPECT_NEAR(with.share(with.within_one), 0.68, 0.12);
+}
+
+// Of a cell that never drifts the frames tell its place ever better; one that begins to is followed at once.
+TEST(CarriedOutline, learns_whether_the_cell_drifts) {
+  constexpr double kSd = 0.2;
+  const auto centre_of = [](const CarriedOutline& outline) { return centroid(outline.contour()); };
+  double square = 0, late = 0;
+  constexpr unsigned kCells = 20;
+  for (unsigned seed = 1; seed <= kCells; ++seed) {
+    std::mt19937 random(seed);
+    CarriedOutline outline;
+    Cell cell;
+    const Point off = [&] {
+      CarriedOutline exact;
+      exact.update(seen(cell, Vector<double>(kRays, 0.0), 1e-6, 0), kStill);
+      return centre_of(exact) - cell.centre;
+    }();
+    for (int frame = 0; frame < 60; ++frame) {
+      outline.update(seen(cell, errors(kSd, random), kSd * kSd, 0), kStill);
+    }
+    square += std::pow(cv::norm(centre_of(outline) - off - cell.centre), 2) / (2 * kCells);
+    for (int frame = 0; frame < 5; ++frame) {
+      cell.centre += Point(0.3, 0.3);
+      outline.update(seen(cell, errors(kSd, random), kSd * kSd, 0), kStill);
+      late = std::max(late, cv::norm(centre_of(outline) - off - cell.centre));
+    }
+  }
+  // One frame alone tells it to the mean of two modes of the errors.
+  const double alone = kSd * std::sqrt(2 / 12.5);
+  EXPECT_LT(std::sqrt(square), 0.7 * alone);
+  EXPECT_LT(late, 0.25);
 }
 
 // A cell that was let go of, or a stage that was moved.
@@ -168,7 +241,7 @@ TEST(CarriedOutline, of_another_number_of_points_begins_anew) {
   }
   coarse.variance.assign(128, 0.04);
   coarse.lasting.assign(128, 0.01);
-  outline.update(coarse, Vector<double>(128, 0.0));
+  outline.update(coarse, {Vector<double>(128, 0.0), Vector<double>(128, 0.0)});
   ASSERT_EQ(outline.contour().size(), 128U);
   EXPECT_NEAR(cv::norm(outline.contour().front() - Point(80, 60)), 0, 0.05);
   EXPECT_NEAR(outline.sd().front(), 0.2, 1e-12);

@@ -15,6 +15,7 @@
 #include "vision/pipettes/needle_bevel.hpp"
 #include "vision/pipettes/needle_end.hpp"
 #include "vision/pipettes/needle_walls.hpp"
+#include "vision/pipettes/steep_glass.hpp"
 #include "vision/pipettes/wide_tube.hpp"
 
 namespace punctum::vision {
@@ -209,13 +210,20 @@ void InjectionPipette::forget_tubes() {
 InjectionPipette::Start InjectionPipette::advance_start(const GradientField& field, double noise,
                                                         const Clear& clear_at, bool keep_tube,
                                                         GatheredFrames* frames) {
+  if (std::exchange(steep_due_, false)) {
+    return begin_steep(field, noise, clear_at) ? Start::found : Start::failed;
+  }
   if (trace_next_border(field, noise)) {
     return Start::more_to_do;
   }
+  const auto without_straight_one = [&] {
+    steep_due_ = frames == nullptr && noise < kNoisy_grey;
+    return steep_due_ ? Start::more_to_do : Start::failed;
+  };
   if (tubes_.empty()) {
     reason_ = "no narrow tube enters through the border";
     forget_tubes();
-    return Start::failed;
+    return without_straight_one();
   }
   if (fit_walls_further(field, noise)) {
     return Start::more_to_do;
@@ -234,7 +242,7 @@ InjectionPipette::Start InjectionPipette::advance_start(const GradientField& fie
   if (!keep_tube || (!straight && frames != nullptr)) {
     forget_tubes();
   }
-  return Start::failed;
+  return straight ? Start::failed : without_straight_one();
 }
 
 // False when all borders were traced before. Through the upper and the lower one enters what is too steep for
@@ -308,7 +316,7 @@ bool InjectionPipette::fit_walls_further(const GradientField& field, double nois
 bool InjectionPipette::begin_at_end(const GradientField& field, double noise, const Clear& clear_at,
                                     GatheredFrames* frames, bool& is_straight) {
   const TubeTrace& tube = tubes_[tubes_tried_];
-  if (lie_between_walls(field, noise, tube) < kStraight || last_.half_width > 2 * radius_px_ + 1 ||
+  if (lie_between_walls(field, noise, tube) < kStraight || last_.half_width > widest_half_width() ||
       is_wall_of_wide_tube(field, tube, noise)) {
     reason_ = "what enters through the border is not a straight needle";
     return false;
@@ -361,13 +369,59 @@ bool InjectionPipette::begin_in(const GradientField& field, double noise, const 
     reason_ = "tip too close to the border";
     return false;
   }
+  begin();
+  return true;
+}
+
+void InjectionPipette::begin() {
   last_.ok = true;
   last_.score = 1;
   velocity_ = {};
   lost_ = 0;
   started_ = true;
   reason_.clear();
-  return true;
+}
+
+// Where no straight one is found in one frame without much noise. What is fitted to walls that are the same
+// all along the needle would be wrong: its end is where its shape says, from the frame of the start on.
+bool InjectionPipette::begin_steep(const GradientField& field, double noise, const Clear& clear_at) {
+  constexpr double kEnd_px = 1.5, kCut = 0.1;  // standard deviations; nothing is known of its cut
+  const auto glass = steep_glass(field, noise);
+  if (!glass || glass->half_width < kLumen_px || glass->half_width > widest_half_width() ||
+      !clear_at(glass->tip)) {
+    return false;
+  }
+  const Side side = glass->axis.x < 0 ? Side::right : Side::left;
+  const NeedlePose before = std::exchange(last_, *glass);
+  if ((side_ != Side::automatic && side_ != side) || !cut_template(field)) {
+    last_ = before;
+    return false;
+  }
+  shape_.forget();
+  shape_.learn(field, last_);
+  shape_offset_ = shape_.face().value_or(0);
+  shape_origin_ = last_.tip;
+  bevel_ = {.tangent = 0, .sd = kCut};
+  glass_blur_ = 0;
+  glass_scatter_ = kEnd_px * kEnd_px;
+  glass_frames_ = looked_at_ = 1;
+  longest_ = kShortest_px;
+  steep_ = walls_tell_ = lumen_ = true;
+  in_noise_ = false;
+  begin();
+  // The shape does not fit best just where it was learnt.
+  const NeedlePose followed = follow(field, noise);
+  started_ =
+      followed.ok && std::abs((followed.tip - glass->tip).dot(glass->axis) - shape_offset_) < kSameEnd_px;
+  if (started_) {
+    glass_ahead_ = (glass->tip - followed.tip).dot(glass->axis);
+    last_ = *glass;
+    last_.tip -= glass_ahead_ * glass->axis;
+    begin();
+    found_side_ = side;
+    side_known_ = true;
+  }
+  return started_;
 }
 
 // Where a cut can be told of it.
@@ -442,6 +496,7 @@ double InjectionPipette::lie_between_walls(const GradientField& field, double no
 // Its shape, cut and glass. motion_sd: of the end, px, where it is not certain how it moves. Whether the
 // outermost glass is known well enough for a faint needle to begin.
 bool InjectionPipette::learn_end_anew(const GradientField& field, double noise, double motion_sd) {
+  steep_ = false;
   step_sign_ = 0;
   walls_offset_ = 0.15 * last_.half_width;
   offset_frames_ = 0;
@@ -735,7 +790,7 @@ bool InjectionPipette::find_end(const GradientField& field, double noise, Needle
   NeedlePose walls = needle;
   walls.tip -= walls_offset_ * walls.axis;
   const auto ahead = end_of_profile(field, walls, 16, 16, noise);
-  walls_agree_ = walls_tell_ && view_.blur == 0 && ahead && std::abs(*ahead) <= kSameEnd_px;
+  walls_agree_ = walls_tell_ && !steep_ && view_.blur == 0 && ahead && std::abs(*ahead) <= kSameEnd_px;
   if (walls_agree_) {
     needle.tip += *ahead * needle.axis;
   }
@@ -778,7 +833,7 @@ void InjectionPipette::learn_glass(const GradientField& field, double noise, Nee
     learn_thin_end(field, noise, followed);
     return;
   }
-  if (glass_frames_ >= kFrames) {
+  if (glass_frames_ >= kFrames || steep_) {
     return;
   }
   followed.tip += glass_ahead_ * followed.axis;

@@ -89,6 +89,9 @@ class InjectionPipette {
                             GatheredFrames* frames);
   [[nodiscard]] bool begin_in(const GradientField& field, double noise, const Clear& clear_at,
                               const MovingEnd* moving);
+  [[nodiscard]] bool begin_steep(const GradientField& field, double noise, const Clear& clear_at);
+  void begin();
+  [[nodiscard]] double widest_half_width() const noexcept { return 2 * radius_px_ + 1; }  // px
   [[nodiscard]] std::optional<double> blur_of_end(const GradientField& field) const;
   [[nodiscard]] std::optional<MovingEnd> go_to_moving_end(double blur_px, double sigma_px,
                                                           GatheredFrames& frames);
@@ -123,6 +126,7 @@ class InjectionPipette {
   std::optional<NarrowTubeTrace> trace_;
   Vector<TubeTrace> tubes_;  // through those, the most likely one first
   std::size_t tubes_tried_ = 0;
+  bool steep_due_ = false;  // none was straight: one that widens steeply is looked for next
   struct WallsTried {
     NeedlePose needle;  // on the straightest
     double straight;
@@ -161,6 +165,7 @@ class InjectionPipette {
   ThinEnd thin_end_;          // tells the same of a needle whose lumen is not seen
   double step_sign_ = 0;      // +1: it is brighter ahead of the walls, -1: darker, 0: not known yet
   bool walls_tell_ = true;    // where it ends, more finely than the shape does: in focus
+  bool steep_ = false;        // it widens so much that its walls are no straight lines of one look
   bool walls_agree_ = false;  // with the shape, in the last frame
 };
 

@@ -15,7 +15,8 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr double kPlain_px = 4;  // of a wall that stands out by itself
+constexpr double kPlain_px = 4;     // of a wall that stands out by itself
+constexpr double kMostTaper = 0.2;  // unless the pose is steeper already
 
 // The outermost strong edge within `reach` px of the distance u0 across the axis; a wall has two faces.
 // Averaged over `length` px of it. Empty when no edge exceeds the floor.
@@ -218,7 +219,7 @@ double fit_walls_averaged(const GradientField& field, double noise, double radiu
   needle.axis *= 1 / cv::norm(needle.axis);
   if (half.offset > 0.3 * needle.half_width && half.offset < 2 * std::max(needle.half_width, radius)) {
     needle.half_width = half.offset;
-    needle.taper = std::clamp(half.slope, 0.0, 0.2);
+    needle.taper = std::clamp(half.slope, 0.0, std::max(kMostTaper, needle.taper));
   }
   // An edge of four standard deviations lies up to a quarter of its squared width off.
   const double tolerance = length > 20 ? 1.6 : 1;

@@ -383,7 +383,7 @@ void InjectionPipette::begin() {
 }
 
 // Where no straight one is found in one frame without much noise. What is fitted to walls that are the same
-// all along the needle would be wrong: its end is where its shape says, from the frame of the start on.
+// all along the needle would be wrong: at first its end is where its shape says.
 bool InjectionPipette::begin_steep(const GradientField& field, double noise, const Clear& clear_at) {
   constexpr double kEnd_px = 1.5, kCut = 0.1;  // standard deviations; nothing is known of its cut
   const auto glass = steep_glass(field, noise);
@@ -406,7 +406,9 @@ bool InjectionPipette::begin_steep(const GradientField& field, double noise, con
   glass_scatter_ = kEnd_px * kEnd_px;
   glass_frames_ = looked_at_ = 1;
   longest_ = kShortest_px;
-  steep_ = walls_tell_ = lumen_ = true;
+  step_sign_ = walls_offset_ = 0;
+  offset_frames_ = 0;
+  walls_tell_ = lumen_ = true;
   in_noise_ = false;
   begin();
   // The shape does not fit best just where it was learnt.
@@ -496,7 +498,6 @@ double InjectionPipette::lie_between_walls(const GradientField& field, double no
 // Its shape, cut and glass. motion_sd: of the end, px, where it is not certain how it moves. Whether the
 // outermost glass is known well enough for a faint needle to begin.
 bool InjectionPipette::learn_end_anew(const GradientField& field, double noise, double motion_sd) {
-  steep_ = false;
   step_sign_ = 0;
   walls_offset_ = 0.15 * last_.half_width;
   offset_frames_ = 0;
@@ -790,7 +791,7 @@ bool InjectionPipette::find_end(const GradientField& field, double noise, Needle
   NeedlePose walls = needle;
   walls.tip -= walls_offset_ * walls.axis;
   const auto ahead = end_of_profile(field, walls, 16, 16, noise);
-  walls_agree_ = walls_tell_ && !steep_ && view_.blur == 0 && ahead && std::abs(*ahead) <= kSameEnd_px;
+  walls_agree_ = walls_tell_ && view_.blur == 0 && ahead && std::abs(*ahead) <= kSameEnd_px;
   if (walls_agree_) {
     needle.tip += *ahead * needle.axis;
   }
@@ -833,7 +834,7 @@ void InjectionPipette::learn_glass(const GradientField& field, double noise, Nee
     learn_thin_end(field, noise, followed);
     return;
   }
-  if (glass_frames_ >= kFrames || steep_) {
+  if (glass_frames_ >= kFrames) {
     return;
   }
   followed.tip += glass_ahead_ * followed.axis;

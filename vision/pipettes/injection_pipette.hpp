@@ -165,7 +165,6 @@ class InjectionPipette {
   ThinEnd thin_end_;          // tells the same of a needle whose lumen is not seen
   double step_sign_ = 0;      // +1: it is brighter ahead of the walls, -1: darker, 0: not known yet
   bool walls_tell_ = true;    // where it ends, more finely than the shape does: in focus
-  bool steep_ = false;        // it widens so much that its walls are no straight lines of one look
   bool walls_agree_ = false;  // with the shape, in the last frame
 };
 

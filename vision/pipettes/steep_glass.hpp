@@ -11,8 +11,8 @@
 namespace punctum::vision {
 
 // Between the straight outer faces of the two walls next to its end; ok, score and sd are not set. Empty
-// unless both walls come from the border, and the glass ends in clear medium and is steepest, that is in
-// focus, there. noise: grey levels. The field is that of the whole picture.
+// unless both walls come from the border, and the glass ends in clear medium and is in focus there. noise:
+// grey levels. The field is that of the whole picture.
 [[nodiscard]] std::optional<NeedlePose> steep_glass(const GradientField& field, double noise);
 
 }  // namespace punctum::vision

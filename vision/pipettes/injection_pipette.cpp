@@ -1,22 +1,18 @@
 #include "vision/pipettes/injection_pipette.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <iterator>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 #include <utility>
 
 #include "hal/math/elementary.hpp"
 #include "vision/image/correlation.hpp"
-#include "vision/pipettes/faint_wall.hpp"
 #include "vision/pipettes/moving_end.hpp"
 #include "vision/pipettes/needle_bevel.hpp"
 #include "vision/pipettes/needle_end.hpp"
 #include "vision/pipettes/needle_walls.hpp"
 #include "vision/pipettes/steep_glass.hpp"
-#include "vision/pipettes/wide_tube.hpp"
 
 namespace punctum::vision {
 
@@ -34,10 +30,8 @@ constexpr double kSameEnd_px = 5;  // the walls end where the shape does, but fo
 // By which the walls may seem to end too early: 1.9 to 4.2 px in pictures of two renderers; later it is
 // known.
 constexpr double kStartReach_px = 7, kGlassReach_px = 4;
-constexpr double kWidest_radii = 10;  // of its radius at the tip: its whole width at the border
-constexpr double kStraight = 0.65;    // share of the stations along the shaft on straight walls
-constexpr double kShortest_px = 4, kLongest_px = 40;  // of a wall that an edge is averaged over, at the start
-constexpr double kFollowed_px = 24;                   // and later, of a faint one: it may bend
+constexpr double kShortest_px = 4;   // of a wall that an edge is averaged over
+constexpr double kFollowed_px = 24;  // of a faint one while it is followed: it may bend
 // Standard deviation of the outermost glass with which a faint needle may begin, and of an end that is found
 // together with its cut; out of focus, where a point may be a disc or a ring and not what is fitted; and of
 // an end from which more is learnt later. A tip that is less certain does more harm than one that is not
@@ -49,105 +43,14 @@ constexpr double kSharp_px = 2.3, kWallsTell_px = 1.9;
 // So far from where the walls end, a speck ended them: the end is looked for again there, so often.
 constexpr double kFar_px = 5;
 constexpr int kFurther = 8;
-// Where the walls go on so far behind what lies across the needle, it does not end there; so often.
-constexpr double kAcross_px = 60, kLump_px = 14, kAcrossAveraged_px = 12;
-constexpr int kAcross = 8;
 constexpr std::size_t kGathered = 4;  // frames that tell an end which one of them does not
 constexpr double kShaft_px = 180;     // of the shaft tell its direction
 constexpr double kMostBlur_px = 3.6;  // the widest blur of which the end is known
-// In a needle with a smaller half-width no lumen is left between the walls, and a line across it looks like
-// them.
-constexpr double kLumen_px = 4.5;
 // Frames in a row; then it is looked for from the border, too, in every other frame.
 constexpr int kLostMax = 3;
 constexpr const char* kEndNotClear = "the end of the needle is not clear";
 constexpr const char* kNotRecognised = "tip not recognised";
 constexpr int kWiderMost = 6;  // frames in a row; then the window for its tip grows no more
-
-// Half of the picture that it enters through.
-Side side_of(const TubeTrace& tube) { return tube.axis.x < 0 ? Side::right : Side::left; }
-
-// Through which it does not enter.
-std::optional<Border> other_border(Side side) {
-  return side == Side::automatic ? std::nullopt
-                                 : std::optional(side == Side::right ? Border::left : Border::right);
-}
-
-// One wall of a holding pipette looks like a needle.
-bool is_wall_of_wide_tube(const GradientField& field, const TubeTrace& tube, double noise) {
-  constexpr double kNarrowest_px = 20, kWidest = 0.6;  // of the picture
-  constexpr double kAside = 0.35, kOutside = 1.2, kTimesAsWide = 1.5, kParallel = 0.12;
-  const Border border = side_of(tube) == Side::right ? Border::right : Border::left;
-  const auto wide = trace_wide_tube(field, border, kNarrowest_px, kWidest * field.area.height, noise);
-  if (!wide || wide->half_width < kTimesAsWide * tube.half_width ||
-      std::abs(tube.axis.cross(wide->axis)) > kParallel) {
-    return false;
-  }
-  const double aside = std::abs((tube.root - wide->root).cross(wide->axis)) / wide->half_width;
-  return aside > kAside && aside < kOutside;
-}
-
-// Mean change of grey across the two outer faces. Those of two equal walls have opposite senses; in relief
-// contrast they need not.
-std::array<double, 2> faces(const GradientField& field, const NeedlePose& needle) {
-  const Point across(-needle.axis.y, needle.axis.x);
-  std::array<double, 2> out{};
-  constexpr int kStations = 30;
-  for (int i = 0; i < kStations; ++i) {
-    const double s = 10 + 2 * i, w = needle.half_width_at(s);
-    out[0] += field.gradient(needle.at(s, -w)).dot(across) / kStations;
-    out[1] += field.gradient(needle.at(s, w)).dot(across) / kStations;
-  }
-  return out;
-}
-
-// As in relief, or where what was taken for both walls is one of them.
-bool walls_differ(const GradientField& field, const NeedlePose& needle) {
-  constexpr double kUnequal = 2;
-  const auto [low, high] = faces(field, needle);
-  return needle.half_width < kLumen_px || std::abs(low) > kUnequal * std::abs(high) ||
-         std::abs(high) > kUnequal * std::abs(low);
-}
-
-// It may hold on to the inner face of one wall, so that both faces have the same sense, or to those of both,
-// so that it is bright as a lumen is. Then there are faces further out, of the opposite sense.
-void look_further_out(const GradientField& field, double noise, double radius_px, NeedlePose& needle,
-                      double& straight) {
-  // Half the distance of the faces of a wall, and where they are looked for: sharp and out of focus. There
-  // the inner face is twice as strong, and must not be seen again.
-  struct Wall {
-    double half_px, reach_px;
-  };
-  constexpr std::array<Wall, 2> kWalls = {{{1.5, kWallReach_px}, {2.5, 2}}};
-  constexpr double kAsStrong = 0.6, kAsInner = 0.35;
-  const auto [low, high] = faces(field, needle);
-  const bool one = low * high > 0, both = low > 0 && high < 0;
-  const double weaker = std::min(std::abs(low), std::abs(high));
-  const NeedlePose before = needle;
-  double most = kStraight;
-  const auto try_wider = [&](double by_low, double by_high, double reach) {
-    NeedlePose wider = before;
-    wider.tip = before.at(0, by_high - by_low);
-    wider.half_width += by_low + by_high;
-    const double s = fit_walls(field, noise, radius_px, wider, kLongest_px, reach);
-    const auto [lower, higher] = faces(field, wider);
-    const double weakest = std::min(std::abs(lower), std::abs(higher));
-    if (s > most && wider.half_width > before.half_width + kWalls[0].half_px / 2 &&
-        (one ? lower * higher < 0 && weakest > kAsStrong * weaker
-             : lower < 0 && higher > 0 && weakest > kAsInner * weaker)) {
-      needle = wider;
-      straight = most = s;
-    }
-  };
-  for (const auto& [by, reach] : kWalls) {
-    if (one) {
-      try_wider(by, 0, reach);
-      try_wider(0, by, reach);
-    } else if (both) {
-      try_wider(by, by, reach);
-    }
-  }
-}
 
 // Of the outermost glass, px.
 double sd_of(const CutGlass& cut, double half_width) {
@@ -162,13 +65,6 @@ cv::Rect area_of(const NeedlePose& needle, double shaft_px) {
   return {static_cast<int>(std::min(a.x, b.x) - beside), static_cast<int>(std::min(a.y, b.y) - beside),
           static_cast<int>(std::abs(a.x - b.x) + 2 * beside),
           static_cast<int>(std::abs(a.y - b.y) + 2 * beside)};
-}
-
-// At the end of its walls.
-void put_at_end(const GradientField& field, double noise, double back, double ahead, NeedlePose& needle) {
-  if (const auto s = end_of_profile(field, needle, back, ahead, noise)) {
-    needle.tip += *s * needle.axis;
-  }
 }
 
 }  // namespace
@@ -192,19 +88,13 @@ bool InjectionPipette::cut_template(const GradientField& field) {
 }
 
 bool InjectionPipette::start(const GradientField& field, double noise, const Clear& clear_at) {
-  forget_tubes();
-  trace_.reset();
+  search_.begin_anew();
+  steep_due_ = false;
   Start start = Start::more_to_do;
   while (start == Start::more_to_do) {
     start = advance_start(field, noise, clear_at, false);
   }
   return start == Start::found;
-}
-
-void InjectionPipette::forget_tubes() {
-  sections_looked_at_ = tubes_tried_ = 0;
-  tubes_.clear();
-  walls_tried_.reset();
 }
 
 InjectionPipette::Start InjectionPipette::advance_start(const GradientField& field, double noise,
@@ -213,117 +103,38 @@ InjectionPipette::Start InjectionPipette::advance_start(const GradientField& fie
   if (std::exchange(steep_due_, false)) {
     return begin_steep(field, noise, clear_at) ? Start::found : Start::failed;
   }
-  if (trace_next_border(field, noise)) {
+  if (search_.advance(field, noise)) {
     return Start::more_to_do;
   }
   const auto without_straight_one = [&] {
     steep_due_ = frames == nullptr && noise < kNoisy_grey;
     return steep_due_ ? Start::more_to_do : Start::failed;
   };
-  if (tubes_.empty()) {
+  if (!search_.found_tube()) {
     reason_ = "no narrow tube enters through the border";
-    forget_tubes();
+    search_.begin_anew();
     return without_straight_one();
   }
-  if (fit_walls_further(field, noise)) {
-    return Start::more_to_do;
+  const auto straight = search_.take_straight(field, noise);
+  if (straight) {
+    last_ = *straight;
+    found_side_ = entered_from(last_.axis);
+    side_known_ = true;
+    if (settle(field, noise, clear_at, frames)) {
+      search_.begin_anew();
+      return Start::found;
+    }
+  } else {
+    reason_ = "what enters through the border is not a straight needle";
+    if (search_.go_to_next_tube()) {
+      return Start::more_to_do;
+    }
   }
-  bool straight = false;
-  const bool found = begin_at_end(field, noise, clear_at, frames, straight);
-  walls_tried_.reset();
-  if (found) {
-    forget_tubes();
-    return Start::found;
-  }
-  if (!straight && ++tubes_tried_ < tubes_.size()) {
-    return Start::more_to_do;
-  }
-  tubes_tried_ = 0;
+  search_.try_again();
   if (!keep_tube || (!straight && frames != nullptr)) {
-    forget_tubes();
+    search_.begin_anew();
   }
   return straight ? Start::failed : without_straight_one();
-}
-
-// False when all borders were traced before. Through the upper and the lower one enters what is too steep for
-// the others.
-bool InjectionPipette::trace_next_border(const GradientField& field, double noise) {
-  if (trace_) {
-    if (!trace_->advance(field)) {
-      return true;
-    }
-    const auto t = trace_->tube(field);
-    trace_.reset();
-    if (t && t->edge_share > 0.5 && t->similarity > 0.5 && t->length > 12 &&
-        (side_ == Side::automatic || side_ == side_of(*t))) {
-      const auto like = [](const TubeTrace& tube) { return tube.edge_share * tube.similarity; };
-      const auto less = [&](const TubeTrace& other) { return like(other) < like(*t); };
-      tubes_.insert(std::find_if(tubes_.begin(), tubes_.end(), less), *t);
-    }
-    return true;
-  }
-  constexpr std::array kBorders = {Border::right, Border::left, Border::upper, Border::lower};
-  // With all its edges first: in relief one wall may be faint.
-  if (sections_looked_at_ == 2 * kBorders.size()) {
-    return false;
-  }
-  const Border border = kBorders[sections_looked_at_ / 2];
-  const bool without_specks = sections_looked_at_++ % 2 == 1;
-  if (border == other_border(side_)) {
-    return true;
-  }
-  const auto crossing = narrow_tube_at_border(field, border, 3, std::max(22.0, kWidest_radii * radius_px_),
-                                              noise, without_specks);
-  if (crossing && !(without_specks && crossing->half_width >= section_half_width_)) {
-    trace_.emplace(*crossing);
-  }
-  section_half_width_ = crossing ? crossing->half_width : 0;
-  return true;
-}
-
-// The width of what was traced is not certain. False when all was tried.
-bool InjectionPipette::fit_walls_further(const GradientField& field, double noise) {
-  // Noise may have hidden the walls near the end; a speck beside a wall draws the tube aside.
-  constexpr double kReaches[] = {kWallReach_px, kWallReachAtStart_px};
-  constexpr double kSurely = 0.9;
-  const TubeTrace& tube = tubes_[tubes_tried_];
-  NeedlePose traced;
-  traced.axis = tube.axis;
-  traced.half_width = tube.end_half_width;
-  traced.taper = std::clamp((tube.half_width - tube.end_half_width) / std::max(tube.length, 1.0), 0.0, 0.2);
-  const double length = walls_tried_ && walls_tried_->reaches % 2 == 1 ? tube.sure_length : tube.length;
-  traced.tip = tube.root + length * tube.axis;
-  if (!walls_tried_) {
-    walls_tried_ = {traced, -1, 0};
-  }
-  if (walls_tried_->reaches == 2 * std::size(kReaches)) {
-    return false;
-  }
-  const double reach = kReaches[walls_tried_->reaches++ / 2];
-  for (const double wider : {1.0, 0.7, 0.5}) {
-    NeedlePose tried = traced;
-    tried.half_width *= wider;
-    const double s =
-        walls_tried_->straight < kSurely ? fit_walls(field, noise, radius_px_, tried, kLongest_px, reach) : 0;
-    if (s > walls_tried_->straight) {
-      walls_tried_->straight = s;
-      walls_tried_->needle = tried;
-    }
-  }
-  return true;
-}
-
-bool InjectionPipette::begin_at_end(const GradientField& field, double noise, const Clear& clear_at,
-                                    GatheredFrames* frames, bool& is_straight) {
-  const TubeTrace& tube = tubes_[tubes_tried_];
-  if (lie_between_walls(field, noise, tube) < kStraight || last_.half_width > widest_half_width() ||
-      is_wall_of_wide_tube(field, tube, noise)) {
-    reason_ = "what enters through the border is not a straight needle";
-    return false;
-  }
-  found_side_ = side_of(tube);
-  side_known_ = is_straight = true;
-  return settle(field, noise, clear_at, frames);
 }
 
 // On the line of its walls, where it ends: where a cut can be told, in the mean of the frames as it moves.
@@ -343,7 +154,7 @@ bool InjectionPipette::settle(const GradientField& field, double noise, const Cl
   }
   const GradientField& moving =
       frames->moving(area_of(last_, kShaft_px), end->per_frame * last_.axis, field.sigma);
-  put_at_end(moving, noise, 2 * kStartReach_px, kStartReach_px, last_);
+  put_at_end_of_walls(moving, noise, 2 * kStartReach_px, kStartReach_px, last_);
   if (!begin_in(moving, noise, clear_at, &*end)) {
     return false;
   }
@@ -357,7 +168,7 @@ bool InjectionPipette::begin_in(const GradientField& field, double noise, const 
                                 const MovingEnd* moving) {
   const bool end_known = learn_end_anew(field, noise, moving != nullptr ? moving->motion_sd : 0);
   NeedlePose plain = last_;
-  const bool faint = fit_walls(field, noise, radius_px_, plain, kShortest_px) < kStraight;
+  const bool faint = fit_walls(field, noise, radius_px_, plain, kShortest_px) < kStraightWalls;
   if ((moving != nullptr && !end_known) || (faint && !(end_known && clear_at(last_.tip)))) {
     reason_ = kEndNotClear;
     return false;
@@ -387,11 +198,11 @@ void InjectionPipette::begin() {
 bool InjectionPipette::begin_steep(const GradientField& field, double noise, const Clear& clear_at) {
   constexpr double kEnd_px = 1.5, kCut = 0.1;  // standard deviations; nothing is known of its cut
   const auto glass = steep_glass(field, noise);
-  if (!glass || glass->half_width < kLumen_px || glass->half_width > widest_half_width() ||
+  if (!glass || glass->half_width < kLeastLumen_px || glass->half_width > search_.widest_half_width() ||
       !clear_at(glass->tip)) {
     return false;
   }
-  const Side side = glass->axis.x < 0 ? Side::right : Side::left;
+  const Side side = entered_from(glass->axis);
   const NeedlePose before = std::exchange(last_, *glass);
   if ((side_ != Side::automatic && side_ != side) || !cut_template(field)) {
     last_ = before;
@@ -428,13 +239,14 @@ bool InjectionPipette::begin_steep(const GradientField& field, double noise, con
 
 // Where a cut can be told of it.
 std::optional<double> InjectionPipette::blur_of_end(const GradientField& field) const {
-  const auto blur = last_.half_width < kLumen_px ? std::nullopt : blur_of_shaft(field, last_, kStartReach_px);
+  const auto blur =
+      last_.half_width < kLeastLumen_px ? std::nullopt : blur_of_shaft(field, last_, kStartReach_px);
   return blur && *blur <= kMostBlur_px ? blur : std::nullopt;
 }
 
 bool InjectionPipette::look_again(double sigma_px, const Clear& clear_at, GatheredFrames& frames) {
   const GradientField& field = frames.at_rest(sigma_px);
-  (void)fit_walls(field, frames.noise(), radius_px_, last_, kLongest_px);
+  (void)fit_walls(field, frames.noise(), radius_px_, last_, kLongestWall_px);
   started_ = !blur_of_end(field) || settle(field, frames.noise(), clear_at, &frames);
   looked_at_ = frames.count();
   return started_;
@@ -460,41 +272,6 @@ std::optional<MovingEnd> InjectionPipette::go_to_moving_end(double blur_px, doub
   return end;
 }
 
-// As the tube was traced, and up to where its walls end. Returns the share of the stations that are straight.
-double InjectionPipette::lie_between_walls(const GradientField& field, double noise, const TubeTrace& tube) {
-  const double back = std::min(30.0, 0.5 * tube.length);
-  last_ = walls_tried_->needle;
-  double straight = walls_tried_->straight;
-  look_further_out(field, noise, radius_px_, last_, straight);
-  const auto go_to_end = [&] {
-    put_at_end(field, noise, back, 25, last_);
-    for (int k = 0; k < kAcross && walls_go_on(field, noise, last_, kLump_px, kAcross_px, kAcrossAveraged_px);
-         ++k) {
-      last_.tip += kAcross_px * last_.axis;
-      last_.half_width -= kAcross_px * last_.taper;
-      (void)fit_walls(field, noise, radius_px_, last_, kLongest_px);
-      put_at_end(field, noise, kAcross_px + 15, 25, last_);
-    }
-  };
-  go_to_end();
-  for (int round = 0; round < 2; ++round) {
-    straight = fit_walls(field, noise, radius_px_, last_, kLongest_px);
-    put_at_end(field, noise, back, 10, last_);
-  }
-  if (const auto between =
-          walls_differ(field, last_) ? with_faint_wall(field, noise, radius_px_, last_) : std::nullopt) {
-    last_ = *between;
-    NeedlePose fitted = last_;
-    if (const double s = fit_walls(field, noise, radius_px_, fitted, kLongest_px); s >= kStraight) {
-      last_ = fitted;
-      straight = s;
-    }
-    go_to_end();
-    put_at_end(field, noise, back, 10, last_);
-  }
-  return straight;
-}
-
 // Its shape, cut and glass. motion_sd: of the end, px, where it is not certain how it moves. Whether the
 // outermost glass is known well enough for a faint needle to begin.
 bool InjectionPipette::learn_end_anew(const GradientField& field, double noise, double motion_sd) {
@@ -513,7 +290,7 @@ bool InjectionPipette::learn_end_anew(const GradientField& field, double noise, 
   glass_ahead_ = glass_scatter_ = glass_blur_ = 0;
   glass_frames_ = 0;
   followed_ = false;
-  lumen_ = last_.half_width >= kLumen_px;
+  lumen_ = last_.half_width >= kLeastLumen_px;
   thin_end_.forget();
   const auto known = [&](const CutGlass& cut) {
     return cut.end.blur <= kMostBlur_px && math::hypot(sd_of(cut, last_.half_width), motion_sd) <=
@@ -651,7 +428,7 @@ std::optional<NeedlePose> InjectionPipette::by_shaft(const GradientField& field,
                                                      const Point& tip) {
   NeedlePose needle = last_;
   needle.tip = tip;
-  if (fit_walls(field, noise, radius_px_, needle, kLongest_px) < kStraight) {
+  if (fit_walls(field, noise, radius_px_, needle, kLongestWall_px) < kStraightWalls) {
     return std::nullopt;
   }
   needle.ok = true;

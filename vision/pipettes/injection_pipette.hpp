@@ -15,20 +15,20 @@
 #include "vision/pipettes/backdrop.hpp"
 #include "vision/pipettes/gathered_frames.hpp"
 #include "vision/pipettes/moving_end.hpp"
-#include "vision/pipettes/narrow_tube.hpp"
 #include "vision/pipettes/needle_bevel.hpp"
 #include "vision/pipettes/needle_end.hpp"
 #include "vision/pipettes/needle_pose.hpp"
+#include "vision/pipettes/needle_search.hpp"
 #include "vision/pipettes/needle_shape.hpp"
 #include "vision/pipettes/thin_end.hpp"
-#include "vision/pipettes/tube_trace.hpp"
 
 namespace punctum::vision {
 
 class InjectionPipette {
  public:
   // side: the border through which it enters. radius_px: expected at the tip.
-  InjectionPipette(Side side, double radius_px) : side_(side), radius_px_(radius_px) {}
+  InjectionPipette(Side side, double radius_px)
+      : side_(side), radius_px_(radius_px), search_(side, radius_px) {}
 
   // Looks for it from the border. True when a template of the tip was cut. noise: grey levels. Faint walls
   // are averaged over much of their length; then the end must be certain, and clear_at(tip) tell that nothing
@@ -80,22 +80,15 @@ class InjectionPipette {
   [[nodiscard]] Side side() const noexcept { return found_side_; }
 
  private:
-  void forget_tubes();
-  [[nodiscard]] bool trace_next_border(const GradientField& field, double noise);
-  [[nodiscard]] bool fit_walls_further(const GradientField& field, double noise);
-  [[nodiscard]] bool begin_at_end(const GradientField& field, double noise, const Clear& clear_at,
-                                  GatheredFrames* frames, bool& is_straight);
   [[nodiscard]] bool settle(const GradientField& field, double noise, const Clear& clear_at,
                             GatheredFrames* frames);
   [[nodiscard]] bool begin_in(const GradientField& field, double noise, const Clear& clear_at,
                               const MovingEnd* moving);
   [[nodiscard]] bool begin_steep(const GradientField& field, double noise, const Clear& clear_at);
   void begin();
-  [[nodiscard]] double widest_half_width() const noexcept { return 2 * radius_px_ + 1; }  // px
   [[nodiscard]] std::optional<double> blur_of_end(const GradientField& field) const;
   [[nodiscard]] std::optional<MovingEnd> go_to_moving_end(double blur_px, double sigma_px,
                                                           GatheredFrames& frames);
-  [[nodiscard]] double lie_between_walls(const GradientField& field, double noise, const TubeTrace& tube);
   [[nodiscard]] bool learn_end_anew(const GradientField& field, double noise, double motion_sd);
   bool cut_template(const GradientField& field);
   void weigh_end(const GradientField& field, double noise, NeedlePose& needle) const;
@@ -121,19 +114,9 @@ class InjectionPipette {
   Side side_;
   double radius_px_;
   bool started_ = false;
-  std::size_t sections_looked_at_ = 0;  // in the search for it: of each border two
-  double section_half_width_ = 0;       // of the last one, px
-  std::optional<NarrowTubeTrace> trace_;
-  Vector<TubeTrace> tubes_;  // through those, the most likely one first
-  std::size_t tubes_tried_ = 0;
+  NeedleSearch search_;
   bool steep_due_ = false;  // none was straight: one that widens steeply is looked for next
-  struct WallsTried {
-    NeedlePose needle;  // on the straightest
-    double straight;
-    std::size_t reaches;  // that were tried
-  };
-  std::optional<WallsTried> walls_tried_;
-  double longest_ = 0;  // of a wall that an edge is averaged over, px
+  double longest_ = 0;      // of a wall that an edge is averaged over, px
   Side found_side_ = Side::right;
   bool side_known_ = false;
   std::string reason_;  // why it was not started

@@ -359,4 +359,11 @@ std::optional<double> steepest_wall_step(const GradientField& field, const Needl
   return (static_cast<int>(k) - n / 2 + vertex_offset(g[k - 1], g[k], g[k + 1])) * kStep_px;
 }
 
+void put_at_end_of_walls(const GradientField& field, double noise, double back, double ahead,
+                         NeedlePose& needle) {
+  if (const auto s = end_of_profile(field, needle, back, ahead, noise)) {
+    needle.tip += *s * needle.axis;
+  }
+}
+
 }  // namespace punctum::vision

@@ -13,6 +13,11 @@ namespace punctum::vision {
 // stations along the shaft whose edges lie on the two straight lines; 0 when there are too few. The edges are
 // averaged over no more than `longest` px of a wall, and looked for within `reach` px.
 inline constexpr double kWallReach_px = 3, kWallReachAtStart_px = 7;
+inline constexpr double kStraightWalls = 0.65;  // what a straight needle has of those stations, at least
+inline constexpr double kLongestWall_px = 40;   // to average an edge over, at the start
+// In a needle with a smaller half-width no lumen is left between the walls, and a line across it looks like
+// them.
+inline constexpr double kLeastLumen_px = 4.5;
 [[nodiscard]] double fit_walls(const GradientField& field, double noise, double radius, NeedlePose& needle,
                                double longest, double reach = kWallReach_px);
 
@@ -25,6 +30,9 @@ inline constexpr double kWallReach_px = 3, kWallReachAtStart_px = 7;
 // Searched from `back` px behind the tip to `ahead` px ahead of it. Empty when it does not end there.
 [[nodiscard]] std::optional<double> end_of_profile(const GradientField& field, const NeedlePose& needle,
                                                    double back, double ahead, double noise);
+// Puts the tip there, where there is such an end.
+void put_at_end_of_walls(const GradientField& field, double noise, double back, double ahead,
+                         NeedlePose& needle);
 
 // Distance ahead of the tip, within +-reach px, of the steepest change of grey along both walls. sign: of
 // that change going ahead; 0 = either. Changes below `floor` (grey levels per px) do not count.

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 
 #include "vision/image/median.hpp"
 #include "vision/membrane/dimple.hpp"
-#include "vision/pipettes/wide_tube.hpp"
 #include "vision/seen_cell.hpp"
 #include "vision/seen_events.hpp"
 #include "vision/seen_holder.hpp"

@@ -233,6 +233,8 @@ bool InjectionPipette::begin_steep(const GradientField& field, double noise, con
     begin();
     found_side_ = side;
     side_known_ = true;
+  } else {
+    reason_ = kEndNotClear;
   }
   return started_;
 }

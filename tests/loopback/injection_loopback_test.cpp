@@ -245,7 +245,7 @@ TEST_F(Injection, is_stopped_by_a_contact_that_opens_while_it_injects) {
   std::int64_t stop_ns = 0, gate_ns = 0;
   int edges = 0;
   hal::Vec3 tip_m = hal::Vec3::Zero();
-  const int status = run("27", [&](const e2e::Running&) {
+  const int status = run("27", [&](const e2e::Running& program) {
     ASSERT_TRUE(wait_for([&] { return gate_is_open() && world.now().force_N > 0; }, 25));
     stop_ns = clock.now_ns();
     board.drive(kContactA, false);
@@ -256,6 +256,7 @@ TEST_F(Injection, is_stopped_by_a_contact_that_opens_while_it_injects) {
     clock.sleep_until_ns(stop_ns + 50'000'000);
     tip_m = world.now().truth.tip_m;
     edges = edges_until(stop_ns + 100'000'000);
+    program.send(SIGINT);
   });
   // Each output, and the ticks of a millisecond that it took.
   std::vector<WorldEvent> outputs = events_after(stop_ns);

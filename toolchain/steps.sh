@@ -3,7 +3,7 @@
 # A step's output goes to a log; its progress is shown, and on failure the part of the log that matters.
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
-export LC_ALL=C.UTF-8
+export LANG=C.UTF-8 LC_ALL=C.UTF-8 # a compiler's cache tells both from none
 # Where ccache is there, clones in different places share what they compiled.
 export CCACHE_BASEDIR=$root CCACHE_NOHASHDIR=1 CCACHE_SLOPPINESS=pch_defines,time_macros
 cores=${PUNCTUM_JOBS:-$(nproc)}

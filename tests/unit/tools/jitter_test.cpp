@@ -92,6 +92,7 @@ Result measured(unsigned seed, double tail_us = 0, double all_us = 0, double kep
   return r;
 }
 
+#ifndef PUNCTUM_SANITIZED  // statistics of a hundred comparisons: minutes there
 bool differs(const Result& a, const Result& b, double part) {
   const auto found = difference(a, b);
   EXPECT_TRUE(found) << found.error();
@@ -99,7 +100,6 @@ bool differs(const Result& a, const Result& b, double part) {
                      [part](const auto& q) { return q.differs && (part == 0 || q.part == part); });
 }
 
-#ifndef PUNCTUM_SANITIZED  // statistics of a hundred comparisons: minutes there
 TEST(Difference, is_rarely_seen_between_measurements_of_one_machine) {
   int wrong = 0;
   constexpr unsigned kPairs = 24;

@@ -21,7 +21,9 @@ struct Microscope {
   double noise = 5;                   // grey levels
   double focus_px = 0;                // radius of the disc that a point becomes; 0: in focus
   double needle_deg = 0;              // of its axis against the holding pipette's
-  double gap_px = 40;                 // from the tip to the outer membrane; < 0: inside the cell
+  double gap_px = 40;                 // from the tip to the outer membrane at rest; < 0: beyond it
+  double dimple_px = 0;               // by which the outer membrane is pushed in on the needle's axis
+  unsigned shot = 0;                  // of the same scene, each with noise of its own
   int impurities = 12, on_shaft = 0;  // specks anywhere, and on the needle's walls
   double turned_deg = 0;              // of the whole picture
   cv::Point2d moved = {0, 0};
@@ -56,10 +58,12 @@ class DrawnMicroscope {
     const double t = m.needle_deg * CV_PI / 180;
     axis_ = {-std::cos(t), std::sin(t)};
     const cv::Point2d aimed = centre_ + cv::Point2d(0, between(-5, 5));
-    tip_ = aimed - (outer_radius(std::atan2(-axis_.y, -axis_.x)) + m.gap_px) * axis_;
+    tip_ = aimed - (radius_at_rest(std::atan2(-axis_.y, -axis_.x)) + m.gap_px) * axis_;
+    pushed_at_ = tip_ + m.gap_px * axis_ - centre_;
     needle_half_ = between(4.2, 5.5);
     taper_ = between(0.012, 0.03);
     bevel_ = between(-0.7, 0.7);
+    dimple_half_ = radius_ * (0.2 + 0.1 * bevel_ * bevel_) + 0.5 * m.dimple_px;
     mouth_ = {centre_.x - outer_radius(CV_PI) + 1.5, centre_.y + between(-3, 3)};
   }
 
@@ -86,6 +90,9 @@ class DrawnMicroscope {
     out.picture.create(kH, kW, CV_8U);
     std::normal_distribution<double> noise(0, 1);
     const double uneven = between(-0.05, 0.05);
+    if (m_.shot > 0) {
+      random_.seed(m_.seed + 100'003 * m_.shot);
+    }
     for (int y = 0; y < kH; ++y) {
       for (int x = 0; x < kW; ++x) {
         const double g =
@@ -119,14 +126,24 @@ class DrawnMicroscope {
     return std::uniform_real_distribution<double>(low, high)(random_);
   }
 
-  [[nodiscard]] double outer_radius(double t) const {
+  [[nodiscard]] double radius_at_rest(double t) const {
     double r = radius_;
     for (int k = 0; k < 3; ++k) {
       r += waves_[k].height * std::cos((k + 2) * t + waves_[k].phase);
     }
     return r;
   }
-  [[nodiscard]] double inner_radius(double t) const { return outer_radius(t) - zona_ - space_; }
+  // A pit, flat where the needle pushes.
+  [[nodiscard]] double pushed(double t, double depth) const {
+    const double along = radius_ * std::remainder(t - std::atan2(pushed_at_.y, pushed_at_.x), 2 * CV_PI);
+    const double x = std::max(0.0, std::abs(along) - needle_half_) / dimple_half_;
+    return depth / ((1 + x * x) * std::sqrt(1 + x * x));
+  }
+  [[nodiscard]] double outer_radius(double t) const { return radius_at_rest(t) - pushed(t, m_.dimple_px); }
+  // The space between them gives half of its width before the inner one is pushed, too.
+  [[nodiscard]] double inner_radius(double t) const {
+    return radius_at_rest(t) - zona_ - space_ - pushed(t, std::max(0.0, m_.dimple_px - 0.5 * space_));
+  }
 
   // Of a ball: what the light crosses at distance u from its middle.
   static double chord(double r, double u) { return u < r ? 2 * std::sqrt(r * r - u * u) : 0; }
@@ -137,7 +154,7 @@ class DrawnMicroscope {
     const double u = cv::norm(q);
     if (m_.cell && u < radius_ + 6) {
       const double t = std::atan2(q.y, q.x), outer = outer_radius(t), lumen = outer - zona_,
-                   inner = lumen - space_;
+                   inner = inner_radius(t);
       body.thickness += 0.5 * (chord(outer, u) - chord(lumen, u)) + 0.35 * chord(inner, u);
       body.dark += u < inner ? 33 + granules(q) : u < lumen ? 7 : u < outer ? 30 : 0;
       body.thickness += u < inner ? 0.15 * granules(q) : 0;
@@ -239,8 +256,8 @@ class DrawnMicroscope {
   static constexpr double kHolder = 46, kMouth = 14;  // half-widths, px
   Microscope m_;
   std::mt19937 random_;
-  cv::Point2d centre_, tip_, axis_, mouth_;
-  double radius_ = 0, zona_ = 0, space_ = 0, needle_half_ = 0, taper_ = 0, bevel_ = 0;
+  cv::Point2d centre_, tip_, axis_, mouth_, pushed_at_;
+  double radius_ = 0, zona_ = 0, space_ = 0, needle_half_ = 0, taper_ = 0, bevel_ = 0, dimple_half_ = 1;
   Wave waves_[3] = {};
 };
 

@@ -181,15 +181,14 @@ bool CommonShape::find(EdgeLearnt& learnt) {
   bool found = false;
   if (!lit_.empty()) {
     average_first_in_relief();
-    return find_from(kRounds);
-  }
-  if (learnt.shape.size() == profiles_.samples) {
+    found = find_from(kRounds);
+  } else if (learnt.shape.size() == profiles_.samples && learnt.turning.empty()) {
     shape_ = learnt.shape;
     spread_ = learnt.spread;
     trust_samples();
     found = find_from(kRoundsFromLast);
   }
-  if (!found) {
+  if (!found && lit_.empty()) {
     std::fill(place_.begin(), place_.end(), 0.0);
     std::fill(gain_.begin(), gain_.end(), 1.0);
     std::fill(trust_.begin(), trust_.end(), 1.0F);
@@ -217,6 +216,14 @@ void CommonShape::learn(EdgeLearnt& learnt) {
   move_shape(learnt.face, 0);
   learnt.shape.assign(moved_shape_.begin(), moved_shape_.end());
   learnt.spread = spread_;
+  learnt.turning.clear();
+  if (!lit_.empty()) {
+    pad(turning_, padded_turning_, padded_turning_slope_);
+    move_shape(learnt.face, 1);
+    for (std::size_t j = 0; j < profiles_.samples; ++j) {
+      learnt.turning.push_back(static_cast<double>(moved_shape_[j]) - learnt.shape[j]);
+    }
+  }
 }
 
 bool CommonShape::find_from(int rounds) {

@@ -71,8 +71,12 @@ std::optional<SeenOutline> shaped_once(const ClearedPicture& picture, const Cont
   if (edge.relief != Point(0, 0)) {
     const auto steps = ReliefSteps(common.turning(), edge, picture.noise).fit();
     if (!steps) {
+      learnt.shape.clear();
       return std::nullopt;
     }
+    learnt.relief = edge.relief;
+    learnt.inside = edge.inside;
+    learnt.face += steps->own;
     return outline(base, profiles, common, steps->own, kRelief_px, picture.noise, learnt);
   }
   const auto steps = BlurredSteps(common.shape(), edge).fit(learnt.steps);
@@ -97,12 +101,14 @@ std::optional<SeenOutline> shaped_once(const ClearedPicture& picture, const Cont
 
 }  // namespace
 
-double grey_beside_face(const EdgeLearnt& edge, double outside_px) {
+double grey_beside_face(const EdgeLearnt& edge, const Point& outwards, double outside_px) {
   const double last = static_cast<double>(edge.shape.size() - 1),
                at = std::clamp((edge.inside + edge.face + outside_px) / EdgeProfiles::kStep_px, 0.0, last);
   const auto i = static_cast<std::size_t>(std::min(at, last - 1));
-  return edge.shape[i] + (at - static_cast<double>(i)) * (edge.shape[i + 1] - edge.shape[i]) -
-         edge.shape.back();
+  const auto of = [&](const Vector<double>& v) {
+    return v[i] + (at - static_cast<double>(i)) * (v[i + 1] - v[i]) - v.back();
+  };
+  return of(edge.shape) + (edge.turning.empty() ? 0 : outwards.dot(edge.relief) * of(edge.turning));
 }
 
 std::optional<SeenOutline> shaped_edge(const ClearedPicture& picture, const Contour& contour,

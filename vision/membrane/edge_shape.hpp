@@ -39,15 +39,18 @@ struct EdgeLearnt {
   bool halo = false;                      // in the last frame
   double nearby_height = 0, blur_px = 0;  // of the nearby edge: half of its change of grey, outwards
   double own_blur_px = 0;                 // 0: not known
-  // What all profiles had in common in the last frame, and how single ones differed from it; empty in relief.
+  // What all profiles had in common in the last frame, and how single ones differed from it.
   Vector<double> shape, spread;
+  Vector<double> turning;  // what they show the more of the more they face `relief`; empty: not in relief
+  Point relief;            // as in EdgeShape
   double inside = 0,
          face = 0;  // px within the contour that the shape begins; outwards, where the step is in it
   std::optional<cv::Vec4d> steps;  // in it: see BlurredSteps
 };
 
-// What the membrane adds to the picture's grey so far outside of its face; with a shape.
-[[nodiscard]] double grey_beside_face(const EdgeLearnt& edge, double outside_px);
+// What the membrane adds to the picture's grey so far outside of its face, where that is the way outwards
+// (unit); with a shape.
+[[nodiscard]] double grey_beside_face(const EdgeLearnt& edge, const Point& outwards, double outside_px);
 
 // soft: per point of the contour, 1 where the membrane may have any shape (beside the needle), 0 elsewhere.
 // Empty where too little is seen, or where the edge does not look alike all round. learnt: takes this frame

@@ -21,6 +21,7 @@ constexpr std::array kLumen = {-0.4, -0.2, 0.0, 0.2, 0.4};  // of the half-width
 // Of the variance of the picture's noise, once it is smoothed and averaged across the lumen; and how far
 // along the axis neighbours tell the same.
 constexpr double kNoiseShare = 0.05, kJoined_px = 3;
+constexpr double kHeight = 0.5;  // by which a membrane on the tip stands out more or less than elsewhere: sd
 constexpr double kUnlike = 0.2;  // of what a membrane on the tip explains, left beyond the noise: it is none
 
 // Grey levels per px along the needle's axis; > 0 for the outer face of a membrane of that polarity.
@@ -154,11 +155,13 @@ std::optional<TipOnMembrane::Tip> TipOnMembrane::ahead(const GradientField& fiel
     const double place = i * kStep_px - kFrom_px;  // ahead of the tip
     const double here = step[static_cast<std::size_t>(i)] =
         membrane.shape.empty() ? 0.5 * blurred_step(place / (std::numbers::sqrt2 * blur))
-                               : grey_beside_face(membrane, -place);
+                               : grey_beside_face(membrane, -needle.axis, -place);
     s += here;
     ss += here * here;
   }
   constexpr double n = kCompared;
+  // Certainty of its height, where it is known how the membrane looks.
+  const double own = membrane.shape.empty() ? 0 : 1 / (kHeight * kHeight);
   for (int t = 0; t < kTips; ++t) {  // the tip lies t steps ahead of the range's back end
     double d = 0, sd = 0, dd = 0;
     for (int i = 0; i < kCompared; ++i) {
@@ -168,9 +171,12 @@ std::optional<TipOnMembrane::Tip> TipOnMembrane::ahead(const GradientField& fiel
       sd += step[static_cast<std::size_t>(i)] * rest;
       dd += rest * rest;
     }
-    const double height = (sd - s * d / n) / (ss - s * s / n), off = (t * kStep_px - kReach_px) / kDrawn_px;
-    const double by_membrane = height * (sd - s * d / n), left = dd - d * d / n - by_membrane;
-    unlikely[static_cast<std::size_t>(t)] = left / variance + off * off;
+    // The height that fits best, and is the membrane's own as far as that is known.
+    const double with = sd - s * d / n, power = ss - s * s / n, known = variance * own;
+    const double height = (with + known) / (power + known), other = height - 1,
+                 off = (t * kStep_px - kReach_px) / kDrawn_px;
+    const double by_membrane = height * (2 * with - height * power), left = dd - d * d / n - by_membrane;
+    unlikely[static_cast<std::size_t>(t)] = left / variance + own * other * other + off * off;
     explained[static_cast<std::size_t>(t)] =
         left < n * kNoiseShare * grey * grey + kUnlike * kUnlike * by_membrane;
   }
@@ -181,7 +187,7 @@ std::optional<TipOnMembrane::Tip> TipOnMembrane::ahead(const GradientField& fiel
   }
   const double curvature = (unlikely[i - 1] - 2 * *best + unlikely[i + 1]) / (kStep_px * kStep_px);
   if (*best > unlikely[i - 1] || *best > unlikely[i + 1] || curvature <= 0) {
-    return std::nullopt;
+    return Tip{0, kReach_px};
   }
   return Tip{(static_cast<double>(i) + vertex_offset(-unlikely[i - 1], -*best, -unlikely[i + 1])) * kStep_px -
                  kReach_px,

@@ -41,9 +41,9 @@ class TipOnMembrane {
     double ahead;  // of the tip of the pose: the outermost glass, px
     double sd;     // px
   };
-  // Empty before anything was learnt, or where the tip lies far from where the pose has it. 0, 0 where what
-  // is seen is no membrane on it, which then draws no end aside. noise: grey levels. membrane: where its
-  // shape is not known, it is a step.
+  // Empty before anything was learnt. 0 where the tip lies far from where the pose has it, which is then its
+  // deviation; 0, 0 where what is seen is no membrane on it, which then draws no end aside. noise: grey
+  // levels. membrane: where its shape is not known, it is a step.
   [[nodiscard]] std::optional<Tip> ahead(const GradientField& field, double noise, const EdgeLearnt& membrane,
                                          const NeedlePose& needle) const;
 

@@ -1,0 +1,194 @@
+// Whole injections by the tests' own microscope (tests/support/drawn_microscope.hpp), in bright field and in
+// relief, by a needle that is cut obliquely: what is seen from the picture alone. $PUNCTUM_INJECTION_SEEDS
+// "101-108" measures more of them than the few of every day, and then requires nothing.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+#include <optional>
+#include <random>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "tests/support/drawn_microscope.hpp"
+#include "tests/support/pictures.hpp"
+#include "vision/tracker.hpp"
+
+namespace {
+
+using namespace punctum::vision;
+using test::distance;
+using test::DrawnMicroscope;
+using test::frame_of;
+using test::Microscope;
+
+constexpr double kRight_px = 2;
+
+// Of the needle in a frame.
+struct Stage {
+  double gap_px, dimple_px;  // to the membrane at rest; of the membrane
+  std::string phase;
+};
+
+// It comes by 1 px per frame, pushes the membrane until that gives way, goes on, rests, and goes back faster.
+Stage stage(int frame, double breaks_px) {
+  constexpr double kFrom_px = 14, kPast_px = 8, kRest = 6, kBack_px = 2.5, kRecoil = 2, kSeenAgain = 5;
+  const double stops = kFrom_px + breaks_px + kPast_px, back = stops + kRest;
+  const double gap_px =
+      frame < back ? kFrom_px - std::min<double>(frame, stops) : kFrom_px - stops + kBack_px * (frame - back);
+  const double since = frame - kFrom_px - breaks_px;
+  if (since < 0) {
+    return {gap_px, std::max(0.0, -gap_px), gap_px > 0 ? "before contact" : "in contact"};
+  }
+  return {gap_px, breaks_px * std::exp(-since / kRecoil),
+          since < kSeenAgain ? "after the puncture" : "inside"};
+}
+
+struct Seen {
+  int frames = 0, outer_right = 0, inner_right = 0, depths = 0, deep_right = 0, deep_covered = 0;
+  double outer = 0, inner = 0, depth = 0;  // sums of squares, px^2
+};
+
+bool far_off(std::span<const Point> from, std::span<const Point> closed) {
+  return std::any_of(from.begin(), from.end(),
+                     [&](const Point& p) { return distance(p, closed) > kRight_px; });
+}
+
+double mean_square(std::span<const Point> from, std::span<const Point> closed) {
+  double sum = 0;
+  for (const Point& p : from) {
+    sum += distance(p, closed) * distance(p, closed);
+  }
+  return sum / static_cast<double>(from.size());
+}
+
+// Of one kind of pictures.
+struct Injections {
+  std::map<std::string, Seen> in;      // phases
+  std::vector<int> contact, puncture;  // frames by which they are told late; 99: never
+};
+
+void inject(Microscope m, Injections& out) {
+  std::mt19937 random(m.seed + 7);
+  const auto between = [&random](double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(random);
+  };
+  m.relief_deg = between(0, 360);
+  m.needle_deg = between(-15, 15);
+  const double breaks_px = std::round(between(10, 18));
+  VisionConfig config;
+  config.pixel_m = DrawnMicroscope::kPixel_um * 1e-6;
+  Tracker tracker(config, DrawnMicroscope::kW, DrawnMicroscope::kH);
+  std::optional<int> touched, broke, touched_seen, broke_seen;
+  std::string before;
+  constexpr int kFrames = 44;
+  for (int k = 0; k < kFrames; ++k) {
+    const Stage at = stage(k, breaks_px);
+    m.gap_px = at.gap_px;
+    m.dimple_px = at.dimple_px;
+    m.shot = static_cast<unsigned>(k) + 1;
+    const auto [picture, truth] = DrawnMicroscope(m).draw();
+    const Result& r = tracker.process(frame_of(picture, static_cast<std::uint64_t>(k)));
+    if (at.phase == "in contact" && !touched) {
+      touched = k;
+    }
+    if (at.phase == "after the puncture" && !broke) {
+      broke = k;
+    }
+    touched_seen = r.contact && !touched_seen ? k : touched_seen;
+    broke_seen = r.punctured && !broke_seen ? k : broke_seen;
+
+    Seen& seen = out.in[at.phase];
+    ++seen.frames;
+    if (r.outer.ok) {
+      seen.outer += mean_square(r.outer.contour, truth.outer);
+      seen.outer_right +=
+          far_off(r.outer.contour, truth.outer) || far_off(truth.outer, r.outer.contour) ? 0 : 1;
+    }
+    if (r.inner.ok) {
+      seen.inner += mean_square(r.inner.contour, truth.inner);
+      seen.inner_right +=
+          far_off(r.inner.contour, truth.inner) || far_off(truth.inner, r.inner.contour) ? 0 : 1;
+    }
+    if (at.phase == "in contact" && r.wd_px && at.dimple_px >= 1) {
+      const double off = *r.wd_px - at.dimple_px;
+      ++seen.depths;
+      seen.depth += off * off;
+      seen.deep_right += std::abs(off) < 1 ? 1 : 0;
+      seen.deep_covered += std::abs(off) < 1.96 * r.wd_sd_px ? 1 : 0;
+    }
+  }
+  out.contact.push_back(touched_seen.value_or(99) - *touched);
+  out.puncture.push_back(broke_seen.value_or(99) - *broke);
+}
+
+void print(const char* name, const Injections& all) {
+  for (const auto& [phase, s] : all.in) {
+    const double n = s.frames;
+    std::printf("%s, %s: %d frames; outer right %.0f %%, %.2f um rms; inner %.0f %%, %.2f um", name,
+                phase.c_str(), s.frames, 100 * s.outer_right / n,
+                DrawnMicroscope::kPixel_um * std::sqrt(s.outer / n), 100 * s.inner_right / n,
+                DrawnMicroscope::kPixel_um * std::sqrt(s.inner / n));
+    if (s.depths > 0) {
+      std::printf("; depth of the dimple %.2f px rms, within 1 px %d of %d, covered %d",
+                  std::sqrt(s.depth / s.depths), s.deep_right, s.depths, s.deep_covered);
+    }
+    std::printf("\n");
+  }
+  for (const auto& [what, late] :
+       {std::pair("contact", &all.contact), std::pair("puncture", &all.puncture)}) {
+    std::printf("%s, %s late by", name, what);
+    for (const int frames : *late) {
+      std::printf(" %+d", frames);
+    }
+    std::printf("\n");
+  }
+}
+
+struct Kind {
+  const char* name;
+  Microscope microscope;
+};
+
+class DrawnInjection : public testing::TestWithParam<Kind> {};
+
+TEST_P(DrawnInjection, shows_the_dimple_and_when_the_membrane_gives_way) {
+  unsigned first = 1, last = 2;
+  const char* const named = std::getenv("PUNCTUM_INJECTION_SEEDS");
+  const bool measured = named != nullptr && std::sscanf(named, "%u-%u", &first, &last) == 2;
+  Injections all;
+  for (unsigned seed = first; seed <= last; ++seed) {
+    Microscope m = GetParam().microscope;
+    m.seed = seed;
+    inject(m, all);
+  }
+  print(GetParam().name, all);
+  if (measured) {
+    return;
+  }
+  const Seen& pushed = all.in["in contact"];
+  EXPECT_GE(pushed.depths, pushed.frames - 4);
+  EXPECT_LT(std::sqrt(pushed.depth / pushed.depths), 0.6);
+  EXPECT_GE(pushed.deep_right, pushed.depths - 1);
+  EXPECT_GE(pushed.deep_covered, 9 * pushed.depths / 10);
+  for (const char* phase : {"before contact", "inside"}) {
+    EXPECT_EQ(all.in[phase].outer_right, all.in[phase].frames) << phase;
+    EXPECT_LT(std::sqrt(all.in[phase].outer / all.in[phase].frames), 0.25) << phase;
+  }
+  for (const int late : all.contact) {
+    EXPECT_TRUE(late >= -1 && late <= 1) << late;
+  }
+  for (const int late : all.puncture) {
+    EXPECT_TRUE(late >= 0 && late <= 2) << late;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, DrawnInjection,
+                         testing::Values(Kind{"bright field", {}}, Kind{"relief", {.relief = true}}),
+                         [](const auto& of) { return of.index == 0 ? "bright_field" : "relief"; });
+
+}  // namespace

@@ -171,10 +171,10 @@ std::optional<TipOnMembrane::Tip> TipOnMembrane::ahead(const GradientField& fiel
       sd += step[static_cast<std::size_t>(i)] * rest;
       dd += rest * rest;
     }
-    // The height that fits best, and is the membrane's own as far as that is known.
+    // The height that fits best, and is the membrane's own as far as that is known: not upside down.
     const double with = sd - s * d / n, power = ss - s * s / n, known = variance * own;
-    const double height = (with + known) / (power + known), other = height - 1,
-                 off = (t * kStep_px - kReach_px) / kDrawn_px;
+    const double best = (with + known) / (power + known), height = own > 0 ? std::max(0.0, best) : best,
+                 other = height - 1, off = (t * kStep_px - kReach_px) / kDrawn_px;
     const double by_membrane = height * (2 * with - height * power), left = dd - d * d / n - by_membrane;
     unlikely[static_cast<std::size_t>(t)] = left / variance + own * other * other + off * off;
     explained[static_cast<std::size_t>(t)] =

@@ -22,9 +22,10 @@
 namespace {
 
 using namespace punctum::vision;
-using test::distance;
 using test::DrawnMicroscope;
 using test::frame_of;
+using test::furthest;
+using test::mean_square;
 using test::Microscope;
 
 constexpr double kRight_px = 2;
@@ -55,17 +56,8 @@ struct Seen {
   double outer = 0, inner = 0, depth = 0;  // sums of squares, px^2; of what is claimed
 };
 
-bool far_off(std::span<const Point> from, std::span<const Point> closed) {
-  return std::any_of(from.begin(), from.end(),
-                     [&](const Point& p) { return distance(p, closed) > kRight_px; });
-}
-
-double mean_square(std::span<const Point> from, std::span<const Point> closed) {
-  double sum = 0;
-  for (const Point& p : from) {
-    sum += distance(p, closed) * distance(p, closed);
-  }
-  return sum / static_cast<double>(from.size());
+bool right(std::span<const Point> seen, std::span<const Point> truth) {
+  return furthest(seen, truth) <= kRight_px && furthest(truth, seen) <= kRight_px;
 }
 
 // Of one kind of pictures.
@@ -108,14 +100,12 @@ void inject(Microscope m, Injections& out) {
     if (r.outer.ok) {
       ++seen.outer_claimed;
       seen.outer += mean_square(r.outer.contour, truth.outer);
-      seen.outer_right +=
-          far_off(r.outer.contour, truth.outer) || far_off(truth.outer, r.outer.contour) ? 0 : 1;
+      seen.outer_right += right(r.outer.contour, truth.outer) ? 1 : 0;
     }
     if (r.inner.ok) {
       ++seen.inner_claimed;
       seen.inner += mean_square(r.inner.contour, truth.inner);
-      seen.inner_right +=
-          far_off(r.inner.contour, truth.inner) || far_off(truth.inner, r.inner.contour) ? 0 : 1;
+      seen.inner_right += right(r.inner.contour, truth.inner) ? 1 : 0;
     }
     if (at.phase == "in contact" && r.wd_px && at.dimple_px >= 1) {
       const double off = *r.wd_px - at.dimple_px;

@@ -31,10 +31,11 @@ using namespace punctum::vision;
 using e2e::python;
 using e2e::renderer;
 using e2e::renderer_lacks;
-using test::distance;
 using test::Drawn;
 using test::DrawnMicroscope;
 using test::frame_of;
+using test::furthest;
+using test::mean_square;
 using test::Microscope;
 using test::Truth;
 
@@ -54,28 +55,6 @@ Seeds seeds(unsigned first = 1) {
     s.measured = true;
   }
   return s;
-}
-
-// px, of each point from the closed contour.
-std::vector<double> distances(std::span<const Point> from, std::span<const Point> closed) {
-  std::vector<double> out;
-  for (const Point& p : from) {
-    out.push_back(distance(p, closed));
-  }
-  return out;
-}
-
-double furthest(std::span<const Point> from, std::span<const Point> closed) {
-  const std::vector<double> off = distances(from, closed);
-  return *std::max_element(off.begin(), off.end());
-}
-
-double mean_square(std::span<const Point> from, std::span<const Point> closed) {
-  double sum = 0;
-  for (const double off : distances(from, closed)) {
-    sum += off * off;
-  }
-  return sum / static_cast<double>(from.size());
 }
 
 struct Errors {

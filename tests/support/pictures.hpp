@@ -37,4 +37,22 @@ inline double distance(const Point& p, std::span<const Point> closed) {
   return std::sqrt(nearest2);
 }
 
+// The points of one contour from the other one, which is closed: the largest distance, px, and the mean
+// square.
+inline double furthest(std::span<const Point> from, std::span<const Point> closed) {
+  double most = 0;
+  for (const Point& p : from) {
+    most = std::max(most, distance(p, closed));
+  }
+  return most;
+}
+inline double mean_square(std::span<const Point> from, std::span<const Point> closed) {
+  double sum = 0;
+  for (const Point& p : from) {
+    const double off = distance(p, closed);
+    sum += off * off;
+  }
+  return sum / static_cast<double>(from.size());
+}
+
 }  // namespace punctum::vision::test

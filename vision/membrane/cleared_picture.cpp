@@ -22,6 +22,7 @@ constexpr double kImpurityKeep_px = 4;  // nearer to a membrane, it belongs to t
 // By which the mouth of the holding pipette may be told too near to the cell, px per grey level of noise
 // above.
 constexpr double kFaceOff = 0.3, kClear_grey = 6;
+constexpr double kReliefReach_px = 8;  // thick glass bends light away from far beside it
 constexpr double kFaceReach_px =
     6.5;  // nearer to the face of the holding pipette, an edge is blurred into it
 
@@ -159,7 +160,7 @@ void ClearedPicture::find_strong(double threshold) {
   }
 }
 
-void ClearedPicture::exclude_holder(EdgeBand& band, const Vector<double>& expected, bool limits) const {
+void ClearedPicture::exclude_holder(EdgeBand& band, const Vector<double>& expected, bool relief) const {
   if (!holder_face) {
     return;
   }
@@ -168,6 +169,7 @@ void ClearedPicture::exclude_holder(EdgeBand& band, const Vector<double>& expect
   if (face >= -2) {
     return;
   }
+  const double reach = kFaceReach_px + (relief ? kReliefReach_px : 0), beside = relief ? kReliefReach_px : 2;
   const int n = static_cast<int>(band.middle.size());
   band.hidden.resize(band.middle.size(), 0);
   if (band.upper.empty()) {
@@ -179,14 +181,14 @@ void ClearedPicture::exclude_holder(EdgeBand& band, const Vector<double>& expect
       continue;
     }
     const double r = face / d.dot(axis);
-    if (std::abs(axis.cross(band.centre + r * d - mouth)) > half_width + 2) {
+    if (std::abs(axis.cross(band.centre + r * d - mouth)) > half_width + beside) {
       continue;
     }
     const std::size_t k = static_cast<std::size_t>(i);
-    if (limits) {
+    if (!relief) {
       band.upper[k] = std::min(band.upper[k], r + kFaceOff * std::max(0.0, noise - kClear_grey));
     }
-    if (expected[k] > r - kFaceReach_px) {
+    if (expected[k] > r - reach) {
       band.hidden[k] = 1;
     }
   }

@@ -48,8 +48,8 @@ struct ClearedPicture {
   // For a membrane that is pressed against the holding pipette. Behind the face of the pipette the membrane
   // cannot be; along the face it is not visible, because of the dark line of the face. expected: radius of
   // the membrane per angle of the band.
-  // limits: false where the place of the face is uncertain.
-  void exclude_holder(EdgeBand& band, const Vector<double>& expected, bool limits = true) const;
+  // In relief the place of the face is uncertain, and its shadow is wide.
+  void exclude_holder(EdgeBand& band, const Vector<double>& expected, bool relief = false) const;
 
  private:
   void find_strong(double threshold);

@@ -177,32 +177,66 @@ bool bounds_a_cell(const ClosedEdge& edge) {
 struct ReliefSeen {
   Relief relief;
   double even = 0, turning = 0;  // mean squares of the two, summed over the distances
+  double left = 1;               // share of the picture across the edge that is neither
 };
 
 std::optional<ReliefSeen> relief_across(const ClosedEdge& edge, const ClearedPicture& picture) {
-  constexpr double kAcross_px = 6;
+  constexpr double kAcross_px = 6, kMost = 3;  // times the usual misfit; what fits worse counts less
   constexpr int kLeastPoints = 48;
   const EdgeProfiles profiles(picture, from_polar(edge.centre, edge.path.r), kAcross_px, kAcross_px);
-  Vector<cv::Vec3d> sum(profiles.samples, cv::Vec3d::all(0));
-  cv::Matx33d a = cv::Matx33d::eye() * 1e-6;
-  int points = 0;
+  struct Across {
+    cv::Vec3d by;  // 1 and the direction of the edge
+    std::size_t point;
+    double weight = 1, all = 0, left = 0;  // grey levels squared
+  };
+  Vector<Across> points;
   for (std::size_t i = 0; i < profiles.points; ++i) {
     if (profiles.whole(i)) {
-      const cv::Vec3d by(1, profiles.normal[i].x, profiles.normal[i].y);
-      a += by * by.t();
-      ++points;
-      for (std::size_t j = 0; j < profiles.samples; ++j) {
-        const Lanes& grey = profiles.grey_of(i / kSideBySide)[j];
-        sum[j] += static_cast<double>(grey[static_cast<int>(i % kSideBySide)]) * by;
-      }
+      points.push_back({{1, profiles.normal[i].x, profiles.normal[i].y}, i});
     }
   }
-  if (points < kLeastPoints) {
+  if (points.size() < kLeastPoints) {
     return std::nullopt;
   }
+  const auto grey = [&](const Across& p, std::size_t j) {
+    return static_cast<double>(
+        profiles.grey_of(p.point / kSideBySide)[j][static_cast<int>(p.point % kSideBySide)]);
+  };
+  Vector<cv::Vec3d> shown(profiles.samples);
+  for (int round = 0; round < 2; ++round) {  // a pipette beside the cell is stronger than the edge
+    cv::Matx33d a = cv::Matx33d::eye() * 1e-6;
+    for (const Across& p : points) {
+      a += p.weight * p.by * p.by.t();
+    }
+    for (std::size_t j = 0; j < profiles.samples; ++j) {
+      cv::Vec3d b;
+      for (const Across& p : points) {
+        b += p.weight * grey(p, j) * p.by;
+      }
+      shown[j] = a.solve(b, cv::DECOMP_CHOLESKY);
+    }
+    Vector<double> misfits;
+    for (Across& p : points) {
+      p.all = p.left = 0;
+      for (std::size_t j = 0; j < profiles.samples; ++j) {
+        const double g = grey(p, j), rest = g - p.by.dot(shown[j]);
+        p.all += g * g;
+        p.left += rest * rest;
+      }
+      misfits.push_back(p.left);
+    }
+    const double most = kMost * median_of(misfits);
+    for (Across& p : points) {
+      p.weight = std::min(1.0, most / std::max(p.left, 1e-9));
+    }
+  }
+  double all = 0, left = 0;
+  for (const Across& p : points) {
+    all += p.weight * p.all;
+    left += p.weight * p.left;
+  }
   double even = 0, xx = 0, xy = 0, yy = 0;
-  for (const cv::Vec3d& b : sum) {
-    const cv::Vec3d x = a.solve(b, cv::DECOMP_CHOLESKY);
+  for (const cv::Vec3d& x : shown) {
     even += x[0] * x[0];
     xx += x[1] * x[1];
     xy += x[1] * x[2];
@@ -213,15 +247,16 @@ std::optional<ReliefSeen> relief_across(const ClosedEdge& edge, const ClearedPic
   if (cv::norm(along) < 1e-6 * turning) {
     along = Point(1, 0);
   }
-  return ReliefSeen{{0, along / std::max(cv::norm(along), 1e-9)}, even, 0.5 * turning};
+  return ReliefSeen{
+      {0, along / std::max(cv::norm(along), 1e-9)}, even, 0.5 * turning, left / std::max(all, 1e-9)};
 }
 
 // The edge followed in relief, where the picture is lit from one side. A path of any sign, or of one, runs
-// along other faces on either side of the cell there, and one in relief does so where it is not; of the two
-// that is right which shows less of the other.
+// along other faces on either side of the cell there, and one in relief does so where it is not. The wrong
+// one shows more of the other, and leaves a fifth of the picture untold, whatever its direction and noise.
 std::optional<ClosedEdge> edge_in_relief(const ClosedEdge& any, EdgeBand band,
                                          const ClearedPicture& picture) {
-  constexpr double kSuspected = 0.1, kStrength = 0.8;
+  constexpr double kSuspected = 0.02, kStrength = 0.8;
   auto seen = relief_across(any, picture);
   std::optional<ClosedEdge> best;
   for (int round = 0; round < 2 && seen && seen->turning > kSuspected * seen->even; ++round) {
@@ -245,7 +280,8 @@ std::optional<ClosedEdge> edge_in_relief(const ClosedEdge& any, EdgeBand band,
   for (const Polarity sign : {Polarity::brighter_out, Polarity::darker_out}) {
     const ClosedEdge e = edge_in(band, picture, sign, any.path.saturation);
     const auto otherwise = e.path.r.empty() ? std::nullopt : relief_across(e, picture);
-    if (otherwise && seen->turning * otherwise->turning < seen->even * otherwise->even) {
+    if (otherwise && otherwise->left < seen->left &&
+        seen->turning * otherwise->turning < seen->even * otherwise->even) {
       return std::nullopt;
     }
   }
@@ -456,7 +492,7 @@ SecondEdge find_in_relief(const Vector<double>& r1, const Point& centre, const R
   band.centre = centre;
   band.half_width = (to - from) / 2;
   band.middle = first;
-  picture.exclude_holder(band, first, false);
+  picture.exclude_holder(band, first, true);
   for (double& r : band.middle) {
     r += (from + to) / 2;
   }

@@ -48,7 +48,7 @@ MembraneSearch::MembraneSearch(const FollowedMembrane& followed, const ClearedPi
       expected[i] = std::max(expected[i], free[i]);
     }
   }
-  picture.exclude_holder(band, expected, m.polarity != Polarity::relief);
+  picture.exclude_holder(band, expected, m.polarity == Polarity::relief);
 
   if (s.needle.ok) {
     const Point tip = s.needle.tip - band.centre;

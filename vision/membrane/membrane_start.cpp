@@ -75,11 +75,15 @@ bool clear_in_relief(const SecondEdge& inside, const FollowedMembrane& outer, co
          inside.path.support > kSupport && inside.path.level >= kEdgeClear_noise * picture.gradient_noise;
 }
 
-// The two faces of a wall: about as clear as each other, and equally far apart all round.
-bool parallel_in_relief(const SecondEdge& edge, const Vector<double>& r, double level,
+// Of the level of the other one, at least: two faces of a wall are about as clear as each other, a zona may
+// be much fainter than its ooplasm.
+constexpr double kFaceLevel = 0.4, kZonaLevel = 0.2;
+
+// Equally far from the other one all round.
+bool parallel_in_relief(const SecondEdge& edge, const Vector<double>& r, double least_level,
                         const ClearedPicture& picture) {
-  constexpr double kLevel = 0.4, kApart_px = 1;  // of the other one; sd
-  if (edge.path.r.size() != r.size() || edge.path.level < kLevel * level ||
+  constexpr double kApart_px = 1;  // sd
+  if (edge.path.r.size() != r.size() || edge.path.level < least_level ||
       edge.path.level < kEdgeClear_noise * picture.gradient_noise) {
     return false;
   }
@@ -100,7 +104,7 @@ std::optional<FollowedMembrane> ooplasm_in_relief(const FollowedMembrane& outer,
   const double from = -kDeepest * median_of(outer.r), to = -kWalls * config.px(config.h_m);
   SecondEdge inside = find_in_relief(outer.r, outer.centre, outer.relief, from, to, picture);
   if (SecondEdge deep = find_in_relief(outer.r, outer.centre, outer.relief, from, to - kSheet_px, picture);
-      parallel_in_relief(deep, outer.r, outer.level, picture) &&
+      parallel_in_relief(deep, outer.r, kFaceLevel * outer.level, picture) &&
       deep.path.level > kAsClear * inside.path.level) {
     inside = std::move(deep);
   }
@@ -122,8 +126,20 @@ bool same_edge(const ClosedEdge& a, const ClosedEdge& b) {
   return static_cast<double>(near) > kShare * static_cast<double>(a.path.r.size());
 }
 
-// The strongest edge is one of the faces of the wall: the outermost one is where what the light crosses
-// begins, and the inner face has the opposite sign.
+// Round the ooplasm, the outer face of its zona: at both, what the light crosses grows inwards.
+std::optional<FollowedMembrane> zona_in_relief(const FollowedMembrane& ooplasm, double wall,
+                                               const ClearedPicture& picture) {
+  constexpr double kFurthest = 0.35, kContrast = 1.5;  // of the radius; times the median edge of the band
+  SecondEdge zona = find_in_relief(ooplasm.r, ooplasm.centre, ooplasm.relief, wall,
+                                   kFurthest * median_of(ooplasm.r), picture);
+  return zona.quality > kContrast && parallel_in_relief(zona, ooplasm.r, kZonaLevel * ooplasm.level, picture)
+             ? std::optional(
+                   started(ooplasm.centre, zona.path.r, Polarity::relief, zona.path.level, zona.relief))
+             : std::nullopt;
+}
+
+// The strongest edge is the ooplasm's, or one of the faces of the wall: the outermost one is where what the
+// light crosses begins, and the inner face has the opposite sign.
 StartedMembranes tell_apart_in_relief(const MainEdge& found, const ClearedPicture& picture,
                                       const VisionConfig& config) {
   const ClosedEdge& main = found.edge;
@@ -133,13 +149,20 @@ StartedMembranes tell_apart_in_relief(const MainEdge& found, const ClearedPictur
   const double wall = config.px(config.h_m);
   const auto other_face = [&](const FollowedMembrane& of, double from, double to) {
     SecondEdge face = find_in_relief(of.r, of.centre, of.relief.opposite(), from * wall, to * wall, picture);
-    return parallel_in_relief(face, of.r, of.level, picture)
+    return parallel_in_relief(face, of.r, kFaceLevel * of.level, picture)
                ? std::optional(
                      started(of.centre, face.path.r, Polarity::relief, face.path.level, face.relief))
                : std::nullopt;
   };
   FollowedMembrane outermost =
       started(main.centre, main.path.r, Polarity::relief, main.path.level, main.relief);
+  if (auto zona = zona_in_relief(outermost, wall, picture)) {
+    out.outer = *std::move(zona);
+    if (config.inner) {
+      out.inner = std::move(outermost);
+    }
+    return out;
+  }
   int further = 0;
   for (; further < kFaces; ++further) {
     auto face = other_face(outermost, kNearest, kFurthest);

@@ -6,8 +6,10 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <random>
 #include <vector>
@@ -52,6 +54,9 @@ class DrawnMicroscope {
     radius_ = between(66, 80);
     zona_ = between(5, 7);
     space_ = between(4, 8);
+    outer_chord_ = ChordInFocus(radius_);
+    lumen_chord_ = ChordInFocus(radius_ - zona_);
+    inner_chord_ = ChordInFocus(radius_ - zona_ - space_);
     for (Wave& w : waves_) {
       w = {between(-1.2, 1.2), between(0, 2 * CV_PI)};
     }
@@ -148,14 +153,49 @@ class DrawnMicroscope {
   // Of a ball: what the light crosses at distance u from its middle.
   static double chord(double r, double u) { return u < r ? 2 * std::sqrt(r * r - u * u) : 0; }
 
+  // The same by a lens of aperture 0.4: what is above and below the focus is blurred. A table round the usual
+  // radius.
+  class ChordInFocus {
+   public:
+    ChordInFocus() = default;
+    explicit ChordInFocus(double radius) {
+      constexpr double kSpread = 0.16, kSharpest_px = 0.15;  // px per px of height; a part of a pixel
+      constexpr int kSlices = 200;
+      for (std::size_t i = 0; i < values_.size(); ++i) {
+        const double u = radius + kFrom + kStep * static_cast<double>(i);
+        for (int k = 0; k < kSlices; ++k) {
+          const double angle = (k + 0.5) * CV_PI / 2 / kSlices, z = radius * std::sin(angle);
+          const double edge = radius * std::cos(angle) - u, spread = std::hypot(kSpread * z, kSharpest_px);
+          values_[i] += radius * std::cos(angle) * CV_PI / 2 / kSlices *
+                        std::erfc(-edge / (spread * std::numbers::sqrt2));
+        }
+      }
+    }
+    [[nodiscard]] double at(double r, double u) const {
+      const double place = (u - r - kFrom) / kStep;
+      if (place < 0) {
+        return chord(r, u);
+      }
+      const auto i = static_cast<std::size_t>(std::min(place, static_cast<double>(kCount) - 2));
+      const double part = std::min(place - static_cast<double>(i), 1.0);
+      return values_[i] + part * (values_[i + 1] - values_[i]);
+    }
+
+   private:
+    static constexpr double kFrom = -40, kTo = 25, kStep = 0.25;
+    static constexpr std::size_t kCount = static_cast<std::size_t>((kTo - kFrom) / kStep) + 1;
+    std::array<double, kCount> values_{};
+  };
+
   [[nodiscard]] Body at(const cv::Point2d& p) const {
     Body body;
     const cv::Point2d q = p - centre_;
     const double u = cv::norm(q);
-    if (m_.cell && u < radius_ + 6) {
+    if (m_.cell && u < radius_ + 25) {
       const double t = std::atan2(q.y, q.x), outer = outer_radius(t), lumen = outer - zona_,
                    inner = inner_radius(t);
-      body.thickness += 0.5 * (chord(outer, u) - chord(lumen, u)) + 0.35 * chord(inner, u);
+      body.thickness +=
+          0.5 * (outer_chord_.at(outer, u) - lumen_chord_.at(lumen, u)) + 0.35 * inner_chord_.at(inner, u);
       body.dark += u < inner ? 33 + granules(q) : u < lumen ? 7 : u < outer ? 30 : 0;
       body.thickness += u < inner ? 0.15 * granules(q) : 0;
     }
@@ -257,6 +297,7 @@ class DrawnMicroscope {
   Microscope m_;
   std::mt19937 random_;
   cv::Point2d centre_, tip_, axis_, mouth_, pushed_at_;
+  ChordInFocus outer_chord_, lumen_chord_, inner_chord_;
   double radius_ = 0, zona_ = 0, space_ = 0, needle_half_ = 0, taper_ = 0, bevel_ = 0, dimple_half_ = 1;
   Wave waves_[3] = {};
 };

@@ -17,9 +17,9 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr double kHalo_px = 0.1;     // sd by which a halo may shift the whole contour
-constexpr double kFocus_px = 1.6;    // blur, with the pixels' own, of a picture that is in focus
-constexpr double kRelief_px = 0.15;  // sd by which relief may: the form of a face is known only roughly
+constexpr double kHalo_px = 0.1;    // sd by which a halo may shift the whole contour
+constexpr double kFocus_px = 1.6;   // blur, with the pixels' own, of a picture that is in focus
+constexpr double kRelief_px = 0.3;  // sd by which relief may: the form of a face is known only roughly
 
 // The contour without finer waves, moved along the rays from its centre.
 Contour smoothed(const Contour& contour, const Vector<double>& stiffness) {
@@ -69,7 +69,7 @@ std::optional<SeenOutline> shaped_once(const ClearedPicture& picture, const Cont
     return std::nullopt;
   }
   if (edge.relief != Point(0, 0)) {
-    const auto steps = ReliefSteps(common.turning(), edge, picture.noise).fit();
+    const auto steps = ReliefSteps(common.turning(), edge).fit(1.0 / (learnt.frames + 1), learnt.flatness);
     if (!steps) {
       learnt.shape.clear();
       return std::nullopt;

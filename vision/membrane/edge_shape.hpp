@@ -25,9 +25,10 @@ struct EdgeShape {
   double lasting = 0;      // of the places' scatter at least this share is the same in the next frames
   double per_blur = 0.25;  // px by which the own step may be off for each px of blur beyond focus: sd
   std::optional<NearbyEdge> nearby;
-  Contour nearby_face;          // where it lies, per point, if it is not equally far everywhere; or empty
-  Point relief;                 // unit, from where the light seems to come: see CommonShape; or zero
-  Vector<std::uint8_t> beside;  // per point, 1: beside a line that is not its own; or empty
+  Contour nearby_face;  // where it lies, per point, if it is not equally far everywhere; or empty
+  Point relief;         // unit, from where the light seems to come: see CommonShape; or zero
+  std::optional<double> other_flatness;  // of the other membrane, a body of the same form: see ReliefSteps
+  Vector<std::uint8_t> beside;           // per point, 1: beside a line that is not its own; or empty
 };
 
 // What is learnt of an edge over the frames.
@@ -43,6 +44,7 @@ struct EdgeLearnt {
   Vector<double> shape, spread;
   Vector<double> turning;  // what they show the more of the more they face `relief`; empty: not in relief
   Point relief;            // as in EdgeShape
+  double flatness = 0;     // see ReliefSteps
   double inside = 0,
          face = 0;  // px within the contour that the shape begins; outwards, where the step is in it
   std::optional<cv::Vec4d> steps;  // in it: see BlurredSteps

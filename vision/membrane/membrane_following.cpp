@@ -101,6 +101,10 @@ std::optional<SeenOutline> refined(const MembraneSearch& search, const EdgePath&
     if (search.m.polarity == Polarity::relief) {
       const Point along = search.m.relief.along;
       edge.relief = along / cv::norm(along);
+      const FollowedMembrane* other = surroundings.outermost ? surroundings.within : surroundings.around;
+      if (other && other->known && !other->edge.turning.empty()) {
+        edge.other_flatness = other->edge.flatness;
+      }
     }
     if (surroundings.outermost) {
       edge.modes = kOuterModes;

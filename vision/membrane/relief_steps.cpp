@@ -20,11 +20,16 @@ constexpr double kNearbyNoise = 0.5;     // grey levels that a nearby face one t
 constexpr double kMostLeft = 0.25;       // of the spread of the shape, rms: a worse fit is none
 constexpr double kLeastBlur_px = 0.7, kMostBlur_px = 4;
 constexpr double kNoFit = 1e200;
-// A round body has more freedom than a sheet, and fits noise and texture better.
-constexpr double kClearlyBetter = 0.3, kShape = 0.7, kShapePerNoise = 0.15;
+constexpr double kLeastLeft = 0.05;  // grey levels, rms: no fit is better
+// A round body has more freedom than a sheet, and fits noise and texture better. Of what the sheet leaves; of
+// the two membranes together.
+constexpr double kAsRound = 0.55, kBothAsRound = 0.09;
+constexpr double kMostTold = 5;  // by one frame
 constexpr int kParts = 5;  // level; of either face of a round body the root and a step, of a sheet a line
 
-// 1 / sqrt(depth) blurred by a Gaussian of sd 1, at the depth -z.
+// 1 / sqrt(depth) blurred by a Gaussian of sd 1, at the depth -z. What is crossed deeper below the face lies
+// further from the plane that is in focus, and is blurred more: by a lens of aperture 0.4 and a cell of 60
+// um, of a variance of about 1 + depth.
 class BlurredRoot {
  public:
   BlurredRoot() {
@@ -32,8 +37,8 @@ class BlurredRoot {
       const double z = kFrom + kStep * static_cast<double>(i);
       double sum = 0;
       for (int k = 0; k < kNodes; ++k) {  // depth = t^2
-        const double t = (k + 0.5) * kNode, off = z + t * t;
-        sum += math::exp(-0.5 * off * off);
+        const double t = (k + 0.5) * kNode, off = z + t * t, variance = 1 + kWidening * t * t;
+        sum += math::exp(-0.5 * off * off / variance) / std::sqrt(variance);
       }
       value_[i] = 2 * kNode * sum / std::sqrt(2 * std::numbers::pi);
     }
@@ -48,9 +53,9 @@ class BlurredRoot {
   }
 
  private:
-  static constexpr double kFrom = -12, kTo = 5, kStep = 0.05, kNode = 0.02;
+  static constexpr double kFrom = -12, kTo = 5, kStep = 0.05, kNode = 0.03, kWidening = 1;
   static constexpr std::size_t kCount = static_cast<std::size_t>((kTo - kFrom) / kStep) + 1;
-  static constexpr int kNodes = 220;  // as far as z + t^2 is 7
+  static constexpr int kNodes = 240;  // as far as t^2 is 52
   std::array<double, kCount> value_{};
 };
 
@@ -101,46 +106,47 @@ double ReliefSteps::cost_of(const cv::Vec3d& x, Body body) const {
   return std::max(0.0, squares - height.dot(b)) + kNearbyNoise * kNearbyNoise * off * off;
 }
 
-// The best of a few places to begin at, then downhill along each of the unknowns, in ever smaller steps.
+// From a few places to begin at, downhill along each of the unknowns, in ever smaller steps.
 ReliefSteps::Trial ReliefSteps::best_of(Body body) const {
-  constexpr std::array kOwn{-2.5, -1.0, 0.0, 1.0};
-  constexpr std::array kBlur{1.2, 1.9};
+  constexpr std::array kOwn{-2.5, -1.0, 0.5};
+  constexpr double kBlur_px = 1.4;
   constexpr int kRounds = 9;
   constexpr double kShorter = 0.55;
   Trial best{{0, 0, 0}, 1e300};
-  const auto try_at = [&](const cv::Vec3d& x) {
-    const double cost = cost_of(x, body);
-    const bool better = cost < best.cost;
-    best = better ? Trial{x, cost} : best;
-    return better;
-  };
   for (const double own : kOwn) {
-    for (const double blur : kBlur) {
-      (void)try_at({own, blur, edge_.nearby ? edge_.nearby->at : 0});
-    }
-  }
-  cv::Vec3d step(0.5, 0.3, 0.5);
-  for (int round = 0; round < kRounds; ++round, step *= kShorter) {
-    for (int p = 0; p < (edge_.nearby ? 3 : 2); ++p) {
-      for (const double way : {1.0, -1.0}) {
-        cv::Vec3d x = best.x;
-        do {
-          x = best.x;
-          x[p] += way * step[p];
-        } while (std::abs(x[0]) < kFurthestFace_px + 1 && x[1] > kLeastBlur_px && x[1] < kMostBlur_px &&
-                 try_at(x));
+    const cv::Vec3d from(own, kBlur_px, edge_.nearby ? edge_.nearby->at : 0);
+    Trial here{from, cost_of(from, body)};
+    cv::Vec3d step(0.5, 0.3, 0.5);
+    for (int round = 0; round < kRounds; ++round, step *= kShorter) {
+      for (int p = 0; p < (edge_.nearby ? 3 : 2); ++p) {
+        for (const double way : {1.0, -1.0}) {
+          for (cv::Vec3d x = here.x;;) {
+            x[p] += way * step[p];
+            if (std::abs(x[0]) >= kFurthestFace_px + 1 || x[1] <= kLeastBlur_px || x[1] >= kMostBlur_px) {
+              break;
+            }
+            const double cost = cost_of(x, body);
+            if (cost >= here.cost) {
+              break;
+            }
+            here = {x, cost};
+          }
+        }
       }
     }
+    best = here.cost < best.cost ? here : best;
   }
   return best;
 }
 
-std::optional<ReliefSteps::Fit> ReliefSteps::fit() const {
+std::optional<ReliefSteps::Fit> ReliefSteps::fit(double part, double& flatness) const {
   const Trial round = best_of(Body::round), sheet = best_of(Body::sheet);
-  const double n = static_cast<double>(turning_.size()),
-               usual = math::hypot(kShape, kShapePerNoise * noise_);  // rms that is left of a right one
-  const Trial& best =
-      sheet.cost > n * usual * usual && round.cost < kClearlyBetter * sheet.cost ? round : sheet;
+  const double n = static_cast<double>(turning_.size()), least = n * kLeastLeft * kLeastLeft;
+  const double seen = math::log((round.cost + least) / (sheet.cost + least));  // one may not fit at all
+  flatness += part * (std::clamp(seen, -kMostTold, kMostTold) - flatness);
+  const bool is_round = edge_.other_flatness ? flatness + *edge_.other_flatness < math::log(kBothAsRound)
+                                             : flatness < math::log(kAsRound);
+  const Trial& best = is_round ? round : sheet;
   double mean = 0, square = 0;
   for (const double v : turning_) {
     mean += v / n;

@@ -15,16 +15,16 @@ namespace punctum::vision {
 class ReliefSteps {
  public:
   // turning: grey levels, from edge.inside px within the contour outwards.
-  // noise: of the picture.
-  ReliefSteps(const Vector<double>& turning, const EdgeShape& edge, double noise)
-      : turning_(turning), edge_(edge), noise_(noise) {}
+  ReliefSteps(const Vector<double>& turning, const EdgeShape& edge) : turning_(turning), edge_(edge) {}
 
   struct Fit {
     double own = 0;   // where the own face lies, px from the contour
     double left = 0;  // rms of what the fit leaves, grey levels
   };
-  // The better of the two. Empty when neither explains the edge.
-  [[nodiscard]] std::optional<Fit> fit() const;
+  // As round body or as sheet, whichever has told the edge better over the frames. flatness: log of what the
+  // one leaves over what the other does, mean over the frames; this one counts as that part of it. Empty
+  // where that one does not explain the edge.
+  [[nodiscard]] std::optional<Fit> fit(double part, double& flatness) const;
 
  private:
   enum class Body : std::uint8_t { round, sheet };
@@ -37,7 +37,6 @@ class ReliefSteps {
 
   const Vector<double>& turning_;
   const EdgeShape& edge_;
-  double noise_;
 };
 
 }  // namespace punctum::vision

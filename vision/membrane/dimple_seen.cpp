@@ -26,15 +26,16 @@ constexpr double kModel = 0.08;        // variance of an edge that looks unusual
 constexpr double kOneSample_px = 3.5;  // along the membrane, by the smoothing
 // A membrane that has let go of the tip is further from it: px, and share of its depth.
 constexpr double kOnTip_px = 3, kOnTip = 0.25;
-constexpr double kTip_px = 1.6;    // to which the tip is known: shapes are learnt from dimples that end there
-constexpr double kSinks_px = 3;    // by which a free membrane may seem to sink in a frame
-constexpr double kSinking = 4;     // log odds against each px of it
-constexpr double kThrough = 12;    // log odds that a membrane is not on the tip that went through it
-constexpr double kStays = 3;       // log odds that it stays on the tip, or off it, for a frame
-constexpr double kHand_px = 1;     // by which a hand changes the needle's speed in a frame
-constexpr double kJumped = 5;      // log odds at most, by a jump of the tip, that it is off it
-constexpr double kSteepest = 1.8;  // slope of a wall that ends at its width; the needle hides a steeper one
-constexpr double kBandHalf_px = 7;    // half-width of the band
+constexpr double kTip_px = 1.6;  // to which the tip is known: shapes are learnt from dimples that end there
+constexpr double kSinks_px = 3;  // by which a free membrane may seem to sink in a frame
+constexpr double kSinking = 4;   // log odds against each px of it
+constexpr double kThrough = 12;  // log odds that a membrane is not on the tip that went through it
+constexpr double kStays = 3;     // log odds that it stays on the tip, or off it, for a frame
+constexpr double kLetsGoAlone = 6;  // log odds against an outer membrane off the tip with the inner one on it
+constexpr double kHand_px = 1;      // by which a hand changes the needle's speed in a frame
+constexpr double kJumped = 5;       // log odds at most, by a jump of the tip, that it is off it
+constexpr double kSteepest = 1.8;   // slope of a wall that ends at its width; the needle hides a steeper one
+constexpr double kBandHalf_px = 7;  // half-width of the band
 constexpr double kWithinHalf_px = 4;  // of an inner membrane's: granules are near
 
 // A flat bottom with a logarithmic wall is what a stretched membrane has; the others end at their width.
@@ -132,20 +133,26 @@ PUNCTUM_WIDE_LOOP void look_along(const Ways& ways, const float* depths, float* 
       for (int l = 0; l < static_cast<int>(kAtOnce); ++l) {
         sign[l] = static_cast<float>(ways.relief.sign_at(cv::Point2f(along_y[l], -along_x[l]) / length[l]));
       }
-      edge *= sign;
-      usual *= sign < 0 ? -sign : sign;
+      edge *= sign;  // a fainter edge tells less
+      usual *= sign * sign;
     }
     const EightFloats bounded = edge < -1.0F  ? -1.0F + EightFloats{}
                                 : edge > 1.2F ? 1.2F + EightFloats{}
                                               : edge;
-    const EightFloats against = -0.5F + EightFloats{}, nothing{};
+    const EightFloats nothing{};
     sum += tells == static_cast<int>(Tells::edge)      ? bounded - usual
-           : tells == static_cast<int>(Tells::against) ? against
+           : tells == static_cast<int>(Tells::against) ? -usual
                                                        : nothing;
     count -= tells != static_cast<int>(Tells::nothing);
   }
   std::memcpy(sums, &sum, sizeof sum);
   std::memcpy(told, &count, sizeof count);
+}
+
+// A dimple of that shape is not deeper: the needle hides a steeper wall.
+double deepest_of(const Shape& shape, double deepest, const MembraneSearch& search) {
+  const double steep = steepness(shape), most = kSteepest * search.surroundings.needle.half_width;
+  return steep > 0 ? std::min(deepest + kPast_px, most / steep) : deepest + kPast_px;
 }
 
 // Dimples of one membrane in one picture: its points at rest, pushed along the needle.
@@ -287,6 +294,54 @@ std::optional<double> Dimples::evidence(std::size_t step) const {
          (kModel + noise * noise);
 }
 
+// What the inner membrane tells of dimples of the outer one: it is pushed by as much less as the space
+// between them gives way, about as wide, or lies on the tip still when the outer one has left it.
+class WithinTells {
+ public:
+  WithinTells(const MembraneSearch& outer, const FollowedMembrane& inner, double deepest)
+      : gap_(std::max(0.0, mean_radius(outer.m.contour()) - mean_radius(inner.contour()))) {
+    Surroundings around = outer.surroundings;
+    around.outermost = false;
+    around.within = nullptr;
+    const MembraneSearch search(inner, outer.picture, around);
+    Dimples dimples(search);
+    if (!dimples.meets_the_cell()) {
+      return;
+    }
+    dimples.look(deepest + kPast_px);
+    first_ = dimples.depth(0);
+    const double on_tip_from = deepest - std::max(kOnTip_px, kOnTip * deepest);
+    for (std::size_t k = 0; k < kDimpleShapes; ++k) {
+      dimples.choose(kShapes[k], deepest_of(kShapes[k], deepest, search));
+      for (std::size_t step = 0; step < dimples.steps(); ++step) {
+        of_[k].push_back(dimples.evidence(step).value_or(0));
+        if (dimples.depth(step) > on_tip_from) {
+          on_tip_ = std::max(on_tip_, of_[k].back());
+        }
+      }
+    }
+  }
+  [[nodiscard]] double evidence(std::size_t shape, double depth, bool outer_on_tip) const {
+    const auto step_of = [&](double d) {
+      return static_cast<int>(std::lround((d - first_) / kStepOfDepth_px));
+    };
+    double best = outer_on_tip ? kNone : on_tip_ - kLetsGoAlone;
+    for (std::size_t k = shape > 0 ? shape - 1 : 0; k < std::min(shape + 2, kDimpleShapes); ++k) {
+      const int to = std::min(step_of(depth) + 1, static_cast<int>(of_[k].size()));
+      for (int step = std::max(step_of(depth - gap_), 0); step < to; ++step) {
+        best = std::max(best, of_[k][static_cast<std::size_t>(step)]);
+      }
+    }
+    return best > kNone ? best : 0;
+  }
+
+ private:
+  static constexpr double kNone = -1e9;
+  double gap_, first_ = 0;                        // px
+  std::array<Vector<double>, kDimpleShapes> of_;  // evidence, step by step
+  double on_tip_ = kNone;
+};
+
 // Log odds that the membrane has left the tip: it draws the end of the needle back while it slides off, and
 // the end then jumps ahead, further than a hand moves it.
 double odds_of_jump(const Surroundings& s) {
@@ -317,12 +372,16 @@ std::optional<SeenDimple> likeliest_dimple(const MembraneSearch& search) {
     return std::nullopt;
   }
   dimples.look(deepest + kPast_px);
+  std::optional<WithinTells> inner;
+  if (const FollowedMembrane* w = search.surroundings.within;
+      !within && m.polarity == Polarity::relief && w && w->known && !w->lost() && !w->rest.r.empty()) {
+    inner.emplace(search, *w, deepest);
+  }
   std::optional<SeenDimple> pushed, free;
   std::array<double, kDimpleShapes> best;
   best.fill(-1e9);
   for (std::size_t k = 0; k < kDimpleShapes; ++k) {
-    const double steep = steepness(kShapes[k]), most = kSteepest * search.surroundings.needle.half_width;
-    dimples.choose(kShapes[k], steep > 0 ? std::min(deepest + kPast_px, most / steep) : deepest + kPast_px);
+    dimples.choose(kShapes[k], deepest_of(kShapes[k], deepest, search));
     for (std::size_t step = 0; step < dimples.steps(); ++step) {
       const double depth = dimples.depth(step);
       // What the needle does not push does not sink.
@@ -339,7 +398,8 @@ std::optional<SeenDimple> likeliest_dimple(const MembraneSearch& search) {
         best[k] = std::max(best[k], *evidence);
       }
       std::optional<SeenDimple>& kept = on_tip ? pushed : free;
-      const double with_odds = *evidence + m.dimple_odds[k] - (on_tip ? 0 : kSinking * sunk);
+      const double with_odds = *evidence + m.dimple_odds[k] - (on_tip ? 0 : kSinking * sunk) +
+                               (inner ? inner->evidence(k, depth, on_tip) : 0);
       if (!kept || with_odds > kept->evidence) {
         kept = SeenDimple{depth, with_odds, k, on_tip, m.dimple_odds};
       }

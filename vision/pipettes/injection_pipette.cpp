@@ -40,9 +40,11 @@ constexpr double kStartKnown_px = 2.5, kUnsharpKnown_px = 1.8, kEndKnown_px = 1.
 // Further out of focus the lumen closes, and the end is somewhere in 3 px; the walls end up to 5 px from
 // where the shape does, at a blur of the shaft that looks like the second.
 constexpr double kSharp_px = 2.3, kWallsTell_px = 1.9;
-// So far from where the walls end, a speck ended them: the end is looked for again there, so often.
-constexpr double kFar_px = 5;
+// So far from where the walls end, a speck ended them, or nearer while the end is not certain: it is looked
+// for again there, so often.
+constexpr double kFar_px = 5, kNear_px = 2;
 constexpr int kFurther = 8;
+constexpr double kSteep = 0.8;        // px along per px across: of a steeper cut the two walls end far apart
 constexpr std::size_t kGathered = 4;  // frames that tell an end which one of them does not
 constexpr double kShaft_px = 180;     // of the shaft tell its direction
 constexpr double kMostBlur_px = 3.6;  // the widest blur of which the end is known
@@ -55,6 +57,11 @@ constexpr int kWiderMost = 6;  // frames in a row; then the window for its tip g
 // Of the outermost glass, px.
 double sd_of(const CutGlass& cut, double half_width) {
   return math::hypot(cut.end.sd, cut.bevel.sd * outer_radius_of_glass(half_width, cut.end.blur));
+}
+
+// By which the outermost glass lies ahead of the middle of the end, px.
+double ahead_of_middle(const Bevel& bevel, const NeedlePose& needle, double blur_px) {
+  return std::abs(bevel.tangent) * outer_radius_of_glass(needle.half_width, blur_px);
 }
 
 // Of its end, what lies beside it, and so much of its shaft.
@@ -298,8 +305,7 @@ bool InjectionPipette::learn_end_anew(const GradientField& field, double noise, 
     return cut.end.blur <= kMostBlur_px && math::hypot(sd_of(cut, last_.half_width), motion_sd) <=
                                                (cut.end.blur > kSharp_px ? kUnsharpKnown_px : kStartKnown_px);
   };
-  if (const auto cut = lumen_ ? go_to_cut(field, noise) : std::nullopt;
-      cut && (known(*cut) || cut->end.blur > kSharp_px)) {
+  if (const auto cut = lumen_ ? go_to_cut(field, noise) : std::nullopt) {
     bevel_ = cut->bevel;
     learn_glass(cut->end);
     return known(*cut);
@@ -315,13 +321,14 @@ bool InjectionPipette::learn_end_anew(const GradientField& field, double noise, 
   return known({*end, bevel_});
 }
 
-// The glass and its cut, with the blur of the shaft.
+// The glass and its cut about the middle of its end, with the blur of the shaft, or in relief with a usual
+// one.
 std::optional<CutGlass> InjectionPipette::cut_seen(const GradientField& field, double noise,
-                                                   const NeedlePose& needle) {
-  const auto blur = blur_of_shaft(field, needle, kStartReach_px);
-  return blur && *blur < kMostBlur_px
-             ? cut_of_glass(field, noise, needle, *blur, kStartReach_px, kStartReach_px)
-             : std::nullopt;
+                                                   const NeedlePose& middle) {
+  constexpr double kUsualBlur_px = 1.5;
+  const double blur = blur_of_shaft(field, middle, kStartReach_px).value_or(kUsualBlur_px);
+  return blur < kMostBlur_px ? cut_of_glass(field, noise, middle, blur, kStartReach_px, kStartReach_px)
+                             : std::nullopt;
 }
 
 // How the needle is cut, and how far ahead the glass ends. It is put where they are when that is far from the
@@ -329,16 +336,18 @@ std::optional<CutGlass> InjectionPipette::cut_seen(const GradientField& field, d
 std::optional<CutGlass> InjectionPipette::go_to_cut(const GradientField& field, double noise) {
   NeedlePose needle = last_;
   auto cut = cut_seen(field, noise, needle);
+  const auto middle_ahead = [&] {
+    return cut->end.ahead - ahead_of_middle(cut->bevel, needle, cut->end.blur);
+  };
   bool further = false;
-  for (int round = 0; round < kFurther && cut && std::abs(cut->end.ahead) > kFar_px; ++round) {
-    needle.tip += cut->end.ahead * needle.axis;
+  for (int round = 0; round < kFurther && cut &&
+                      std::abs(middle_ahead()) > (cut->end.sd > kEndKnown_px ? kNear_px : kFar_px);
+       ++round) {
+    needle.tip += middle_ahead() * needle.axis;
     cut = cut_seen(field, noise, needle);
     further = true;
   }
-  if (!cut || cut->end.sd > kStartKnown_px) {
-    return std::nullopt;
-  }
-  if (further) {
+  if (cut && further) {
     last_.tip = needle.tip;
     learn_shape_anew(field);
     walls_agree_ = false;
@@ -363,8 +372,7 @@ NeedlePose InjectionPipette::find(const GradientField& field, double noise,
 void InjectionPipette::weigh_end(const GradientField& field, double noise, NeedlePose& needle) const {
   constexpr double kReach_px = 6;
   NeedlePose middle = needle;
-  middle.tip -=
-      std::abs(bevel_.tangent) * outer_radius_of_glass(needle.half_width, glass_blur_) * needle.axis;
+  middle.tip -= ahead_of_middle(bevel_, needle, glass_blur_) * needle.axis;
   if (const auto end = end_of_known_cut(field, noise, middle, bevel_.tangent, glass_blur_, kReach_px)) {
     needle.tip += end->ahead * needle.axis;
     needle.sd = std::max(needle.sd, math::hypot(end->sd, needle.constant_sd));
@@ -544,7 +552,16 @@ NeedlePose InjectionPipette::search_from_border(const GradientField& field, doub
 // Where its learnt shape fits best: walls end at many a granule, a shape does not. Where the walls end there,
 // too, they tell the place more finely.
 bool InjectionPipette::find_end(const GradientField& field, double noise, NeedlePose& needle, bool& near) {
-  (void)fit_walls(field, noise, radius_px_, needle, longest_);
+  // Its width is known: other lines beside the walls are not them.
+  constexpr double kWidth_px = 1;
+  const auto fit_to_walls = [&] {
+    (void)fit_walls(field, noise, radius_px_, needle, longest_);
+    if (std::abs(needle.half_width - last_.half_width) > kWidth_px) {
+      needle.half_width = last_.half_width;
+      needle.taper = last_.taper;
+    }
+  };
+  fit_to_walls();
   needle.tip -= shape_offset_ * needle.axis;
   // First near where the motion predicts it: what lies further ahead cannot be mistaken for it then.
   std::optional<NeedleShape::End> end;
@@ -560,7 +577,7 @@ bool InjectionPipette::find_end(const GradientField& field, double noise, Needle
   }
   view_ = end->view;
   needle.tip += end->ahead * needle.axis;
-  (void)fit_walls(field, noise, radius_px_, needle, longest_);
+  fit_to_walls();
   if (const auto again = shape_.end_near(view_, field, backdrop_, needle, near ? kAgainNear_px : kAgain_px)) {
     needle.tip += *again * needle.axis;
   }
@@ -570,7 +587,8 @@ bool InjectionPipette::find_end(const GradientField& field, double noise, Needle
   NeedlePose walls = needle;
   walls.tip -= walls_offset_ * walls.axis;
   const auto ahead = end_of_profile(field, walls, 16, 16, noise);
-  walls_agree_ = walls_tell_ && view_.blur == 0 && ahead && std::abs(*ahead) <= kSameEnd_px;
+  walls_agree_ = walls_tell_ && std::abs(bevel_.tangent) < kSteep && view_.blur == 0 && ahead &&
+                 std::abs(*ahead) <= kSameEnd_px;
   if (walls_agree_) {
     needle.tip += *ahead * needle.axis;
   }
@@ -607,7 +625,7 @@ void InjectionPipette::learn_shape_anew(const GradientField& field) {
 }
 
 // Nothing else may touch the tip: a membrane that it pushes looks like a line of glass.
-void InjectionPipette::learn_glass(const GradientField& field, double noise, NeedlePose followed) {
+void InjectionPipette::learn_glass(const GradientField& field, double noise, const NeedlePose& followed) {
   constexpr int kFrames = 30;  // by then the noise of one frame has fallen to a fifth
   if (!lumen_) {
     learn_thin_end(field, noise, followed);
@@ -616,14 +634,20 @@ void InjectionPipette::learn_glass(const GradientField& field, double noise, Nee
   if (glass_frames_ >= kFrames) {
     return;
   }
-  followed.tip += glass_ahead_ * followed.axis;
+  const bool steep = walls_tell_ && std::abs(bevel_.tangent) > kSteep;
+  const double behind = ahead_of_middle(bevel_, followed, glass_blur_);
+  NeedlePose middle = followed;  // of its end, as far as it is known
+  middle.tip += (glass_ahead_ - behind) * followed.axis;
   std::optional<GlassEnd> end;
-  if (walls_tell_) {
-    end = end_of_glass(field, noise, followed, bevel_.tangent, kGlassReach_px, kGlassReach_px);
-  } else if (const auto cut = cut_seen(field, noise, followed)) {
+  if (steep) {
+    end = end_of_known_cut(field, noise, middle, bevel_.tangent, glass_blur_, kGlassReach_px);
+  } else if (walls_tell_) {
+    end = end_of_glass(field, noise, middle, bevel_.tangent, kGlassReach_px, kGlassReach_px);
+  } else if (const auto cut = cut_seen(field, noise, middle)) {
     end = cut->end;
   }
   if (end && end->sd < kEndKnown_px) {
+    end->ahead -= steep ? 0 : behind;  // a known cut tells the middle, the others the outermost glass
     learn_glass(*end);
   }
 }

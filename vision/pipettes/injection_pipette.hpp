@@ -100,9 +100,9 @@ class InjectionPipette {
   void calibrate_walls(const GradientField& field, const NeedlePose& walls, double noise);
   void learn_shape_anew(const GradientField& field);
   [[nodiscard]] static std::optional<CutGlass> cut_seen(const GradientField& field, double noise,
-                                                        const NeedlePose& needle);
+                                                        const NeedlePose& middle);
   [[nodiscard]] std::optional<CutGlass> go_to_cut(const GradientField& field, double noise);
-  void learn_glass(const GradientField& field, double noise, NeedlePose followed);
+  void learn_glass(const GradientField& field, double noise, const NeedlePose& followed);
   void learn_glass(const GlassEnd& end);
   void learn_thin_end(const GradientField& field, double noise, const NeedlePose& followed);
   [[nodiscard]] double tip_sd(double noise) const;

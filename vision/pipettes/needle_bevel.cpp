@@ -27,7 +27,11 @@ constexpr double kBehind_px = 14;                      // behind the range, comp
 // Half the thickness of the glass over the radius of its middle, in a usual capillary.
 constexpr double kHalfOfWall = 0.17;
 // px along per px across; what is cut more steeply is no needle's end.
-constexpr double kSteepestCut = 0.95, kCutMost = 0.85;
+constexpr double kSteepestCut = 0.95;
+// A needle that is ground sharp may be cut so, where that explains the picture better by so much of what the
+// walls do.
+constexpr double kSharpestCut = 2.8, kClearlySharp = 0.02;
+constexpr double kSteepestFrom = 0.1;  // of the steepest: it may be steeper still
 using GlassRow = std::array<double, kAllLanes>;
 
 // A table of a function of the distance in blurs.
@@ -358,7 +362,7 @@ double CutModel::gain(const CutEnd& end) const {
   // Walls; the same times the distance from the end; line.
   cv::Matx33d a = cv::Matx33d::zeros();
   cv::Vec3d g;
-  const double cut_px = end.tangent * middle_;
+  const double cut_px = end.tangent * middle_, of_line_px = blur_ * std::sqrt(1 + end.tangent * end.tangent);
   for (const Seen& row : rows_) {
     double x0 = 0, x1 = 0, l0 = 0, l1 = 0, xx = 0, xl = 0, ll = 0, xy = 0, ly = 0;
     const double along = row.s - end.at, low = step_of((along + cut_px) / blur_),
@@ -367,7 +371,7 @@ double CutModel::gain(const CutEnd& end) const {
       const double u = lane_at(i, row.half_width), w = row.weight[i], tilt = u - row.middle;
       const double near = i < kOneSide ? low : high, far = i < kOneSide ? high : low;
       const double x = walls_[i] * (far + near_[i] * (near - far));
-      const double l = line_[i] * bump_of((along - end.tangent * u - line_behind_) / blur_);
+      const double l = line_[i] * bump_of((along - end.tangent * u - line_behind_) / of_line_px);
       x0 += w * x;
       x1 += w * tilt * x;
       l0 += w * l;
@@ -404,6 +408,34 @@ double CutModel::gain(const CutEnd& end) const {
 struct EndsAndCuts {
   double from, to, apart, cut_from, cut_to, cut_apart;
 };
+
+// Coarsely, of cuts like these.
+template <std::size_t kCuts>
+CutEnd likeliest_end(const CutModel& model, double back, double ahead,
+                     const std::array<double, kCuts>& tangents) {
+  CutEnd best;
+  double most = -1e18;
+  for (double at = -ahead; at <= back; at += 1) {
+    for (const double tangent : tangents) {
+      if (const double gain = model.gain({at, tangent}); gain > most) {
+        most = gain;
+        best = {at, tangent};
+      }
+    }
+  }
+  return best;
+}
+
+// With a cut that is a little steeper.
+bool gets_likelier_beyond(const CutModel& model, const CutEnd& end) {
+  const double gain = model.gain(end);
+  for (double off = -0.5; off <= 0.5; off += 0.5) {
+    if (model.gain({end.at + off, 1.1 * end.tangent}) > gain) {
+      return true;
+    }
+  }
+  return false;
+}
 
 // Each as likely as it explains the picture; and the likeliest. radius: of the glass, px.
 CutGlass mean_of(const CutModel& model, const EndsAndCuts& tried, double blur_px, double radius,
@@ -485,30 +517,31 @@ std::optional<CutGlass> cut_of_glass(const GradientField& field, double noise, c
   if (!model.stands_out()) {
     return std::nullopt;
   }
-  CutEnd best;
-  double most = -1e18;
-  for (double at = -ahead; at <= back; at += 1) {
-    for (const double tangent : {-0.6, -0.3, 0.0, 0.3, 0.6}) {
-      const CutEnd end{at, tangent};
-      if (const double gain = model.gain(end); gain > most) {
-        most = gain;
-        best = end;
-      }
-    }
-  }
-  constexpr double kEdge_px = 1.5;  // of the range
-  if (best.at < -ahead + kEdge_px || best.at > back - kEdge_px) {
-    return CutGlass{{-best.at, back + ahead, blur_px}, {}};
-  }
+  CutEnd best = likeliest_end(model, back, ahead, std::array{-0.6, -0.3, 0.0, 0.3, 0.6});
+  const CutEnd sharp =
+      likeliest_end(model, back, ahead, std::array{-2.4, -2.0, -1.6, -1.2, 1.2, 1.6, 2.0, 2.4});
+  const auto clearly_sharp = [&] { return model.gain(sharp) > (1 + kClearlySharp) * model.gain(best); };
   // Ends far from the best one may be as likely: in noise the likelihood falls off in straight lines, not as
   // a parabola. Where they are not, it is sharp.
   constexpr double kBeyond_px = 2, kSharp_px2 = 0.1,
                    kReach_px = 1;  // of the range; variance; round the best end
   constexpr double kReachOfCut = 0.16;
   const double radius = outer_radius_of_glass(needle.half_width, blur_px);
-  const EndsAndCuts all{-ahead - kBeyond_px, back + kBeyond_px, 0.5, -kSteepestCut, kSteepestCut, 0.1};
-  CutGlass found = mean_of(model, all, blur_px, radius, best);
-  if (std::abs(best.tangent) > kCutMost) {
+  const EndsAndCuts usual{-ahead - kBeyond_px, back + kBeyond_px, 0.5, -kSteepestCut, kSteepestCut, 0.1};
+  EndsAndCuts tried = usual;
+  if (clearly_sharp()) {
+    (void)mean_of(model, usual, blur_px, radius, best);
+    if (clearly_sharp()) {
+      tried = {usual.from, usual.to, 0.5, -kSharpestCut, kSharpestCut, 0.2};
+      best = sharp;
+    }
+  }
+  constexpr double kEdge_px = 1.5;  // of the range
+  if (best.at < -ahead + kEdge_px || best.at > back - kEdge_px) {
+    return CutGlass{{std::abs(best.tangent) * radius - best.at, back + ahead, blur_px}, {best.tangent, 0}};
+  }
+  CutGlass found = mean_of(model, tried, blur_px, radius, best);
+  if (std::abs(best.tangent) > tried.cut_to - kSteepestFrom && gets_likelier_beyond(model, best)) {
     return std::nullopt;
   }
   if (const double of_cut = found.bevel.sd * radius;

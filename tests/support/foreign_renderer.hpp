@@ -22,9 +22,9 @@ inline int python(const std::vector<std::string>& arguments) {
   return Running(arguments, "/dev/null", "python3").wait();
 }
 
-// Why it cannot draw; or empty.
-inline std::string renderer_lacks() {
-  if (!std::filesystem::exists(renderer())) {
+// Why it cannot draw, or one of this tree; or empty.
+inline std::string renderer_lacks(bool others = true) {
+  if (others && !std::filesystem::exists(renderer())) {
     return renderer().string() + " is not there: the renderer is not part of this tree";
   }
   return python({"-c", "import numpy, cv2"}) != 0 ? "the renderer needs python3-numpy and python3-opencv"

@@ -16,7 +16,6 @@
 #include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <string>
-#include <tuple>
 #include <vector>
 
 #include "tests/support/foreign_renderer.hpp"
@@ -46,6 +45,20 @@ Contour contour_of(const nlohmann::json& points) {
     contour.emplace_back(p[0].get<double>(), p[1].get<double>());
   }
   return contour;
+}
+
+cv::Mat drawn(const fs::path& folder, int frame) {
+  char name[32];
+  std::snprintf(name, sizeof name, "frame_%04d.png", frame);
+  return cv::imread((folder / name).string(), cv::IMREAD_GRAYSCALE);
+}
+
+// The first frames of contact and puncture.
+using Events = std::map<std::string, std::optional<int>>;
+void mark(Events& in, const char* event, bool is, int frame) {
+  if (is && !in[event]) {
+    in[event] = frame;
+  }
 }
 
 // Of one membrane in the frames of one phase. A frame in which it is not claimed is not right.
@@ -82,6 +95,12 @@ struct Score {
     return kPixel_um * std::sqrt(sum2_px2 / static_cast<double>(std::max<std::size_t>(points, 1)));
   }
 };
+
+void print(const char* membrane, const std::string& part, const Score& score) {
+  std::printf("%s %-10s %2d frames, %2d right, %d wrong, rms %.3f um, %.0f %% within one sd, %.0f %% in 95\n",
+              membrane, part.c_str(), score.frames, score.right, score.wrong, score.rms_um(),
+              100 * score.within_one / score.nodes, 100 * score.within_two / score.nodes);
+}
 
 struct Sequence {
   int seed, noise;  // grey levels
@@ -145,12 +164,10 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
   std::vector<double> touching_px;             // tip in contact, from the membrane
   double furthest_px = 0;                      // of those
   double surest = 0;                           // tip, when the membrane gives way: deviations off
-  std::map<std::string, std::optional<int>> begun, seen_in, told_in;  // frames, of contact and puncture
+  Events begun, seen_in, told_in;
   for (int k = 0; k < frames; ++k) {
-    char name[32];
-    std::snprintf(name, sizeof name, "frame_%04d.png", k);
-    const cv::Mat picture = cv::imread((folder / name).string(), cv::IMREAD_GRAYSCALE);
-    ASSERT_FALSE(picture.empty()) << name;
+    const cv::Mat picture = drawn(folder, k);
+    ASSERT_FALSE(picture.empty()) << k;
     if (!tracker) {
       tracker.emplace(config, picture.cols, picture.rows);
       with_pose.emplace(config, picture.cols, picture.rows);
@@ -164,17 +181,12 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
     inner[part].add(contour_of(t["inner"]), seen.inner);
     const Point tip(t["tip"][0].get<double>(), t["tip"][1].get<double>());
     const Result& told = with_pose->process(frame, tip + off);
-    const auto mark = [&](std::map<std::string, std::optional<int>>& in, const char* event, bool is) {
-      if (is && !in[event]) {
-        in[event] = k;
-      }
-    };
     for (const char* event : {"contact", "puncture"}) {
-      mark(begun, event, phase == event);
+      mark(begun, event, phase == event, k);
     }
     for (const auto& [of, in] : {std::pair(&seen, &seen_in), {&told, &told_in}}) {
-      mark(*in, "contact", of->contact);
-      mark(*in, "puncture", of->punctured);
+      mark(*in, "contact", of->contact, k);
+      mark(*in, "puncture", of->punctured, k);
     }
     if (told.needle.ok) {
       told_px.push_back((told.needle.tip - tip).dot(told.needle.axis));
@@ -198,10 +210,7 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
   int right = 0, wrong = 0;
   for (const auto& [membrane, parts] : {std::pair{"outer", outer}, std::pair{"inner", inner}}) {
     for (const auto& [part, score] : parts) {
-      std::printf(
-          "%s %-8s %2d frames, %2d right, %d wrong, rms %.3f um, %.0f %% within one sd, %.0f %% in 95\n",
-          membrane, part.c_str(), score.frames, score.right, score.wrong, score.rms_um(),
-          100 * score.within_one / score.nodes, 100 * score.within_two / score.nodes);
+      print(membrane, part, score);
       right += score.right;
       wrong += score.wrong;
     }
@@ -301,12 +310,10 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
   std::optional<Tracker> tracker;
   std::map<std::string, Score> outer, inner;
   std::vector<double> tip_px;
-  std::map<std::string, std::optional<int>> begun, told;  // frames, of contact and puncture
+  Events begun, told;
   for (int k = 0; k < static_cast<int>(truth.size()); ++k) {
-    char name[32];
-    std::snprintf(name, sizeof name, "frame_%04d.png", k);
-    const cv::Mat picture = cv::imread((folder / name).string(), cv::IMREAD_GRAYSCALE);
-    ASSERT_FALSE(picture.empty()) << name;
+    const cv::Mat picture = drawn(folder, k);
+    ASSERT_FALSE(picture.empty()) << k;
     if (!tracker) {
       tracker.emplace(config, picture.cols, picture.rows);
     }
@@ -319,22 +326,15 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
     if (phase == "approach" && seen.needle.ok) {
       tip_px.push_back((seen.needle.tip - tip).dot(seen.needle.axis));
     }
-    for (const auto& [event, is, is_told] : {std::tuple("contact", phase == "contact", seen.contact),
-                                             std::tuple("puncture", phase == "puncture", seen.punctured)}) {
-      if (is && !begun[event]) {
-        begun[event] = k;
-      }
-      if (is_told && !told[event]) {
-        told[event] = k;
-      }
+    for (const char* event : {"contact", "puncture"}) {
+      mark(begun, event, phase == event, k);
     }
+    mark(told, "contact", seen.contact, k);
+    mark(told, "puncture", seen.punctured, k);
   }
   for (const auto& [membrane, phases] : {std::pair{"outer", outer}, std::pair{"inner", inner}}) {
     for (const auto& [phase, score] : phases) {
-      std::printf(
-          "%s %-10s %2d frames, %2d right, %d wrong, rms %.3f um, %.0f %% within one sd, %.0f %% in 95\n",
-          membrane, phase.c_str(), score.frames, score.right, score.wrong, score.rms_um(),
-          100 * score.within_one / score.nodes, 100 * score.within_two / score.nodes);
+      print(membrane, phase, score);
     }
   }
   const Score &outer_before = outer["approach"], &inner_before = inner["approach"];

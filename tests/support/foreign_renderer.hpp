@@ -22,7 +22,7 @@ inline int python(const std::vector<std::string>& arguments) {
   return Running(arguments, "/dev/null", "python3").wait();
 }
 
-// Why it cannot draw, or one of this tree; or empty.
+// Why it cannot draw; not others: why one that is part of this tree cannot. Or empty.
 inline std::string renderer_lacks(bool others = true) {
   if (others && !std::filesystem::exists(renderer())) {
     return renderer().string() + " is not there: the renderer is not part of this tree";

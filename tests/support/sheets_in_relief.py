@@ -39,6 +39,7 @@ def main():
         grey = grey + noise * np.random.default_rng((seed, 78, k)).standard_normal(grey.shape)
         cv2.imwrite(f"{out}/frame_{k:04d}.png", np.clip(np.rint(grey), 0, 255).astype(np.uint8))
         truth.append({"frame": k, "phase": phase, "wd_px": float(t["wd"]), "tip": [float(x) for x in t["tip"]],
+                      "holder": [float(x) for x in t["holder"][:2]],
                       "outer": t["outer"].tolist(), "inner": t["inner"].tolist()})
     with open(f"{out}/truth.json", "w") as f:
         json.dump(truth, f)

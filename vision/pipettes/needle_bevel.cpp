@@ -47,22 +47,16 @@ class OfBlurs {
     const int k = static_cast<int>(blurs * kPerBlur + kZero + 0.5);
     return values_[static_cast<std::size_t>(std::clamp(k, 0, kCount - 1))];
   }
+  static constexpr double kFar = 5;  // beyond so many blurs it does not change
 
  private:
-  static constexpr int kZero = 160, kCount = 2 * kZero + 1;
   static constexpr double kPerBlur = 32;
+  static constexpr int kZero = static_cast<int>(kFar * kPerBlur), kCount = 2 * kZero + 1;
   std::array<double, kCount> values_{};
 };
 
-double step_of(double blurs) {
-  static const OfBlurs kStep([](double z) { return 0.5 * blurred_step(z / std::numbers::sqrt2); });
-  return kStep(blurs);
-}
-
-double bump_of(double blurs) {
-  static const OfBlurs kBump([](double z) { return math::exp(-0.5 * z * z); });
-  return kBump(blurs);
-}
+const OfBlurs kStep([](double z) { return 0.5 * blurred_step(z / std::numbers::sqrt2); });
+const OfBlurs kBump([](double z) { return math::exp(-0.5 * z * z); });
 
 // Grey levels across the shaft from `from` to `to` px behind the tip, from its axis outwards, less their
 // mean.
@@ -100,7 +94,7 @@ double unexplained(const Vector<double>& profile, double apart_px, double middle
   for (std::size_t k = 0; k < profile.size(); ++k) {
     const double u = apart_px * static_cast<double>(k), low = (u - middle_px) / blur_px,
                  high = (u + middle_px) / blur_px;
-    const cv::Vec3d shown(bump_of(low) + bump_of(high), step_of(high) - step_of(low), 1);
+    const cv::Vec3d shown(kBump(low) + kBump(high), kStep(high) - kStep(low), 1);
     a += shown * shown.t();
     g += profile[k] * shown;
     square += profile[k] * profile[k];
@@ -156,6 +150,8 @@ class CutModel {
     double middle = 0, weights = 0, tilts = 0;
     // px, px cubed: what tells that the medium is even here, in the mean and across.
     double even = 0, level = 0;
+    // Of both walls where the needle goes on: squared, and times the grey levels.
+    double walls_squared = 0, walls_seen = 0;
   };
   [[nodiscard]] double lane_at(std::size_t lane, double half_width) const;
   [[nodiscard]] double lane_width(std::size_t lane, double half_width) const;
@@ -164,6 +160,7 @@ class CutModel {
   void take_off_plane();
   void tell_how_even_it_is();
   void take_off_mean_and_slope(Seen& row) const;
+  void expect_walls(Seen& row) const;
   double half_width_, blur_, smooth_noise_, unit_;
   double square_ = 0, area_px2_ = 0;  // of what is seen, grey levels squared
   bool clear_ = false;
@@ -232,10 +229,9 @@ CutModel::CutModel(const GradientField& field, const NeedlePose& needle, double 
     square += walls_[i] * walls_[i] / kAllLanes;
     most = std::max(most, std::abs(walls_[i]));
     const double u = lane_at(i, half_width_), lumen = middle_ - line_behind_;
-    const double near = bump_of((std::abs(u) - middle_) / blur_),
-                 far = bump_of((std::abs(u) + middle_) / blur_);
+    const double near = kBump((std::abs(u) - middle_) / blur_), far = kBump((std::abs(u) + middle_) / blur_);
     near_[i] = near / std::max(near + far, 1e-9);
-    line_[i] = step_of((lumen - u) / blur_) - step_of((-lumen - u) / blur_);
+    line_[i] = kStep((lumen - u) / blur_) - kStep((-lumen - u) / blur_);
     of_wall += walls_[i] * (near + far);
     squares += (near + far) * (near + far);
   }
@@ -255,7 +251,20 @@ CutModel::CutModel(const GradientField& field, const NeedlePose& needle, double 
       area_px2_ += row.weight[i];
       row.grey[i] *= row.weight[i];
     }
+    expect_walls(row);
   }
+}
+
+void CutModel::expect_walls(Seen& row) const {
+  double x0 = 0, x1 = 0;
+  for (std::size_t i = 0; i < kAllLanes; ++i) {
+    const double x = walls_[i], weighted = row.weight[i] * x;
+    x0 += weighted;
+    x1 += weighted * (lane_at(i, row.half_width) - row.middle);
+    row.walls_squared += weighted * x;
+    row.walls_seen += row.grey[i] * x;
+  }
+  row.walls_squared -= x0 * x0 / row.weights + x1 * x1 / row.tilts;
 }
 
 // What is neither the walls nor clear is a speck, wherever the needle ends. most: of the walls, grey levels.
@@ -363,15 +372,29 @@ double CutModel::gain(const CutEnd& end) const {
   cv::Matx33d a = cv::Matx33d::zeros();
   cv::Vec3d g;
   const double cut_px = end.tangent * middle_, of_line_px = blur_ * std::sqrt(1 + end.tangent * end.tangent);
+  // From the end: where the needle goes on to, and from where it shows.
+  const double reach_px = std::abs(cut_px) + OfBlurs::kFar * of_line_px;
   for (const Seen& row : rows_) {
+    if (row.s < end.at - reach_px) {
+      continue;
+    }
+    if (row.s > end.at + line_behind_ + reach_px) {
+      const double from_end = row.s - end.at;
+      a(0, 0) += row.walls_squared;
+      a(0, 1) += from_end * row.walls_squared;
+      a(1, 1) += from_end * from_end * row.walls_squared;
+      g[0] += row.walls_seen;
+      g[1] += from_end * row.walls_seen;
+      continue;
+    }
     double x0 = 0, x1 = 0, l0 = 0, l1 = 0, xx = 0, xl = 0, ll = 0, xy = 0, ly = 0;
-    const double along = row.s - end.at, low = step_of((along + cut_px) / blur_),
-                 high = step_of((along - cut_px) / blur_);
+    const double along = row.s - end.at, low = kStep((along + cut_px) / blur_),
+                 high = kStep((along - cut_px) / blur_);
     for (std::size_t i = 0; i < kAllLanes; ++i) {
       const double u = lane_at(i, row.half_width), w = row.weight[i], tilt = u - row.middle;
       const double near = i < kOneSide ? low : high, far = i < kOneSide ? high : low;
       const double x = walls_[i] * (far + near_[i] * (near - far));
-      const double l = line_[i] * bump_of((along - end.tangent * u - line_behind_) / of_line_px);
+      const double l = line_[i] * kBump((along - end.tangent * u - line_behind_) / of_line_px);
       x0 += w * x;
       x1 += w * tilt * x;
       l0 += w * l;
@@ -390,6 +413,7 @@ double CutModel::gain(const CutEnd& end) const {
                      from_end * xl, ll);
     g += cv::Vec3d(xy, from_end * xy, ly);
   }
+  a(1, 0) = a(0, 1);
   const double sure = unit_ / (kStrength * kStrength);
   a(0, 0) += sure;
   g[0] += sure;
@@ -421,6 +445,30 @@ CutEnd likeliest_end(const CutModel& model, double back, double ahead,
         most = gain;
         best = {at, tangent};
       }
+    }
+  }
+  return best;
+}
+
+// Uphill from a likely one, by the steps that are tried.
+CutEnd likeliest_near(const CutModel& model, const CutEnd& from, const EndsAndCuts& tried) {
+  constexpr int kSteps = 16;
+  CutEnd best = from;
+  double most = model.gain(from);
+  for (int step = 0; step < kSteps; ++step) {
+    const CutEnd middle = best;
+    for (const double along : {-tried.apart, 0.0, tried.apart}) {
+      for (const double cut : {-tried.cut_apart, 0.0, tried.cut_apart}) {
+        const CutEnd end{std::clamp(middle.at + along, tried.from, tried.to),
+                         std::clamp(middle.tangent + cut, tried.cut_from, tried.cut_to)};
+        if (const double gain = model.gain(end); gain > most) {
+          most = gain;
+          best = end;
+        }
+      }
+    }
+    if (best.at == middle.at && best.tangent == middle.tangent) {
+      break;
     }
   }
   return best;
@@ -530,7 +578,7 @@ std::optional<CutGlass> cut_of_glass(const GradientField& field, double noise, c
   const EndsAndCuts usual{-ahead - kBeyond_px, back + kBeyond_px, 0.5, -kSteepestCut, kSteepestCut, 0.1};
   EndsAndCuts tried = usual;
   if (clearly_sharp()) {
-    (void)mean_of(model, usual, blur_px, radius, best);
+    best = likeliest_near(model, best, usual);
     if (clearly_sharp()) {
       tried = {usual.from, usual.to, 0.5, -kSharpestCut, kSharpestCut, 0.2};
       best = sharp;

@@ -580,7 +580,8 @@ std::optional<CutGlass> cut_of_glass(const GradientField& field, double noise, c
   if (clearly_sharp()) {
     best = likeliest_near(model, best, usual);
     if (clearly_sharp()) {
-      tried = {usual.from, usual.to, 0.5, -kSharpestCut, kSharpestCut, 0.2};
+      const bool up = sharp.tangent > 0;  // a needle that is cut the other way explains it far worse
+      tried = {usual.from, usual.to, 0.5, up ? 0 : -kSharpestCut, up ? kSharpestCut : 0, 0.2};
       best = sharp;
     }
   }
@@ -589,7 +590,8 @@ std::optional<CutGlass> cut_of_glass(const GradientField& field, double noise, c
     return CutGlass{{std::abs(best.tangent) * radius - best.at, back + ahead, blur_px}, {best.tangent, 0}};
   }
   CutGlass found = mean_of(model, tried, blur_px, radius, best);
-  if (std::abs(best.tangent) > tried.cut_to - kSteepestFrom && gets_likelier_beyond(model, best)) {
+  if (std::abs(best.tangent) > std::max(tried.cut_to, -tried.cut_from) - kSteepestFrom &&
+      gets_likelier_beyond(model, best)) {
     return std::nullopt;
   }
   if (const double of_cut = found.bevel.sd * radius;

@@ -31,6 +31,8 @@ constexpr double kSinks_px = 3;  // by which a free membrane may seem to sink in
 constexpr double kSinking = 4;   // log odds against each px of it
 constexpr double kThrough = 12;  // log odds that a membrane is not on the tip that went through it
 constexpr double kStays = 3;     // log odds that it stays on the tip, or off it, for a frame
+// In relief its motion tells it, too; a shape that is none of those tried tells no more than that.
+constexpr double kStaysInRelief = 5, kByShape = 10;
 constexpr double kLetsGoAlone = 6;  // log odds against an outer membrane off the tip with the inner one on it
 constexpr double kHand_px = 1;      // by which a hand changes the needle's speed in a frame
 constexpr double kJumped = 5;       // log odds at most, by a jump of the tip, that it is off it
@@ -405,12 +407,18 @@ std::optional<SeenDimple> likeliest_dimple(const MembraneSearch& search) {
       }
     }
   }
+  const double stays = search.free_by_motion ? kStaysInRelief : kStays;
   const bool through = punctured && !(within && m.held);
-  double on_tip = through ? -kThrough : m.held && !punctured ? kStays : -kStays;
+  double on_tip = through ? -kThrough : m.held && !punctured ? stays : -stays;
   if (on_tip > 0 && !within) {
     on_tip -= odds_of_jump(search.surroundings);
   }
-  if (!pushed || (free && pushed->evidence + on_tip < free->evidence)) {
+  double by_shape = pushed && free ? free->evidence - pushed->evidence : 0;
+  if (search.free_by_motion) {
+    by_shape = std::clamp(by_shape, -kByShape, kByShape);
+    on_tip -= on_tip > 0 ? *search.free_by_motion : 0;
+  }
+  if (!pushed || (free && on_tip < by_shape)) {
     return free;
   }
   // A dimple keeps its shape while it grows, and while it goes back.

@@ -9,6 +9,7 @@
 #include "vision/image/polar_contour.hpp"
 #include "vision/membrane/carried_outline.hpp"
 #include "vision/membrane/edge_shape.hpp"
+#include "vision/membrane/membrane_recoil.hpp"
 #include "vision/membrane/rest_shape.hpp"
 
 namespace punctum::vision {
@@ -29,6 +30,7 @@ struct FollowedMembrane {
   bool held = true;                                 // the needle pushes it, or would where it touched it
   double dimple_px = 0;                             // depth of its dimple
   std::array<double, kDimpleShapes> dimple_odds{};  // log odds of the shape of its dimple
+  MembraneRecoil recoil;                            // of the outer one in relief
   int lost_frames = 0;                              // in a row
 
   // Of an edge of that direction, outwards.

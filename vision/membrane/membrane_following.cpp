@@ -9,6 +9,7 @@
 #include "hal/math/elementary.hpp"
 #include "vision/image/median.hpp"
 #include "vision/membrane/edge_shape.hpp"
+#include "vision/membrane/undeformed.hpp"
 
 namespace punctum::vision {
 
@@ -235,6 +236,22 @@ std::string why_not_the_same_edge(const MembraneSearch& s, const EdgeFound& foun
   return {};
 }
 
+// In relief, where a membrane hardly shows that lies across the relief's axis.
+std::optional<double> odds_of_recoil(FollowedMembrane& m, const MembraneSearch& search) {
+  constexpr double kNear_px = 12;  // the tip, outside
+  const Surroundings& s = search.surroundings;
+  const NeedlePose& n = s.needle;
+  if (m.polarity == Polarity::relief && s.outermost && !s.punctured && search.needle &&
+      !search.rest.empty()) {
+    const auto entry = entry_point(from_polar(search.band.centre, search.rest), n.tip, n.axis);
+    if (entry && (*entry - n.tip).dot(n.axis) < kNear_px) {
+      return m.recoil.update(search.picture, n, *entry, s.expected_px, m.level);
+    }
+  }
+  m.recoil.forget();
+  return std::nullopt;
+}
+
 }  // namespace
 
 Membrane follow(FollowedMembrane& m, const ClearedPicture& picture, const VisionConfig& config,
@@ -244,7 +261,8 @@ Membrane follow(FollowedMembrane& m, const ClearedPicture& picture, const Vision
     out.reason = "not found";
     return out;
   }
-  const MembraneSearch search(m, picture, surroundings);
+  MembraneSearch search(m, picture, surroundings);
+  search.free_by_motion = odds_of_recoil(m, search);
   const EdgeFound found = pushed_or_free(search);
   const EdgePath& path = found.path;
   if (path.r.empty()) {

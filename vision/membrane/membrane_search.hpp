@@ -41,6 +41,7 @@ struct MembraneSearch {
   EdgeBand band;        // round the last contour
   Vector<double> rest;  // rest outline, seen from the centre of the band; empty: not known
   std::optional<NeedleSeen> needle;
+  std::optional<double> free_by_motion;  // log odds that it has gone back against the needle
 
   MembraneSearch(const FollowedMembrane& followed, const ClearedPicture& cleared, const Surroundings& s);
 

@@ -86,6 +86,7 @@ void SeenEvents::decide(const ClearedPicture& picture, const SeenNeedle& needle,
     in.depth_px = in.membrane_px;
     in.sd_px = math::hypot(kContactPoint_px, result.needle.sd);
     in.free = !cell.outer().held;
+    in.taken = cell.outer().taken;
   }
   touch_.punctured = result.punctured = puncture_.update(in);
   result.inner_punctured = inner_puncture_.update(result.punctured, inner_on_needle(cell.inner(), result),

@@ -279,7 +279,8 @@ struct Relief {
   int seed;
   Light light;
   double outer_um, inner_um, tip_px;  // rms at most, before contact
-  bool events = true;                 // contact and puncture are told within 3 frames
+  int astray = 0;                     // frames in contact whose outer membrane is somewhere off by 4 px
+  int early = 3;                      // frames at most, of contact
 };
 
 class ReliefFrames : public testing::TestWithParam<Relief> {
@@ -352,31 +353,30 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
   const int contact = late(begun["contact"], told["contact"]),
             puncture = late(begun["puncture"], told["puncture"]);
   std::printf("contact %+d frames late, puncture %+d\n", contact, puncture);
-  if (GetParam().events) {
-    EXPECT_LE(std::abs(contact), 3);
-    EXPECT_GE(puncture, 0);
-    EXPECT_LE(puncture, 3);
-  }
+  EXPECT_GE(contact, -GetParam().early);
+  EXPECT_LE(contact, 3);
+  EXPECT_GE(puncture, 0);
+  EXPECT_LE(puncture, 3);
+  EXPECT_LE(outer["contact"].wrong, GetParam().astray);
 }
 
 // In 106 the needle's tip was once told 6 px too far back, in 2 of DIC 7 px; in 104 it was once seen inside
-// the cell long before it was there. Of 106 the light comes along the needle. Into the mouth of the holding
-// pipette the membrane bulges unseen. In 103 and 104 the sharp point meets the membrane beside the needle's
-// axis, which no dimple here does: puncture and contact are told five and six frames early, and not looked
-// at. In the sheets the membrane that gave way was once taken for one that lies along the inner one, and the
-// puncture told ten frames late.
-INSTANTIATE_TEST_SUITE_P(Seeds, ReliefFrames,
-                         testing::Values(Relief{101, Light::hoffman, 0.6, 0.35, 2.5},
-                                         Relief{106, Light::hoffman, 0.55, 0.45, 2},
-                                         Relief{103, Light::hoffman, 0.6, 0.4, 0.6, false},
-                                         Relief{104, Light::hoffman, 0.6, 0.4, 5, false},
-                                         Relief{2, Light::dic, 0.7, 0.45, 0.5},
-                                         Relief{4, Light::sheets, 0.35, 0.4, 2}),
-                         [](const auto& of) {
-                           return (of.param.light == Light::hoffman ? "hoffman_"
-                                   : of.param.light == Light::dic   ? "dic_"
-                                                                    : "sheets_") +
-                                  std::to_string(of.param.seed);
-                         });
+// the cell long before it was there, and contact is told five frames early. Of 106 the light comes along the
+// needle. Into the mouth of the holding pipette the membrane bulges unseen. In 103 and in the
+// sheets 104 the puncture was once told six and seven frames before it happens, for a dimple hardly shows
+// where the light comes along the needle, and in 104 the membrane was drawn to a tip that is seen 2 px too
+// far ahead; in the sheets 4 it was once told ten frames late.
+INSTANTIATE_TEST_SUITE_P(
+    Seeds, ReliefFrames,
+    testing::Values(Relief{101, Light::hoffman, 0.6, 0.35, 2.5, 3},
+                    Relief{106, Light::hoffman, 0.55, 0.45, 2}, Relief{103, Light::hoffman, 0.6, 0.4, 0.6},
+                    Relief{104, Light::hoffman, 0.6, 0.4, 5, 0, 6}, Relief{2, Light::dic, 0.7, 0.45, 0.5},
+                    Relief{4, Light::sheets, 0.35, 0.4, 2}, Relief{104, Light::sheets, 0.35, 0.4, 3}),
+    [](const auto& of) {
+      return (of.param.light == Light::hoffman ? "hoffman_"
+              : of.param.light == Light::dic   ? "dic_"
+                                               : "sheets_") +
+             std::to_string(of.param.seed);
+    });
 
 }  // namespace

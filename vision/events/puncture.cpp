@@ -54,7 +54,7 @@ void Puncture::weigh_recoil(const PunctureInput& in) {
                 : in.membrane_px;
   const double recoil = std::min(off, deepest - in.membrane_px);
   const double ratio = least * (recoil - 0.5 * least) / (in.sd_px * in.sd_px);
-  evidence_ = std::max(0.0, evidence_ + std::clamp(ratio, -kOneFrame, kOneFrame));
+  evidence_ = std::max(0.0, evidence_ + std::clamp(ratio, -kOneFrame, in.taken ? 0 : kOneFrame));
   if (in.free && ratio > 0) {
     evidence_ += kFree;
   }
@@ -70,9 +70,10 @@ void Puncture::weigh_recoil(const PunctureInput& in) {
 // A tip far inside a membrane that is hardly dented is through it, whether or not the recoil was seen. One
 // frame tells at the start, when no other came before; later three in a row do.
 bool Puncture::is_through_undented_membrane(const PunctureInput& in) {
+  constexpr int kTakenFrames = 12;
   const bool through = !punctured_ && -in.gap_px > 3 * in.radius_px && in.depth_px < -0.35 * in.gap_px;
   inside_frames_ = through ? inside_frames_ + 1 : 0;
-  return inside_frames_ >= (frames_ < 3 ? 1 : 3);
+  return inside_frames_ >= (frames_ < 3 ? 1 : in.taken ? kTakenFrames : 3);
 }
 
 namespace {

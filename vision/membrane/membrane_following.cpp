@@ -300,7 +300,9 @@ Membrane follow(FollowedMembrane& m, const ClearedPicture& picture, const Vision
   out.contour = m.carried.contour();
   out.sd_px = m.carried.sd();
   out.ok = true;
+  constexpr double kTaken = 3;
   m.held = found.held;
+  m.taken = found.held && search.free_by_motion && *search.free_by_motion < -kTaken;
   m.dimple_px = found.dimple_px;
   m.dimple_odds = found.dimple_odds;
   m.lost_frames = 0;

@@ -170,6 +170,12 @@ EdgeFound outer_pushed_or_free(const MembraneSearch& s) {
     if (dimple) {
       EdgeBand band = band_along(s, *dimple);
       band.anchors = s.end_face();
+      if (s.m.polarity == Polarity::relief) {
+        const double short_of_tip = std::max(s.depth_of_tip() - dimple->depth, 0.0);
+        for (auto& [i, r] : band.anchors) {
+          r += short_of_tip;
+        }
+      }
       band.slope = 1.5;
       band.stiffness = 0.15;
       found.path = s.path_in(band);

@@ -1,0 +1,113 @@
+// Whether a membrane has gone back against the needle, by its motion between two pictures of a texture that
+// is moved as a dimple moves it.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <opencv2/core.hpp>
+#include <random>
+
+#include "tests/support/pictures.hpp"
+#include "vision/membrane/membrane_recoil.hpp"
+
+namespace punctum::vision {
+namespace {
+
+constexpr int kWidth = 240, kHeight = 160;
+constexpr double kHalfWidth_px = 5, kLevel = 4;
+
+// A needle from the right meets the cell at the entry.
+struct Scene {
+  Point entry{130, 80};
+  std::mt19937 random{7};
+  MembraneRecoil recoil;
+
+  NeedlePose needle(double depth_px) const {
+    NeedlePose n;
+    n.ok = true;
+    n.tip = entry + Point(-depth_px, 0);
+    n.half_width = kHalfWidth_px;
+    return n;
+  }
+
+  // Its texture beside the needle is moved by the dimple, wide_px from the axis to where it ends.
+  cv::Mat draw(double depth_px, double wide_px, double noise) {
+    std::normal_distribution<double> grain(0, 1);
+    cv::Mat out(kHeight, kWidth, CV_8U);
+    for (int y = 0; y < kHeight; ++y) {
+      const double u = (y - entry.y) / wide_px, f = std::abs(u) < 1 ? (1 - u * u) * (1 - u * u) : 0;
+      for (int x = 0; x < kWidth; ++x) {
+        const double at = x + depth_px * f - entry.x;
+        double grey = 140;
+        for (int k = 1; k <= 4; ++k) {
+          const double turn = 2.4 * k, wave = 2 * std::numbers::pi / (7.0 + 4 * k);
+          grey += 5 * std::sin(wave * (at * std::cos(turn) + (y - entry.y) * std::sin(turn)) + turn);
+        }
+        out.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(grey + noise * grain(random));
+      }
+    }
+    return out;
+  }
+
+  std::optional<double> see(double dimple_px, double tip_px, double moved_px, double wide_px = 22,
+                            double noise = 5, const Vector<Polygon>& covered = {}) {
+    const cv::Mat pixels = draw(dimple_px, wide_px, noise);
+    ClearedPicture picture;
+    EXPECT_EQ(picture.load(test::frame_of(pixels), kWidth, kHeight), "");
+    picture.compute_gradient({0, 0, kWidth, kHeight});
+    picture.cover(covered);
+    return recoil.update(picture, needle(tip_px), entry, moved_px, kLevel);
+  }
+};
+
+TEST(MembraneRecoil, is_told_of_a_dimple_that_goes_back_while_the_needle_goes_on) {
+  for (const double wide : {14.0, 22.0, 35.0}) {
+    for (const double noise : {2.0, 5.0, 10.0}) {
+      Scene scene;
+      EXPECT_EQ(scene.see(8, 8, 1, wide, noise), std::nullopt);  // one picture tells nothing
+      for (const double depth : {9.0, 10.0}) {
+        const auto on = scene.see(depth, depth, 1, wide, noise);
+        ASSERT_TRUE(on);
+        EXPECT_LT(*on, 0) << wide << ' ' << noise << ' ' << depth;
+      }
+      const auto back = scene.see(5, 11, 1, wide, noise);
+      ASSERT_TRUE(back);
+      EXPECT_GT(*back, 3) << wide << ' ' << noise;
+    }
+  }
+}
+
+TEST(MembraneRecoil, is_not_told_of_one_that_follows_the_needle_out_or_waits) {
+  Scene scene;
+  (void)scene.see(10, 10, 0);
+  EXPECT_LT(scene.see(10, 10, 0).value(), 0);
+  for (const double depth : {7.0, 4.0, 1.0}) {
+    EXPECT_LT(scene.see(depth, depth, -3).value(), 1) << depth;  // 5 are asked for a membrane to be free
+  }
+}
+
+TEST(MembraneRecoil, is_told_by_the_cells_own_motion_least_of_all) {
+  Scene scene;
+  (void)scene.see(8, 8, 0);
+  scene.entry.x += 4;  // the cell and its outline at rest go back with the needle's shaft standing still
+  EXPECT_LT(scene.see(8, 8, 0).value(), 0);
+}
+
+TEST(MembraneRecoil, is_uncertain_where_hardly_anything_is_seen) {
+  Scene scene;
+  const Vector<Polygon> all{{{1, 1}, {238, 1}, {238, 158}, {1, 158}}};
+  (void)scene.see(8, 8, 1, 22, 5, all);
+  EXPECT_NEAR(scene.see(2, 9, 1, 22, 5, all).value(), 0, 1e-9);
+  scene.recoil.forget();
+  EXPECT_EQ(scene.see(2, 9, 1), std::nullopt);
+}
+
+TEST(MembraneRecoil, tells_nothing_where_the_needle_jumps_further_than_it_can_see) {
+  Scene scene;
+  (void)scene.see(20, 20, 1);
+  EXPECT_EQ(scene.see(0, 0, -20), std::nullopt);
+  EXPECT_LT(scene.see(0, 0, 0).value(), 0);
+}
+
+}  // namespace
+}  // namespace punctum::vision

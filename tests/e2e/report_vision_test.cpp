@@ -4,12 +4,16 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
 #include <map>
+#include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/e2e/quick_report.hpp"
 #include "tests/support/programs.hpp"
+#include "tools/report/foreign_frames.hpp"
 #include "tools/report/vision_phases.hpp"
 
 namespace punctum::e2e {
@@ -104,6 +108,28 @@ TEST(ReportVision, frames_of_another_renderer_are_seen_as_well_or_what_is_missin
     }
   }
   EXPECT_EQ(shipped, 1);
+}
+
+TEST(ReportVision, a_truth_that_lacks_something_is_refused_with_its_file_frame_and_key) {
+  const fs::path folder = fs::path(testing::TempDir()) / ("truth_" + std::to_string(getpid()));
+  fs::create_directories(folder);
+  const std::string contour = "[[1, 1], [9, 1], [9, 9]]";
+  const std::string whole =
+      R"("phase": "contact", "wd_px": 1, "tip": [1, 1], "outer": )" + contour + R"(, "inner": )" + contour;
+  const std::vector<std::pair<std::string, std::string>> refused{
+      {"[{" + whole + "}]", "'holder'"}, {R"([{"phase": 3}])", "must be string"}, {"[{]", "parse error"}};
+  for (const auto& [text, named] : refused) {
+    std::ofstream(folder / "truth.json") << text;
+    try {
+      (void)report::read_foreign(folder);
+      ADD_FAILURE() << text;
+    } catch (const std::runtime_error& e) {
+      const std::string said = e.what();
+      EXPECT_NE(said.find("truth.json: frame 0: "), std::string::npos) << said;
+      EXPECT_NE(said.find(named), std::string::npos) << said;
+    }
+  }
+  fs::remove_all(folder);
 }
 
 }  // namespace

@@ -55,15 +55,23 @@ FrameTruth truth_of(const nlohmann::json& told, double pixel_m) {
 
 DrawnInjection read_foreign(const fs::path& drawn) {
   DrawnInjection out;
-  for (const auto& told : nlohmann::json::parse(read_text(drawn / "truth.json"))) {
-    auto picture = recorded::read_picture(drawn / fmt::format("frame_{:04}.png", out.pixels.size()));
-    if (!picture) {
-      throw std::runtime_error(picture.error());
+  const fs::path file = drawn / "truth.json";
+  try {
+    for (const auto& told : nlohmann::json::parse(read_text(file))) {
+      out.truth.push_back(truth_of(told, out.lens.pixel_m));
+      auto picture = recorded::read_picture(drawn / fmt::format("frame_{:04}.png", out.pixels.size()));
+      if (!picture) {
+        throw std::runtime_error(picture.error());
+      }
+      out.lens.width = picture->width;
+      out.lens.height = picture->height;
+      out.pixels.push_back(std::move(picture->pixels));
     }
-    out.lens.width = picture->width;
-    out.lens.height = picture->height;
-    out.pixels.push_back(std::move(picture->pixels));
-    out.truth.push_back(truth_of(told, out.lens.pixel_m));
+  } catch (const nlohmann::json::exception& e) {
+    throw std::runtime_error(
+        fmt::format("{}: frame {}: {}; each frame has a phase, outer and inner contours and tip and holder "
+                    "[px], and wd_px",
+                    file.string(), out.truth.size(), e.what()));
   }
   return out;
 }

@@ -365,7 +365,7 @@ std::string observe_foreign(const Job& job, Measurement& m, PhaseScores& phases)
       }
       job.progress.step();
     }
-    return folders.empty() ? job.frames.string() + " holds none" : "";
+    return folders.empty() ? job.frames.string() + " holds no noise-LEVEL/SEQUENCE/truth.json" : "";
   }
   const std::vector<ForeignPlan> injections = foreign_plans(job.quick);
   job.progress.start("another renderer", static_cast<std::int64_t>(injections.size()));

@@ -77,6 +77,7 @@ void SeenEvents::decide(const ClearedPicture& picture, const SeenNeedle& needle,
   // A frame that does not show needle and cell changes nothing; a needle that points past the cell is off it.
   const bool unseen = !(result.needle.ok && result.outer.ok);
   in.contact = result.contact || (unseen && touch_.contact);
+  in.recoil = cell.outer().recoil_odds;
   in.gap_px = result.gap_px.value_or(0);
   in.radius_px = result.needle.half_width;
   in.points = behind_tip && result.entry;
@@ -86,7 +87,6 @@ void SeenEvents::decide(const ClearedPicture& picture, const SeenNeedle& needle,
     in.depth_px = in.membrane_px;
     in.sd_px = math::hypot(kContactPoint_px, result.needle.sd);
     in.free = !cell.outer().held;
-    in.taken = cell.outer().taken;
   }
   touch_.punctured = result.punctured = puncture_.update(in);
   result.inner_punctured = inner_puncture_.update(result.punctured, inner_on_needle(cell.inner(), result),

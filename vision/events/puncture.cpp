@@ -10,6 +10,7 @@ constexpr double kDecides =
 constexpr double kOneFrame = 9;  // at most by the contact points of one frame, which may be mistaken ones
 constexpr double kLearnt = 0.2;  // of a frame, of the membrane's share of the tip's depth
 constexpr double kLittle_px2 = 4;  // as much counts the usual share as a frame with the tip 2 px deep
+constexpr double kTaken = 3;       // log odds against a recoil, from which contact points are mistaken
 constexpr double kFree = 5;  // by the picture beside the needle, which says it with log odds of 3 or more
 }  // namespace
 
@@ -18,6 +19,10 @@ bool Puncture::update(const PunctureInput& in) {
   ++frames_;
   if (punctured_ && in.gap_px > 2 * in.radius_px) {  // away from the cell: the next puncture may come
     *this = Puncture(recoil_px_);
+  }
+  if (in.contact && in.recoil > 0) {
+    evidence_ += in.recoil;
+    punctured_ = punctured_ || evidence_ > kDecides;
   }
   if (!in.contact || !in.points) {
     have_last_ = false;
@@ -54,7 +59,7 @@ void Puncture::weigh_recoil(const PunctureInput& in) {
                 : in.membrane_px;
   const double recoil = std::min(off, deepest - in.membrane_px);
   const double ratio = least * (recoil - 0.5 * least) / (in.sd_px * in.sd_px);
-  evidence_ = std::max(0.0, evidence_ + std::clamp(ratio, -kOneFrame, in.taken ? 0 : kOneFrame));
+  evidence_ = std::max(0.0, evidence_ + std::clamp(ratio, -kOneFrame, in.recoil < -kTaken ? 0 : kOneFrame));
   if (in.free && ratio > 0) {
     evidence_ += kFree;
   }
@@ -73,7 +78,7 @@ bool Puncture::is_through_undented_membrane(const PunctureInput& in) {
   constexpr int kTakenFrames = 12;
   const bool through = !punctured_ && -in.gap_px > 3 * in.radius_px && in.depth_px < -0.35 * in.gap_px;
   inside_frames_ = through ? inside_frames_ + 1 : 0;
-  return inside_frames_ >= (frames_ < 3 ? 1 : in.taken ? kTakenFrames : 3);
+  return inside_frames_ >= (frames_ < 3 ? 1 : in.recoil < -kTaken ? kTakenFrames : 3);
 }
 
 namespace {

@@ -19,7 +19,7 @@ struct PunctureInput {
   double radius_px = 0;    // of the needle
   double sd_px = 0.7;      // of membrane_px
   bool free = false;       // the picture beside the needle shows the membrane off the tip
-  bool taken = false;      // or shows that it has not gone back since the last frame
+  double recoil = 0;       // log odds, by its motion, that it has gone back since the last frame
 };
 
 // Page's sequential test (CUSUM) on the way that the membrane has gone back further than the needle.

@@ -31,7 +31,7 @@ struct FollowedMembrane {
   double dimple_px = 0;                             // depth of its dimple
   std::array<double, kDimpleShapes> dimple_odds{};  // log odds of the shape of its dimple
   MembraneRecoil recoil;                            // of the outer one in relief
-  bool taken = false;                               // held, and has not gone back since the last frame
+  double recoil_odds = 0;                           // log odds that it has gone back since the last frame
   int lost_frames = 0;                              // in a row
 
   // Of an edge of that direction, outwards.

@@ -263,6 +263,7 @@ Membrane follow(FollowedMembrane& m, const ClearedPicture& picture, const Vision
   }
   MembraneSearch search(m, picture, surroundings);
   search.free_by_motion = odds_of_recoil(m, search);
+  m.recoil_odds = m.held ? search.free_by_motion.value_or(0) : 0;
   const EdgeFound found = pushed_or_free(search);
   const EdgePath& path = found.path;
   if (path.r.empty()) {
@@ -300,9 +301,7 @@ Membrane follow(FollowedMembrane& m, const ClearedPicture& picture, const Vision
   out.contour = m.carried.contour();
   out.sd_px = m.carried.sd();
   out.ok = true;
-  constexpr double kTaken = 3;
   m.held = found.held;
-  m.taken = found.held && search.free_by_motion && *search.free_by_motion < -kTaken;
   m.dimple_px = found.dimple_px;
   m.dimple_odds = found.dimple_odds;
   m.lost_frames = 0;

@@ -217,10 +217,10 @@ TEST(Components, are_those_of_another_labelling) {
 struct Script {
   Puncture puncture{1.5};
   std::int64_t t = 0;
-  bool step(double tip, double membrane, bool contact = true, bool free = false, bool taken = false) {
+  bool step(double tip, double membrane, bool contact = true, bool free = false, double recoil = 0) {
     PunctureInput in;
     in.free = free;
-    in.taken = taken;
+    in.recoil = recoil;
     in.t_ns = t;
     t += 40'000'000;
     in.contact = contact;
@@ -347,24 +347,42 @@ TEST(Puncture, is_also_a_tip_deep_inside_an_undented_membrane) {
 // Contact points that lie far behind the tip are mistaken where the membrane has not gone back; but not for
 // ever: what did not show it go back may have missed it.
 TEST(Puncture, is_not_told_by_contact_points_while_the_picture_shows_that_the_membrane_has_not_gone_back) {
+  constexpr double kNotBack = -5;
   Script s, alone;
   s.push(20);
   alone.push(20);
   bool told = false;
   for (int k = 0; k < 10; ++k) {
-    EXPECT_FALSE(s.step(20, 5, true, false, true)) << k;
+    EXPECT_FALSE(s.step(20, 5, true, false, kNotBack)) << k;
     told = alone.step(20, 5);
   }
   EXPECT_TRUE(told);
   for (int k = 0; k < 10; ++k) {
-    told = s.step(20, 5, true, false, true);
+    told = s.step(20, 5, true, false, kNotBack);
   }
   EXPECT_TRUE(told);
   Script pushed;
   pushed.push(10);
   for (int k = 0; k < 100; ++k) {
-    EXPECT_FALSE(pushed.step(10, 5, true, false, true)) << k;
+    EXPECT_FALSE(pushed.step(10, 5, true, false, kNotBack)) << k;
   }
+}
+
+TEST(Puncture, is_told_at_once_by_a_membrane_that_clearly_goes_back_whatever_the_contact_points_say) {
+  Script clear, doubtful, outside;
+  for (Script* s : {&clear, &doubtful, &outside}) {
+    s->push(20);
+  }
+  EXPECT_TRUE(clear.step(20.5, 20, true, false, 25));
+  for (int k = 0; k < 100; ++k) {
+    EXPECT_FALSE(doubtful.step(20.5, 19.5, true, false, 4)) << k;
+  }
+  EXPECT_FALSE(outside.step(-5, 0, false, false, 25));  // nothing touches it
+  PunctureInput unseen;
+  unseen.t_ns = doubtful.t;
+  unseen.contact = true;
+  unseen.recoil = 25;
+  EXPECT_TRUE(doubtful.puncture.update(unseen));  // no contact points in this frame
 }
 
 TEST(InnerPuncture, is_a_contour_that_recoiled_far_behind_the_tip_in_two_frames_of_a_punctured_cell) {

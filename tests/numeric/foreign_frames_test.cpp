@@ -356,7 +356,7 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
   EXPECT_GE(contact, -GetParam().early);
   EXPECT_LE(contact, 3);
   EXPECT_GE(puncture, 0);
-  EXPECT_LE(puncture, 3);
+  EXPECT_LE(puncture, 2);
   EXPECT_LE(outer["contact"].wrong, GetParam().astray);
 }
 

@@ -358,6 +358,16 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
   EXPECT_GE(puncture, 0);
   EXPECT_LE(puncture, 2);
   EXPECT_LE(outer["contact"].wrong, GetParam().astray);
+
+  // A hand that turns back just before the membrane gives way, at once and three times as fast.
+  ASSERT_TRUE(begun["puncture"]);
+  const int deepest = *begun["puncture"] - 1, back = 3;
+  const cv::Size size = drawn(folder, 0).size();
+  Tracker turned(config, size.width, size.height);
+  for (int k = 0; k <= deepest + deepest / back; ++k) {
+    const cv::Mat picture = drawn(folder, k <= deepest ? k : deepest - back * (k - deepest));
+    EXPECT_FALSE(turned.process(frame_of(picture, static_cast<std::uint64_t>(k))).punctured) << k;
+  }
 }
 
 // In 106 the needle's tip was once told 6 px too far back, in 2 of DIC 7 px; in 104 it was once seen inside

@@ -245,7 +245,10 @@ std::optional<double> odds_of_recoil(FollowedMembrane& m, const MembraneSearch& 
       !search.rest.empty()) {
     const auto entry = entry_point(from_polar(search.band.centre, search.rest), n.tip, n.axis);
     if (entry && (*entry - n.tip).dot(n.axis) < kNear_px) {
-      return m.recoil.update(search.picture, n, *entry, s.expected_px, m.level);
+      // A hand that turns back at once is seen to; a tip that seems to jump ahead has not.
+      const double moved_px =
+          s.last_tip ? std::min(s.expected_px, (n.tip - *s.last_tip).dot(n.axis)) : s.expected_px;
+      return m.recoil.update(search.picture, n, *entry, moved_px, m.level);
     }
   }
   m.recoil.forget();

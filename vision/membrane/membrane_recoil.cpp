@@ -109,10 +109,10 @@ std::optional<double> MembraneRecoil::update(const ClearedPicture& picture, cons
                                              const Point& entry, double moved_px, double level) {
   // By which it may go back and go on, in a frame.
   constexpr double kBack_px = 12, kOn_px = 3, kReach_px = kPlace_px * (kMost - 1);
-  // It follows a tip that goes back, and hardly more.
-  constexpr double kLetsGo_px = 1;
+  // It follows a tip that goes back, which is seen less exactly while it is fast.
+  constexpr double kLetsGo_px = 1, kFollows = 1.5;
   look(picture, needle, entry);
-  const double taken_from = std::min(moved_px, 0.0) - kLetsGo_px;
+  const double taken_from = kFollows * std::min(moved_px, 0.0) - kLetsGo_px;
   if (!std::exchange(seen_, true) || taken_from <= -kReach_px) {
     return std::nullopt;
   }

@@ -86,10 +86,10 @@ TEST(MembraneRecoil, is_not_told_of_one_that_follows_the_needle_out_or_waits) {
   }
 }
 
-TEST(MembraneRecoil, is_told_by_the_cells_own_motion_least_of_all) {
+TEST(MembraneRecoil, is_not_told_of_a_cell_that_moves_as_a_whole) {
   Scene scene;
   (void)scene.see(8, 8, 0);
-  scene.entry.x += 4;  // the cell and its outline at rest go back with the needle's shaft standing still
+  scene.entry.x += 4;  // with its outline at rest, against a needle that stays
   EXPECT_LT(scene.see(8, 8, 0).value(), 0);
 }
 

@@ -347,8 +347,8 @@ TEST_F(Console, tells_everybody_what_happens_while_others_ask_for_stops_all_the_
 class OwnHand : public Console {
  protected:
   void begin() {
-    run_.emplace(std::vector<std::string>{"run", "own-hand", "--set", kPatientRelay, "--report", report(),
-                                          "--no-figure", "--no-frames"},
+    run_.emplace(std::vector<std::string>{"run", "own-hand", "--seconds", "120", "--set", kPatientRelay,
+                                          "--report", report(), "--no-figure", "--no-frames"},
                  words());
     port_ = port_said_by(*run_);
     me_ = operator_client(R"({"op":"subscribe","subscriptions":[{"id":10,"channelId":0}]})");
@@ -357,7 +357,7 @@ class OwnHand : public Console {
   template <class Over>
   bool push_and_inject(Over over) {
     constexpr double kHand_m_s = 0.02, kEvery_s = 0.04, kControlEvery_s = 0.4;
-    double way_m = 0, told_s = -1, asked_s = -1, refused_s = -1;
+    double way_m = 0, told_s = -1, asked_s = -1, refused_s = -1, injection_s = -1;
     bool was_open = false;
     const auto begun = std::chrono::steady_clock::now();
     for (v1::Telemetry t;;) {
@@ -393,8 +393,10 @@ class OwnHand : public Console {
             break;
           case v1::PHASE_INJECTION:
             was_open = was_open || t.injector_open();
-            inject = !was_open || t.injector_open();  // which closes by itself
-            way_m += inject ? 0 : step_m;
+            injection_s = injection_s < 0 ? now_s : injection_s;
+            // It closes by itself. A dose that late vision keeps back is asked for by a new press.
+            inject = t.injector_open() || (!was_open && std::fmod(now_s - injection_s, 1.0) < 0.7);
+            way_m += was_open && !inject ? step_m : 0;
             break;
           case v1::PHASE_WITHDRAWAL:
             way_m += step_m;

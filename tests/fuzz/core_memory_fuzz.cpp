@@ -125,7 +125,7 @@ void read_all(Station& station) {
     found("the report cannot be read");
   }
   expect_text(tools::summary(station.scene(), result, recorder->measures(), status, {}, false));
-  expect_text(tools::progress_line(station.scene(), recorder->measures().last, status, {}));
+  expect_text(tools::progress_line(station.scene(), recorder->measures(), status, {}));
   expect_text(tools::missing_rights(status));
 }
 

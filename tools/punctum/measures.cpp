@@ -62,6 +62,10 @@ Measures::Measures(const Scene& scene)
       hand_band_(3, TremorBand(scene.servo.rate_Hz)),
       tip_band_(3, TremorBand(scene.servo.rate_Hz)) {}
 
+bool Measures::dose_kept_back() const noexcept {
+  return has_injector_ && now_.asked_s > 0 && now_.injected_s.value_or(0) < CellMeasures::kDoseTolerance_s;
+}
+
 std::optional<double> Measures::tremor_ratio() const {
   if (tremor_ticks == 0 || tremor_hand2 <= 0) {
     return std::nullopt;

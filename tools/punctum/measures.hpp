@@ -158,6 +158,8 @@ class Measures {
   double last_s = 0;
   rt::TelemetrySample last;
 
+  // The button was down in this cell, and nothing came out of the injector that is there.
+  [[nodiscard]] bool dose_kept_back() const noexcept;
   [[nodiscard]] std::optional<double> tremor_ratio() const;
   [[nodiscard]] std::optional<double> force_error_rms_N() const;
 

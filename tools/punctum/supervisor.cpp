@@ -631,7 +631,7 @@ void Run::tell_progress() {
   next_progress_s_ = now_s() + terminal_.progress_every_s();
   const Measures& m = recorder_.measures();
   if (m.ticks > 0) {
-    terminal_.progress(progress_line(scene_, m.last, core, terminal_.line_style()));
+    terminal_.progress(progress_line(scene_, m, core, terminal_.line_style()));
   }
 }
 

@@ -86,7 +86,8 @@ Part vision_part(const Scene& scene, const rt::TelemetrySample& newest) {
 }
 
 // For somebody who does it for the first time: what to do now. Empty where the hand is simulated.
-const char* next_step(const Scene& scene, const rt::TelemetrySample& newest) {
+const char* next_step(const Scene& scene, const Measures& measures) {
+  const rt::TelemetrySample& newest = measures.last;
   if (scene.devices.haptic == kSimulated || !scene.servo.phases || newest.stop != rt::StopStage::running) {
     return "";
   }
@@ -102,7 +103,10 @@ const char* next_step(const Scene& scene, const rt::TelemetrySample& newest) {
     case rt::Phase::puncture:
       return (newest.alarms & rt::alarm_injection_refused) != 0 ? "deeper" : "press inject";
     case rt::Phase::injection:
-      return newest.injector_open != 0 ? "hold inject" : "draw back";
+      // A press asks for one dose, which late vision may have kept back.
+      return newest.injector_open != 0   ? "hold inject"
+             : measures.dose_kept_back() ? "inject anew"
+                                         : "draw back";
     case rt::Phase::withdrawal:
       return "draw back";
     case rt::Phase::clear:
@@ -225,8 +229,9 @@ LineStyle Terminal::line_style() const {
   return {.coloured = coloured_, .blocks = writes_utf8(), .columns = columns_of(STDOUT_FILENO)};
 }
 
-std::string progress_line(const Scene& scene, const rt::TelemetrySample& newest, const rt::CoreStatus& core,
+std::string progress_line(const Scene& scene, const Measures& measures, const rt::CoreStatus& core,
                           const LineStyle& style) {
+  const rt::TelemetrySample& newest = measures.last;
   const double hand_N = std::hypot(newest.force_N[0], newest.force_N[1], newest.force_N[2]);
   const double most_N = scene.servo.limits.hand_force_N;
   std::vector<Part> parts;
@@ -237,7 +242,7 @@ std::string progress_line(const Scene& scene, const rt::TelemetrySample& newest,
   parts.push_back(part(fmt::format("{:<11}", rt::name(newest.phase)), 10));
   parts.push_back(bar(most_N > 0 ? hand_N / most_N : 0, style.blocks));
   parts.push_back(part(fmt::format("{:4.2f} N", hand_N), 8));
-  if (const char* const next = next_step(scene, newest); *next != '\0') {
+  if (const char* const next = next_step(scene, measures); *next != '\0') {
     parts.push_back(part(fmt::format("> {:<15}", next), 9, Colour::good));
   }
   if (scene.servo.membrane) {

@@ -55,7 +55,7 @@ class Terminal {
 };
 
 // Time, what is left of it, phase, force, depth, vision, and what is not as it should be.
-[[nodiscard]] std::string progress_line(const Scene& scene, const rt::TelemetrySample& newest,
+[[nodiscard]] std::string progress_line(const Scene& scene, const Measures& measures,
                                         const rt::CoreStatus& core, const LineStyle& style);
 
 }  // namespace punctum::tools

@@ -476,7 +476,9 @@ class LiveLine : public testing::Test {
     core->missed.store(3);
   }
   [[nodiscard]] std::string line(const LineStyle& style) const {
-    return progress_line(scene, sample, *core, style);
+    Measures measures(scene);
+    measures.last = sample;
+    return progress_line(scene, measures, *core, style);
   }
 
   Scene scene = *load_scene("icsi");
@@ -513,6 +515,28 @@ TEST_F(LiveLine, tells_a_persons_own_hand_what_to_do_next) {
   says(rt::Phase::withdrawal, 0, "draw back");
   sample.stop = rt::StopStage::stopped;
   EXPECT_FALSE(contains(line({}), ">")) << line({});
+}
+
+TEST_F(LiveLine, asks_for_a_new_press_where_a_dose_was_kept_back) {
+  scene = *load_scene("hands-on");
+  scene.sim->cell.reset();  // which nobody knows in truth
+  Measures measures(scene);
+  sample.phase = rt::Phase::injection;
+  sample.buttons = hal::kButtonInject;
+  const auto after_s = [&](double seconds, std::uint8_t injector_open, std::uint32_t buttons) {
+    sample.injector_open = injector_open;
+    sample.buttons = buttons;
+    for (int i = 0; i < static_cast<int>(seconds * scene.servo.rate_Hz); ++i) {
+      ++sample.tick;
+      measures.tick(sample, nullptr);
+    }
+    return progress_line(scene, measures, *core, {});
+  };
+  EXPECT_TRUE(contains(after_s(0.5, 0, hal::kButtonInject), "> inject anew"));
+  EXPECT_TRUE(contains(after_s(0.01, 1, hal::kButtonInject), "> hold inject"));
+  EXPECT_TRUE(contains(after_s(0.1, 0, 0), "> inject anew"));  // too short to be a dose
+  EXPECT_TRUE(contains(after_s(0.2, 1, hal::kButtonInject), "> hold inject"));
+  EXPECT_TRUE(contains(after_s(0.5, 0, hal::kButtonInject), "> draw back"));
 }
 
 TEST_F(LiveLine, a_fault_and_stale_vision_stand_out_and_survive_a_narrow_terminal) {

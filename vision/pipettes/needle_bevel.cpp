@@ -30,7 +30,7 @@ constexpr double kHalfOfWall = 0.17;
 constexpr double kSteepestCut = 0.95;
 // A needle that is ground sharp may be cut so, where that explains the picture better by so much of what the
 // walls do.
-constexpr double kSharpestCut = 2.8, kClearlySharp = 0.02;
+constexpr double kSharpestCut = 2.8, kClearlySharp = 0.02, kClearlyCut = 0.025;
 constexpr double kSteepestFrom = 0.1;  // of the steepest: it may be steeper still
 using GlassRow = std::array<double, kAllLanes>;
 
@@ -135,7 +135,13 @@ class CutModel {
            double ahead);
   [[nodiscard]] bool stands_out() const noexcept { return clear_; }
   // Log likelihood over no needle, twice.
-  [[nodiscard]] double gain(const CutEnd& end) const;
+  [[nodiscard]] double gain(const CutEnd& end) const {
+    const Sums<3> of_needle = sums(end);
+    return likelier(of_needle);
+  }
+  // The same with a speck, as dark or bright as it fits best, in line with the wall at that side: the most
+  // that one within reach of the end explains.
+  [[nodiscard]] double gain_with_speck(const CutEnd& end, double side) const;
   // What specks and granules leave of the picture, over what the noise alone would, at least 1.
   [[nodiscard]] double misfit(double gain) const {
     return std::max(1.0, (square_ - gain * unit_) / (area_px2_ * smooth_noise_ * smooth_noise_));
@@ -153,6 +159,28 @@ class CutModel {
     // Of both walls where the needle goes on: squared, and times the grey levels.
     double walls_squared = 0, walls_seen = 0;
   };
+  // Of the squares of what is shown, and of that times what is seen: walls; the same times the distance from
+  // the end; line; what else is shown.
+  template <int N>
+  struct Sums {
+    cv::Matx<double, N, N> a;
+    cv::Vec<double, N> g;
+  };
+  // Of a lane of a row, where the needle ends so.
+  struct Shown {
+    double walls, line;
+  };
+  struct Ends {
+    CutEnd end;
+    double cut_px, of_line_px, reach_px;  // reach: where the needle goes on to, and from where it shows
+  };
+  [[nodiscard]] Ends ends_at(const CutEnd& end) const;
+  // Calls for each lane with what is shown in it.
+  template <class Each>
+  void for_lanes(const Seen& row, const Ends& ends, Each each) const;
+  [[nodiscard]] Sums<3> sums(const CutEnd& end) const;
+  template <int N>
+  [[nodiscard]] double likelier(Sums<N> sums) const;
   [[nodiscard]] double lane_at(std::size_t lane, double half_width) const;
   [[nodiscard]] double lane_width(std::size_t lane, double half_width) const;
   [[nodiscard]] static bool is_beside(std::size_t lane) { return lane % kOneSide + kBeside >= kOneSide; }
@@ -362,39 +390,43 @@ void CutModel::take_off_mean_and_slope(Seen& row) const {
   }
 }
 
-double CutModel::gain(const CutEnd& end) const {
-  constexpr double kStrength = 0.25,
-                   kPerPx = 0.01;  // usual deviations of the walls' strength from the shaft's
-  // Usual deviation of the line's strength from none, or from that of the walls. In focus it shows, and is
-  // not just where a usual capillary has it; out of focus the walls merge into one.
-  constexpr double kFocused = 3, kClosed = 0.15, kUnsharp_px = 2.2;
-  // Walls; the same times the distance from the end; line.
-  cv::Matx33d a = cv::Matx33d::zeros();
-  cv::Vec3d g;
+CutModel::Ends CutModel::ends_at(const CutEnd& end) const {
   const double cut_px = end.tangent * middle_, of_line_px = blur_ * std::sqrt(1 + end.tangent * end.tangent);
-  // From the end: where the needle goes on to, and from where it shows.
-  const double reach_px = std::abs(cut_px) + OfBlurs::kFar * of_line_px;
+  return {end, cut_px, of_line_px, std::abs(cut_px) + OfBlurs::kFar * of_line_px};
+}
+
+template <class Each>
+void CutModel::for_lanes(const Seen& row, const Ends& ends, Each each) const {
+  const double along = row.s - ends.end.at, low = kStep((along + ends.cut_px) / blur_),
+               high = kStep((along - ends.cut_px) / blur_);
+  for (std::size_t i = 0; i < kAllLanes; ++i) {
+    const double u = lane_at(i, row.half_width);
+    const double near = i < kOneSide ? low : high, far = i < kOneSide ? high : low;
+    each(i, u,
+         Shown{walls_[i] * (far + near_[i] * (near - far)),
+               line_[i] * kBump((along - ends.end.tangent * u - line_behind_) / ends.of_line_px)});
+  }
+}
+
+CutModel::Sums<3> CutModel::sums(const CutEnd& end) const {
+  Sums<3> of{cv::Matx33d::zeros(), {}};
+  const Ends ends = ends_at(end);
   for (const Seen& row : rows_) {
-    if (row.s < end.at - reach_px) {
+    if (row.s < end.at - ends.reach_px) {
       continue;
     }
-    if (row.s > end.at + line_behind_ + reach_px) {
+    if (row.s > end.at + line_behind_ + ends.reach_px) {
       const double from_end = row.s - end.at;
-      a(0, 0) += row.walls_squared;
-      a(0, 1) += from_end * row.walls_squared;
-      a(1, 1) += from_end * from_end * row.walls_squared;
-      g[0] += row.walls_seen;
-      g[1] += from_end * row.walls_seen;
+      of.a(0, 0) += row.walls_squared;
+      of.a(0, 1) += from_end * row.walls_squared;
+      of.a(1, 1) += from_end * from_end * row.walls_squared;
+      of.g[0] += row.walls_seen;
+      of.g[1] += from_end * row.walls_seen;
       continue;
     }
     double x0 = 0, x1 = 0, l0 = 0, l1 = 0, xx = 0, xl = 0, ll = 0, xy = 0, ly = 0;
-    const double along = row.s - end.at, low = kStep((along + cut_px) / blur_),
-                 high = kStep((along - cut_px) / blur_);
-    for (std::size_t i = 0; i < kAllLanes; ++i) {
-      const double u = lane_at(i, row.half_width), w = row.weight[i], tilt = u - row.middle;
-      const double near = i < kOneSide ? low : high, far = i < kOneSide ? high : low;
-      const double x = walls_[i] * (far + near_[i] * (near - far));
-      const double l = line_[i] * kBump((along - end.tangent * u - line_behind_) / of_line_px);
+    for_lanes(row, ends, [&](std::size_t i, double u, const Shown& shown) {
+      const double w = row.weight[i], tilt = u - row.middle, x = shown.walls, l = shown.line;
       x0 += w * x;
       x1 += w * tilt * x;
       l0 += w * l;
@@ -404,28 +436,95 @@ double CutModel::gain(const CutEnd& end) const {
       ll += w * l * l;
       xy += x * row.grey[i];
       ly += l * row.grey[i];
-    }
+    });
     xx -= x0 * x0 / row.weights + x1 * x1 / row.tilts;
     xl -= x0 * l0 / row.weights + x1 * l1 / row.tilts;
     ll -= l0 * l0 / row.weights + l1 * l1 / row.tilts;
     const double from_end = std::max(0.0, row.s - end.at);
-    a += cv::Matx33d(xx, from_end * xx, xl, from_end * xx, from_end * from_end * xx, from_end * xl, xl,
-                     from_end * xl, ll);
-    g += cv::Vec3d(xy, from_end * xy, ly);
+    of.a += cv::Matx33d(xx, from_end * xx, xl, from_end * xx, from_end * from_end * xx, from_end * xl, xl,
+                        from_end * xl, ll);
+    of.g += cv::Vec3d(xy, from_end * xy, ly);
   }
-  a(1, 0) = a(0, 1);
+  of.a(1, 0) = of.a(0, 1);
+  return of;
+}
+
+// With what is usual of walls and line.
+template <int N>
+double CutModel::likelier(Sums<N> of) const {
+  constexpr double kStrength = 0.25,
+                   kPerPx = 0.01;  // usual deviations of the walls' strength from the shaft's
+  // Usual deviation of the line's strength from none, or from that of the walls. In focus it shows, and is
+  // not just where a usual capillary has it; out of focus the walls merge into one.
+  constexpr double kFocused = 3, kClosed = 0.15, kUnsharp_px = 2.2;
   const double sure = unit_ / (kStrength * kStrength);
-  a(0, 0) += sure;
-  g[0] += sure;
-  a(1, 1) += unit_ / (kPerPx * kPerPx);
+  of.a(0, 0) += sure;
+  of.g[0] += sure;
+  of.a(1, 1) += unit_ / (kPerPx * kPerPx);
   // An open end or one that is closed by glass as strong as the walls.
   const double usual = blur_ > kUnsharp_px ? kClosed : kFocused, of_line = unit_ / (usual * usual);
-  a(2, 2) += of_line;
-  const cv::Matx33d inverse = a.inv();
-  const double open = (g.dot(inverse * g) - sure) / unit_;
-  g[2] += of_line;
-  const double closed = (g.dot(inverse * g) - sure - of_line) / unit_, likelier = std::max(open, closed);
-  return likelier + 2 * math::log(0.5 * (1 + math::exp(-0.5 * std::abs(open - closed))));
+  of.a(2, 2) += of_line;
+  const cv::Matx<double, N, N> inverse = of.a.inv();
+  const double open = (of.g.dot(inverse * of.g) - sure) / unit_;
+  of.g[2] += of_line;
+  const double closed = (of.g.dot(inverse * of.g) - sure - of_line) / unit_, more = std::max(open, closed);
+  return more + 2 * math::log(0.5 * (1 + math::exp(-0.5 * std::abs(open - closed))));
+}
+
+double CutModel::gain_with_speck(const CutEnd& end, double side) const {
+  constexpr int kReach_px = 14, kOffLine_px = 1;
+  const Ends ends = ends_at(end);
+  const Sums<3> of_needle = sums(end);
+  double most = likelier(of_needle);
+  for (const double radius_px : {blur_, 1.5 * blur_}) {
+    for (int aside = -kOffLine_px; aside <= kOffLine_px; ++aside) {
+      for (int ahead = 0; ahead <= kReach_px; ++ahead) {
+        const double s = end.at - ahead, u = std::copysign(middle_ + aside, side);
+        Sums<4> of{cv::Matx44d::eye(), {}};
+        for (int i = 0; i < 3; ++i) {
+          of.g[i] = of_needle.g[i];
+          for (int j = 0; j < 3; ++j) {
+            of.a(i, j) = of_needle.a(i, j);
+          }
+        }
+        for (const Seen& row : rows_) {
+          if (std::abs(row.s - s) > 3 * radius_px) {
+            continue;
+          }
+          double x0 = 0, x1 = 0, l0 = 0, l1 = 0, b0 = 0, b1 = 0, xb = 0, lb = 0, bb = 0, by = 0;
+          const double along = kBump((row.s - s) / radius_px);
+          for_lanes(row, ends, [&](std::size_t i, double lane, const Shown& shown) {
+            const double w = row.weight[i], tilt = lane - row.middle, x = shown.walls, l = shown.line,
+                         b = along * kBump((lane - u) / radius_px);
+            x0 += w * x;
+            x1 += w * tilt * x;
+            l0 += w * l;
+            l1 += w * tilt * l;
+            b0 += w * b;
+            b1 += w * tilt * b;
+            xb += w * x * b;
+            lb += w * l * b;
+            bb += w * b * b;
+            by += b * row.grey[i];
+          });
+          xb -= x0 * b0 / row.weights + x1 * b1 / row.tilts;
+          lb -= l0 * b0 / row.weights + l1 * b1 / row.tilts;
+          bb -= b0 * b0 / row.weights + b1 * b1 / row.tilts;
+          const double from_end = std::max(0.0, row.s - end.at);
+          of.a(0, 3) += xb;
+          of.a(1, 3) += from_end * xb;
+          of.a(2, 3) += lb;
+          of.a(3, 3) += bb;
+          of.g[3] += by;
+        }
+        for (int i = 0; i < 3; ++i) {
+          of.a(3, i) = of.a(i, 3);
+        }
+        most = std::max(most, likelier(of));
+      }
+    }
+  }
+  return most;
 }
 
 // Ends from..to px behind the tip of the pose, and cuts, with what is between two of them.
@@ -483,6 +582,19 @@ bool gets_likelier_beyond(const CutModel& model, const CutEnd& end) {
     }
   }
   return false;
+}
+
+// Rather than at right angles with a speck in line with one wall, which looks alike but for the light between
+// the two.
+bool is_clearly_cut(const CutModel& model, const CutEnd& cut, const CutEnd& right) {
+  constexpr double kThanSpeck = 1.2;
+  constexpr int kReach_px = 3;
+  const double without = model.gain(right);
+  double speck = 0;
+  for (int off = -kReach_px; off <= kReach_px; ++off) {
+    speck = std::max(speck, model.gain_with_speck({right.at + off, 0}, -cut.tangent) - without);
+  }
+  return model.gain(cut) - without > std::max(kThanSpeck * speck, kClearlyCut * without);
 }
 
 // Each as likely as it explains the picture; and the likeliest. radius: of the glass, px.
@@ -577,12 +689,15 @@ std::optional<CutGlass> cut_of_glass(const GradientField& field, double noise, c
   const double radius = outer_radius_of_glass(needle.half_width, blur_px);
   const EndsAndCuts usual{-ahead - kBeyond_px, back + kBeyond_px, 0.5, -kSteepestCut, kSteepestCut, 0.1};
   EndsAndCuts tried = usual;
+  const auto try_sharp = [&](const CutEnd& likely) {
+    const bool up = likely.tangent > 0;  // a needle that is cut the other way explains it far worse
+    tried = {usual.from, usual.to, 0.5, up ? 0 : -kSharpestCut, up ? kSharpestCut : 0, 0.2};
+    best = likely;
+  };
   if (clearly_sharp()) {
     best = likeliest_near(model, best, usual);
     if (clearly_sharp()) {
-      const bool up = sharp.tangent > 0;  // a needle that is cut the other way explains it far worse
-      tried = {usual.from, usual.to, 0.5, up ? 0 : -kSharpestCut, up ? kSharpestCut : 0, 0.2};
-      best = sharp;
+      try_sharp(sharp);
     }
   }
   constexpr double kEdge_px = 1.5;  // of the range
@@ -590,8 +705,21 @@ std::optional<CutGlass> cut_of_glass(const GradientField& field, double noise, c
     return CutGlass{{std::abs(best.tangent) * radius - best.at, back + ahead, blur_px}, {best.tangent, 0}};
   }
   CutGlass found = mean_of(model, tried, blur_px, radius, best);
-  if (std::abs(best.tangent) > std::max(tried.cut_to, -tried.cut_from) - kSteepestFrom &&
-      gets_likelier_beyond(model, best)) {
+  const auto is_steeper = [&] {
+    return std::abs(best.tangent) > std::max(tried.cut_to, -tried.cut_from) - kSteepestFrom &&
+           gets_likelier_beyond(model, best);
+  };
+  // A cut that is hardly steeper than usual explains the picture hardly better than a usual one, but better
+  // than a right angle, with a speck before it or without.
+  if (tried.cut_from == usual.cut_from && is_steeper()) {
+    try_sharp(best);
+    best = likeliest_near(model, best, tried);
+    if (!is_clearly_cut(model, best, likeliest_end(model, back, ahead, std::array{0.0}))) {
+      return std::nullopt;
+    }
+    found = mean_of(model, tried, blur_px, radius, best);
+  }
+  if (is_steeper()) {
     return std::nullopt;
   }
   if (const double of_cut = found.bevel.sd * radius;

@@ -181,4 +181,75 @@ std::optional<NeedlePose> with_faint_wall(const GradientField& field, double noi
   return found;
 }
 
+std::optional<NeedlePose> with_outer_line(const GradientField& field, double noise,
+                                          const NeedlePose& needle) {
+  constexpr int kFewest = 20;  // stations
+  constexpr double kMost_px = 100;
+  constexpr int kOfWall_px = 3, kBeside_px = 8;  // from the outer face, inward and outward
+  constexpr int kNear_px = 1, kFar_px = 5;       // beyond the face, where the line is looked for
+  constexpr double kNoises = 6, kOfWalls = 0.2, kOneSided = 2;
+  constexpr double kHalfOfLine_px = 1.8;
+  const double outside = kBeside_px + 1;
+  int stations = 0;
+  const auto station = [&](int i) { return kFrom_px + kApart_px * i; };
+  for (; station(stations) <= kMost_px; ++stations) {
+    const double s = station(stations), w = needle.half_width_at(s) + outside;
+    if (!field.area.contains(needle.at(s, w)) || !field.area.contains(needle.at(s, -w))) {
+      break;
+    }
+  }
+  if (stations < kFewest) {
+    return std::nullopt;
+  }
+  // The median along the needle, at half-widths and px from its axis.
+  Vector<double> along(static_cast<std::size_t>(stations));
+  const auto grey_at = [&](double half_widths, double px) {
+    for (int i = 0; i < stations; ++i) {
+      const double s = station(i);
+      along[static_cast<std::size_t>(i)] =
+          field.grey(needle.at(s, half_widths * needle.half_width_at(s) + px));
+    }
+    return median_of(along);
+  };
+  const double medium = 0.5 * (grey_at(-1, -kBeside_px) + grey_at(1, kBeside_px));
+  double across = 0;  // grey levels over the medium
+  for (double at = -0.9; at < 1; at += 0.2) {
+    across += grey_at(at, 0) - medium;
+  }
+  struct Side {
+    double wall = 0, line = 0;
+    int at = 0;  // px beyond the face
+  };
+  const auto look = [&](int side) {
+    Side seen;
+    for (int d = -kOfWall_px; d <= kFar_px; ++d) {
+      const double grey = grey_at(side, side * d) - medium;
+      if (d < 0) {
+        seen.wall = std::abs(grey) > std::abs(seen.wall) ? grey : seen.wall;
+      } else if (d >= kNear_px && grey * seen.wall < 0 && std::abs(grey) > std::abs(seen.line)) {
+        seen.line = grey;
+        seen.at = d;
+      }
+    }
+    return seen;
+  };
+  const Side low = look(-1), high = look(1);
+  const bool is_low = std::abs(low.line) > std::abs(high.line);
+  const Side &found = is_low ? low : high, &other = is_low ? high : low;
+  const double smooth_noise = std::max(noise, 0.5) / (2 * field.sigma * std::sqrt(std::numbers::pi));
+  const double least = std::max({kNoises * smooth_noise / std::sqrt(static_cast<double>(stations)),
+                                 kOfWalls * std::max(std::abs(low.wall), std::abs(high.wall)),
+                                 kOneSided * std::abs(other.line)});
+  // As far as the light's path rises across the needle it falls again: what is missing of that is a wall,
+  // more of the same a fringe.
+  if (std::abs(found.line) < least || found.line * across > 0) {
+    return std::nullopt;
+  }
+  NeedlePose wider = needle;
+  const double by_px = 0.5 * (found.at + kHalfOfLine_px);
+  wider.tip = needle.at(0, is_low ? -by_px : by_px);
+  wider.half_width += by_px;
+  return wider;
+}
+
 }  // namespace punctum::vision

@@ -228,6 +228,13 @@ double NeedleSearch::lie_between_walls(const GradientField& field, double noise,
     go_to_end();
     put_at_end_of_walls(field, noise, back, 10, needle);
   }
+  if (auto wider = with_outer_line(field, noise, needle)) {
+    if (const double s = fit_walls(field, noise, radius_px_, *wider, kLongestWall_px); s >= kStraightWalls) {
+      needle = *wider;
+      straight = s;
+      put_at_end_of_walls(field, noise, back, 10, needle);
+    }
+  }
   return straight;
 }
 

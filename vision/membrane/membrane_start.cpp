@@ -79,10 +79,12 @@ bool clear_in_relief(const SecondEdge& inside, const FollowedMembrane& outer, co
 // be much fainter than its ooplasm.
 constexpr double kFaceLevel = 0.4, kZonaLevel = 0.2;
 
-// Equally far from the other one all round.
-bool parallel_in_relief(const SecondEdge& edge, const Vector<double>& r, double least_level,
+// Equally far from the other one all round, with this standard deviation: two faces of a wall, or ooplasm and
+// zona, between which there is a space.
+constexpr double kFaceApart_px = 1, kZonaApart_px = 2;
+
+bool parallel_in_relief(const SecondEdge& edge, const Vector<double>& r, double apart_px, double least_level,
                         const ClearedPicture& picture) {
-  constexpr double kApart_px = 1;  // sd
   if (edge.path.r.size() != r.size() || edge.path.level < least_level ||
       edge.path.level < kEdgeClear_noise * picture.gradient_noise) {
     return false;
@@ -92,7 +94,7 @@ bool parallel_in_relief(const SecondEdge& edge, const Vector<double>& r, double 
   const double usual = median_of(apart);
   std::transform(apart.begin(), apart.end(), apart.begin(),
                  [usual](double a) { return std::abs(a - usual); });
-  return kSdOfMedian * median_of(apart) < kApart_px;
+  return kSdOfMedian * median_of(apart) < apart_px;
 }
 
 // Inside the wall of an outer membrane in relief, the edge at which what the light crosses grows again. Of a
@@ -104,7 +106,7 @@ std::optional<FollowedMembrane> ooplasm_in_relief(const FollowedMembrane& outer,
   const double from = -kDeepest * median_of(outer.r), to = -kWalls * config.px(config.h_m);
   SecondEdge inside = find_in_relief(outer.r, outer.centre, outer.relief, from, to, picture);
   if (SecondEdge deep = find_in_relief(outer.r, outer.centre, outer.relief, from, to - kSheet_px, picture);
-      parallel_in_relief(deep, outer.r, kFaceLevel * outer.level, picture) &&
+      parallel_in_relief(deep, outer.r, kFaceApart_px, kFaceLevel * outer.level, picture) &&
       deep.path.level > kAsClear * inside.path.level) {
     inside = std::move(deep);
   }
@@ -132,7 +134,8 @@ std::optional<FollowedMembrane> zona_in_relief(const FollowedMembrane& ooplasm, 
   constexpr double kFurthest = 0.35, kContrast = 1.5;  // of the radius; times the median edge of the band
   SecondEdge zona = find_in_relief(ooplasm.r, ooplasm.centre, ooplasm.relief, wall,
                                    kFurthest * median_of(ooplasm.r), picture);
-  return zona.quality > kContrast && parallel_in_relief(zona, ooplasm.r, kZonaLevel * ooplasm.level, picture)
+  return zona.quality > kContrast &&
+                 parallel_in_relief(zona, ooplasm.r, kZonaApart_px, kZonaLevel * ooplasm.level, picture)
              ? std::optional(
                    started(ooplasm.centre, zona.path.r, Polarity::relief, zona.path.level, zona.relief))
              : std::nullopt;
@@ -149,7 +152,7 @@ StartedMembranes tell_apart_in_relief(const MainEdge& found, const ClearedPictur
   const double wall = config.px(config.h_m);
   const auto other_face = [&](const FollowedMembrane& of, double from, double to) {
     SecondEdge face = find_in_relief(of.r, of.centre, of.relief.opposite(), from * wall, to * wall, picture);
-    return parallel_in_relief(face, of.r, kFaceLevel * of.level, picture)
+    return parallel_in_relief(face, of.r, kFaceApart_px, kFaceLevel * of.level, picture)
                ? std::optional(
                      started(of.centre, face.path.r, Polarity::relief, face.path.level, face.relief))
                : std::nullopt;

@@ -179,8 +179,8 @@ int SeenCell::fit_undeformed_membrane(const ClearedPicture& picture, const Touch
   std::optional<Point> entry;  // if the needle is near
   bool clear = !n.ok;
   if (n.ok) {
-    entry = entry_point(undeformed_.known() ? undeformed_.at_rest().shape : contour, n.tip, n.axis);
-    const double gap = entry ? (*entry - n.tip).dot(n.axis) : kMayTouch_px;
+    entry = entry_point(undeformed_.known() ? undeformed_.at_rest().shape : contour, n.point(), n.axis);
+    const double gap = entry ? (*entry - n.point()).dot(n.axis) : kMayTouch_px;
     clear = gap >= kClear_px;
     if (gap >= kMayTouch_px) {
       entry.reset();
@@ -224,11 +224,11 @@ int SeenCell::fit_undeformed_membrane(const ClearedPicture& picture, const Touch
 
 void SeenCell::measure_gap(int fitted_points, Result& result) {
   const NeedlePose& n = result.needle;
-  result.entry = entry_point(undeformed_.at_rest().shape, n.tip, n.axis);
+  result.entry = entry_point(undeformed_.at_rest().shape, n.point(), n.axis);
   if (!result.entry) {
     return;
   }
-  result.gap_px = (*result.entry - n.tip).dot(n.axis);
+  result.gap_px = (*result.entry - n.point()).dot(n.axis);
   entry_sd_px_ = 3 * result.outer.residual_px / std::sqrt(fitted_points);
   result.gap_sd_px = math::hypot(n.sd, entry_sd_px_);
 }

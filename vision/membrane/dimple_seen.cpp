@@ -40,31 +40,48 @@ constexpr double kSteepest = 1.8;   // slope of a wall that ends at its width; t
 constexpr double kBandHalf_px = 7;  // half-width of the band
 constexpr double kWithinHalf_px = 4;  // of an inner membrane's: granules are near
 
-// A flat bottom with a logarithmic wall is what a stretched membrane has; the others end at their width.
+// A flat bottom with a logarithmic wall is what a stretched membrane has; bumps end at their width. Under a
+// sharp point it is a cusp, which falls off exponentially.
+enum class Wall : std::uint8_t { bump, logarithmic, cusp };
 struct Shape {
-  double width;  // half-widths of the needle
-  bool logarithmic;
+  double width;  // half-widths of the needle; of a cusp, over which it falls to 1/e
+  Wall wall;
 };
-constexpr std::array<Shape, kDimpleShapes> kShapes{{{2, false},
-                                                    {2.3, false},
-                                                    {2.65, false},
-                                                    {3.05, false},
-                                                    {3.5, false},
-                                                    {4, false},
-                                                    {4.6, false},
-                                                    {5.3, false},
-                                                    {18, true},
-                                                    {100, true}}};
+constexpr std::array<Shape, kDimpleShapes> kShapes{{{2, Wall::bump},
+                                                    {2.3, Wall::bump},
+                                                    {2.65, Wall::bump},
+                                                    {3.05, Wall::bump},
+                                                    {3.5, Wall::bump},
+                                                    {4, Wall::bump},
+                                                    {4.6, Wall::bump},
+                                                    {5.3, Wall::bump},
+                                                    {18, Wall::logarithmic},
+                                                    {100, Wall::logarithmic},
+                                                    {1.5, Wall::cusp},
+                                                    {2.2, Wall::cusp},
+                                                    {3.3, Wall::cusp}}};
 
-// Slope of its wall where it is steepest, for a depth of one half-width; a logarithmic wall may have any: 0.
-double steepness(const Shape& shape) { return shape.logarithmic ? 0 : 1.54 / shape.width; }
+struct Shapes {
+  std::size_t first, end;
+};
+Shapes shapes_under(const NeedlePose& needle) {
+  constexpr std::size_t kBlunt = 10;
+  return needle.point_aside == 0 ? Shapes{0, kBlunt} : Shapes{kBlunt, kDimpleShapes};
+}
+
+// Slope of its wall where it is steepest, for a depth of one half-width; a logarithmic wall and a cusp may
+// have any: 0.
+double steepness(const Shape& shape) { return shape.wall == Wall::bump ? 1.54 / shape.width : 0; }
 
 // Share of the depth, u half-widths away from the entry.
 double share_of_depth(const Shape& shape, double u) {
+  if (shape.wall == Wall::cusp) {
+    return math::exp(-u / shape.width);
+  }
   if (u >= shape.width) {
     return 0;
   }
-  if (shape.logarithmic) {
+  if (shape.wall == Wall::logarithmic) {
     return u <= 1 ? 1 : 1 - math::log(u) / math::log(shape.width);
   }
   const double f = 1 - u * u / (shape.width * shape.width);
@@ -165,8 +182,8 @@ class Dimples {
         outline_(from_polar(s_.band.centre, s_.rest)),
         spacing_(s_.usual_r * 2 * std::numbers::pi / s_.angles) {
     const NeedlePose& n = s_.surroundings.needle;
-    if (const auto entry = entry_point(outline_, n.tip, n.axis)) {
-      depth_of_tip_ = (n.tip - *entry).dot(n.axis);
+    if (const auto entry = entry_point(outline_, n.point(), n.axis)) {
+      depth_of_tip_ = (n.point() - *entry).dot(n.axis);
       meets_the_cell_ = true;
       entry_ = polar_index(*entry - s_.band.centre, s_.angles);
       reach_ =
@@ -313,7 +330,7 @@ class WithinTells {
     dimples.look(deepest + kPast_px);
     first_ = dimples.depth(0);
     const double on_tip_from = deepest - std::max(kOnTip_px, kOnTip * deepest);
-    for (std::size_t k = 0; k < kDimpleShapes; ++k) {
+    for (auto [k, end] = shapes_under(around.needle); k < end; ++k) {
       dimples.choose(kShapes[k], deepest_of(kShapes[k], deepest, search));
       for (std::size_t step = 0; step < dimples.steps(); ++step) {
         of_[k].push_back(dimples.evidence(step).value_or(0));
@@ -382,7 +399,7 @@ std::optional<SeenDimple> likeliest_dimple(const MembraneSearch& search) {
   std::optional<SeenDimple> pushed, free;
   std::array<double, kDimpleShapes> best;
   best.fill(-1e9);
-  for (std::size_t k = 0; k < kDimpleShapes; ++k) {
+  for (auto [k, end] = shapes_under(search.surroundings.needle); k < end; ++k) {
     dimples.choose(kShapes[k], deepest_of(kShapes[k], deepest, search));
     for (std::size_t step = 0; step < dimples.steps(); ++step) {
       const double depth = dimples.depth(step);

@@ -14,7 +14,7 @@
 
 namespace punctum::vision {
 
-constexpr std::size_t kDimpleShapes = 10;
+constexpr std::size_t kDimpleShapes = 13;
 
 struct FollowedMembrane {
   bool known = false;

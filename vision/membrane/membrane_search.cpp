@@ -51,8 +51,8 @@ MembraneSearch::MembraneSearch(const FollowedMembrane& followed, const ClearedPi
   picture.exclude_holder(band, expected, m.polarity == Polarity::relief);
 
   if (s.needle.ok) {
-    const Point tip = s.needle.tip - band.centre;
-    const auto entry = entry_point(m.contour(), s.needle.tip, s.needle.axis);
+    const Point tip = s.needle.point() - band.centre;
+    const auto entry = entry_point(m.contour(), s.needle.point(), s.needle.axis);
     const Point towards = entry ? *entry - band.centre : -s.needle.axis;
     needle = {math::atan2(towards.y, towards.x), polar_index(tip, angles), cv::norm(tip)};
     if (!rest.empty()) {
@@ -90,7 +90,7 @@ void MembraneSearch::keep_membranes_apart() {
 // The membrane is not pushed in further than the tip has come.
 void MembraneSearch::limit_depth_to_tip() {
   constexpr double kMargin_px = 6;
-  const Point tip = surroundings.needle.tip - band.centre;
+  const Point tip = surroundings.needle.point() - band.centre;
   const double depth = tip.dot(surroundings.needle.axis) < 0
                            ? std::max(0.0, rest[static_cast<std::size_t>(needle->tip_index)] - needle->tip_r)
                            : 0;
@@ -172,8 +172,9 @@ EdgeFound outer_pushed_or_free(const MembraneSearch& s) {
       band.anchors = s.end_face();
       if (s.m.polarity == Polarity::relief) {
         const double short_of_tip = std::max(s.depth_of_tip() - dimple->depth, 0.0);
+        const bool sharp = s.surroundings.needle.point_aside != 0;
         for (auto& [i, r] : band.anchors) {
-          r += short_of_tip;
+          r = sharp ? band.middle[static_cast<std::size_t>(i)] : r + short_of_tip;
         }
       }
       band.slope = 1.5;

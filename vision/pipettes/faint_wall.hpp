@@ -16,8 +16,8 @@ namespace punctum::vision {
                                                         double radius, const NeedlePose& needle);
 
 // The needle up to a line that lies outside one of the walls of the pose, dark where that is bright or the
-// reverse: of four lines, as the faces of two walls are in relief, three look like a needle. Empty where there
-// is none, or one on either side, which is a fringe.
+// reverse: of four lines, as the faces of two walls are in relief, three look like a needle. Empty where
+// there is none, or one on either side, which is a fringe.
 [[nodiscard]] std::optional<NeedlePose> with_outer_line(const GradientField& field, double noise,
                                                         const NeedlePose& needle);
 

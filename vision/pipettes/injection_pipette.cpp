@@ -383,6 +383,9 @@ NeedlePose InjectionPipette::as_found(double noise) const { return told(last_, n
 
 NeedlePose InjectionPipette::told(NeedlePose needle, double noise) const {
   needle.tip += glass_ahead_ * needle.axis;
+  const bool sharp = std::abs(bevel_.tangent) > kSteep;
+  needle.point_aside =
+      sharp ? std::copysign(outer_radius_of_glass(last_.half_width, glass_blur_), -bevel_.tangent) : 0;
   // Of a needle whose lumen is not seen only the walls tell the end at first, and its cut is not seen.
   constexpr double kWalls_px = 0.5, kBeyondWalls_px = 0.8, kUnseenCut_px = 0.4;
   const bool by_walls = !lumen_ && glass_frames_ == 0;

@@ -238,7 +238,8 @@ std::string why_not_the_same_edge(const MembraneSearch& s, const EdgeFound& foun
 
 // In relief, where a membrane hardly shows that lies across the relief's axis.
 std::optional<double> odds_of_recoil(FollowedMembrane& m, const MembraneSearch& search) {
-  constexpr double kNear_px = 12;  // the tip, outside
+  constexpr double kNear_px = 12;   // the tip, outside
+  constexpr double kHardly_px = 2;  // what is pushed in by less has no way to go back
   const Surroundings& s = search.surroundings;
   const NeedlePose& n = s.needle;
   if (m.polarity == Polarity::relief && s.outermost && !s.punctured && search.needle &&
@@ -248,7 +249,9 @@ std::optional<double> odds_of_recoil(FollowedMembrane& m, const MembraneSearch& 
       // A hand that turns back at once is seen to; a tip that seems to jump ahead has not.
       const double moved_px =
           s.last_tip ? std::min(s.expected_px, (n.tip - *s.last_tip).dot(n.axis)) : s.expected_px;
-      return m.recoil.update(search.picture, n, *entry, moved_px, m.level);
+      const auto odds = m.recoil.update(search.picture, n, *entry, moved_px, m.level);
+      const bool pushed = std::max(m.dimple_px, search.depth_of_tip()) > kHardly_px;
+      return odds && !pushed ? std::min(*odds, 0.0) : odds;
     }
   }
   m.recoil.forget();

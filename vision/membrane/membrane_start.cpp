@@ -131,7 +131,7 @@ bool same_edge(const ClosedEdge& a, const ClosedEdge& b) {
 // Round the ooplasm, the outer face of its zona: at both, what the light crosses grows inwards.
 std::optional<FollowedMembrane> zona_in_relief(const FollowedMembrane& ooplasm, double wall,
                                                const ClearedPicture& picture) {
-  constexpr double kFurthest = 0.35, kContrast = 1.5;  // of the radius; times the median edge of the band
+  constexpr double kFurthest = 0.35, kContrast = 1;  // of the radius; times the median edge of the band
   SecondEdge zona = find_in_relief(ooplasm.r, ooplasm.centre, ooplasm.relief, wall,
                                    kFurthest * median_of(ooplasm.r), picture);
   return zona.quality > kContrast &&

@@ -239,7 +239,7 @@ std::string why_not_the_same_edge(const MembraneSearch& s, const EdgeFound& foun
 // In relief, where a membrane hardly shows that lies across the relief's axis.
 std::optional<double> odds_of_recoil(FollowedMembrane& m, const MembraneSearch& search) {
   constexpr double kNear_px = 12;   // the tip, outside
-  constexpr double kHardly_px = 2;  // what is pushed in by less has no way to go back
+  constexpr double kHardly_px = 3;  // what is pushed in by less has no way to go back
   const Surroundings& s = search.surroundings;
   const NeedlePose& n = s.needle;
   if (m.polarity == Polarity::relief && s.outermost && !s.punctured && search.needle &&

@@ -8,6 +8,7 @@
 
 #include "vision/image/kept_vector.hpp"
 #include "vision/image/median.hpp"
+#include "vision/pipettes/needle_walls.hpp"
 
 namespace punctum::vision {
 
@@ -187,7 +188,7 @@ std::optional<NeedlePose> with_outer_line(const GradientField& field, double noi
   constexpr double kMost_px = 100;
   constexpr int kOfWall_px = 3, kBeside_px = 8;  // from the outer face, inward and outward
   constexpr int kNear_px = 1, kFar_px = 5;       // beyond the face, where the line is looked for
-  constexpr double kNoises = 6, kOfWalls = 0.2, kOneSided = 2;
+  constexpr double kNoises = 6, kOfWalls = 0.2, kOneSided = 2, kOuter = 1.5;
   constexpr double kHalfOfLine_px = 1.8;
   const double outside = kBeside_px + 1;
   int stations = 0;
@@ -237,18 +238,23 @@ std::optional<NeedlePose> with_outer_line(const GradientField& field, double noi
   const bool is_low = std::abs(low.line) > std::abs(high.line);
   const Side &found = is_low ? low : high, &other = is_low ? high : low;
   const double smooth_noise = std::max(noise, 0.5) / (2 * field.sigma * std::sqrt(std::numbers::pi));
-  const double least = std::max({kNoises * smooth_noise / std::sqrt(static_cast<double>(stations)),
-                                 kOfWalls * std::max(std::abs(low.wall), std::abs(high.wall)),
-                                 kOneSided * std::abs(other.line)});
+  const double walls = std::max(std::abs(low.wall), std::abs(high.wall));
+  const double least =
+      std::max(kNoises * smooth_noise / std::sqrt(static_cast<double>(stations)), kOfWalls * walls);
   // As far as the light's path rises across the needle it falls again: what is missing of that is a wall,
   // more of the same a fringe.
-  if (std::abs(found.line) < least || found.line * across > 0) {
+  const bool is_one = std::abs(found.line) > std::max(least, kOneSided * std::abs(other.line)) &&
+                      found.line * across < 0,
+             are_both = needle.half_width < kLeastLumen_px && std::abs(found.line) > kOuter * walls &&
+                        std::abs(other.line) > least && found.line * other.line < 0;
+  if (!is_one && !are_both) {
     return std::nullopt;
   }
+  const double by_found = found.at + kHalfOfLine_px, by_other = are_both ? other.at + kHalfOfLine_px : 0,
+               by_low = is_low ? by_found : by_other, by_high = is_low ? by_other : by_found;
   NeedlePose wider = needle;
-  const double by_px = 0.5 * (found.at + kHalfOfLine_px);
-  wider.tip = needle.at(0, is_low ? -by_px : by_px);
-  wider.half_width += by_px;
+  wider.tip = needle.at(0, 0.5 * (by_high - by_low));
+  wider.half_width += 0.5 * (by_low + by_high);
   return wider;
 }
 

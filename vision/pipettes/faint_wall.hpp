@@ -15,9 +15,9 @@ namespace punctum::vision {
 [[nodiscard]] std::optional<NeedlePose> with_faint_wall(const GradientField& field, double noise,
                                                         double radius, const NeedlePose& needle);
 
-// The needle up to a line that lies outside one of the walls of the pose, dark where that is bright or the
-// reverse: of four lines, as the faces of two walls are in relief, three look like a needle. Empty where
-// there is none, or one on either side, which is a fringe.
+// The needle up to the lines that lie outside the walls of the pose, dark where those are bright or the
+// reverse: of four lines, as the faces of two walls are in relief, three look like a needle, and two like a
+// thin one. Empty where there are none, or such as a fringe has: alike on either side.
 [[nodiscard]] std::optional<NeedlePose> with_outer_line(const GradientField& field, double noise,
                                                         const NeedlePose& needle);
 

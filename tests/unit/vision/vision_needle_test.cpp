@@ -371,6 +371,79 @@ TEST(WideNeedle, ends_with_the_outermost_glass_though_a_speck_lies_on_a_wall) {
   }
 }
 
+TEST(WideNeedle, that_is_ground_sharp_ends_with_its_point) {
+  constexpr double kTip_px = 1.5, kAside_px = 1.5;
+  for (const double tangent : {1.0, 1.1, 1.2, 1.4, 1.7, 2.0}) {
+    for (const double side : {-1.0, 1.0}) {
+      InjectionPipette needle(Side::right, kWideRadius);
+      const Wide wide{.tangent = side * tangent};
+      ASSERT_TRUE(needle.start(draw(wide), kWideNoise, kClear)) << tangent;
+      const NeedlePose seen = needle.as_found(kWideNoise);
+      EXPECT_NEAR(seen.point().x, wide.tip, kTip_px) << side * tangent;
+      EXPECT_NEAR(seen.point().y, kAxis_y - side * kWideRadius, kAside_px) << side * tangent;
+    }
+  }
+}
+
+// It looks as if that wall went on there, but for the light before it.
+TEST(WideNeedle, does_not_go_on_to_a_speck_in_line_with_a_wall) {
+  constexpr double kTip_px = 2.5;
+  for (const double ahead_px : {5.0, 6.0, 7.0, 8.0}) {
+    for (const double side : {-1.0, 1.0}) {
+      InjectionPipette needle(Side::right, kWideRadius);
+      const Wide wide{.speck_px = -ahead_px, .side = side};
+      ASSERT_TRUE(needle.start(draw(wide), kWideNoise, kClear));
+      const NeedlePose seen = needle.as_found(kWideNoise);
+      EXPECT_NEAR(seen.tip.x, wide.tip, kTip_px) << ahead_px << ' ' << side;
+      EXPECT_EQ(seen.point_aside, 0) << ahead_px << ' ' << side;
+    }
+  }
+}
+
+// What light from one side makes of the faces of two walls.
+struct LineAlong {
+  double aside, grey;  // px from the axis, over the medium
+};
+
+std::optional<NeedlePose> widened(std::initializer_list<LineAlong> lines, double half_width) {
+  constexpr double kTip_x = 150, kBlur_px = 1.3;
+  cv::Mat m(kH, kW, CV_32F, cv::Scalar(150));
+  for (int y = 0; y < kH; ++y) {
+    for (int x = static_cast<int>(kTip_x); x < kW; ++x) {
+      for (const LineAlong& line : lines) {
+        const double z = (kAxis_y - y - line.aside) / kBlur_px;
+        m.at<float>(y, x) += static_cast<float>(line.grey * std::exp(-0.5 * z * z));
+      }
+    }
+  }
+  NeedlePose pose;
+  pose.tip = {kTip_x, kAxis_y};
+  pose.half_width = half_width;
+  return with_outer_line(photographed(m, 2100, kWideNoise), kWideNoise, pose);
+}
+
+TEST(WideNeedle, reaches_to_the_outermost_line_of_its_walls_in_relief) {
+  constexpr double kFace_px = 1.3, kAbout_px = 1.2;  // outside the middle of a line
+  for (const double sign : {-1.0, 1.0}) {
+    const auto one = widened({{-7, 25}, {-3.3, -18}, {sign * 0.1, 18}, {3.7, -40}}, 4.9);
+    ASSERT_TRUE(one);
+    EXPECT_NEAR(one->at(0, one->half_width).y, kAxis_y - 4.9, kAbout_px);
+    EXPECT_NEAR(one->at(0, -one->half_width).y, kAxis_y + 7 + kFace_px, kAbout_px);
+    const auto both = widened({{-6, -44 * sign}, {-2, 16 * sign}, {2, -18 * sign}, {6, 16 * sign}}, 3.5);
+    ASSERT_TRUE(both);
+    EXPECT_NEAR(both->at(0, both->half_width).y, kAxis_y - 6 - kFace_px, kAbout_px);
+    EXPECT_NEAR(both->at(0, -both->half_width).y, kAxis_y + 6 + kFace_px, kAbout_px);
+  }
+}
+
+// As in a real picture of a needle in an oocyte, in bright field, and with a line too faint to be a wall.
+TEST(WideNeedle, is_no_wider_for_a_fringe) {
+  EXPECT_FALSE(widened({{-3, -72}, {3, 60}, {7, -40}}, 4.5));
+  EXPECT_FALSE(widened({{-4, -40}, {4, -40}, {-7.5, 12}, {7.5, 12}}, 5));
+  EXPECT_FALSE(widened({{-3.3, -18}, {0, 18}, {3.7, -40}, {-7, 5}}, 4.9));
+  EXPECT_FALSE(widened({{-4, -40}, {4, -40}}, 5));
+}
+
 // As where light comes from one side: the strong wall alone looks like a thin needle.
 TEST(WideNeedle, lies_between_a_strong_wall_and_a_faint_one) {
   constexpr double kTip_px = 2.5, kAside_px = 1.5, kAxis_y_most = 0.03;

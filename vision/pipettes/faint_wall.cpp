@@ -186,11 +186,11 @@ std::optional<NeedlePose> with_outer_line(const GradientField& field, double noi
                                           const NeedlePose& needle) {
   constexpr int kFewest = 20;  // stations
   constexpr double kMost_px = 100;
-  constexpr int kOfWall_px = 3, kBeside_px = 8;  // from the outer face, inward and outward
+  constexpr int kOfWall_px = 3, kMedium_px = 8;  // from the outer face, inward and outward
   constexpr int kNear_px = 1, kFar_px = 5;       // beyond the face, where the line is looked for
   constexpr double kNoises = 6, kOfWalls = 0.2, kOneSided = 2, kOuter = 1.5;
   constexpr double kHalfOfLine_px = 1.8;
-  const double outside = kBeside_px + 1;
+  const double outside = kMedium_px + 1;
   int stations = 0;
   const auto station = [&](int i) { return kFrom_px + kApart_px * i; };
   for (; station(stations) <= kMost_px; ++stations) {
@@ -212,7 +212,7 @@ std::optional<NeedlePose> with_outer_line(const GradientField& field, double noi
     }
     return median_of(along);
   };
-  const double medium = 0.5 * (grey_at(-1, -kBeside_px) + grey_at(1, kBeside_px));
+  const double medium = 0.5 * (grey_at(-1, -kMedium_px) + grey_at(1, kMedium_px));
   double across = 0;  // grey levels over the medium
   for (double at = -0.9; at < 1; at += 0.2) {
     across += grey_at(at, 0) - medium;

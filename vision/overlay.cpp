@@ -98,8 +98,8 @@ void draw_needle(Canvas& canvas, const NeedlePose& n) {
   for (const double side : {-1.0, 1.0}) {
     canvas.line(n.at(0, side * n.half_width), n.at(80, side * n.half_width_at(80)), kYellow);
   }
-  canvas.line(n.tip + Point(0, -4), n.tip + Point(0, 4), kRed, 2);
-  canvas.line(n.tip + Point(-4, 0), n.tip + Point(4, 0), kRed, 2);
+  canvas.line(n.point() + Point(0, -4), n.point() + Point(0, 4), kRed, 2);
+  canvas.line(n.point() + Point(-4, 0), n.point() + Point(4, 0), kRed, 2);
 }
 
 void draw_membranes(Canvas& canvas, const Result& result) {

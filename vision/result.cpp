@@ -34,7 +34,7 @@ rt::Observation to_observation(const Result& r, const VisionConfig& config, int 
             (r.contact ? rt::Observation::contact : 0U) | (r.punctured ? rt::Observation::punctured : 0U) |
             (r.inner_punctured ? rt::Observation::inner_punctured : 0U);
   if (r.needle.ok) {
-    place(r.needle.tip, o.tip_m);
+    place(r.needle.point(), o.tip_m);
     o.axis[0] = r.needle.axis.x;
     o.axis[1] = r.needle.axis.y;
     o.axis[2] = 0;

@@ -174,7 +174,7 @@ void ObservationCsv::row(const vision::Result& r, const vision::VisionConfig& co
   row.flag(r.punctured);
   row.point(some(r.holder.ok, r.holder.mouth), offset);
   row.number(r.holder.ok || r.holder.score > 0 ? std::optional<double>(r.holder.score) : std::nullopt, 5);
-  row.point(some(r.needle.ok, r.needle.tip), offset);
+  row.point(some(r.needle.ok, r.needle.point()), offset);
   row.flag(r.outer.ok);
   row.flag(r.inner.ok);
   row.number(r.wd_px, 4, um);

@@ -135,12 +135,8 @@ class CutModel {
            double ahead);
   [[nodiscard]] bool stands_out() const noexcept { return clear_; }
   // Log likelihood over no needle, twice.
-  [[nodiscard]] double gain(const CutEnd& end) const {
-    const Sums<3> of_needle = sums(end);
-    return likelier(of_needle);
-  }
-  // The same with a speck, as dark or bright as it fits best, in line with the wall at that side: the most
-  // that one within reach of the end explains.
+  [[nodiscard]] double gain(const CutEnd& end) const { return likelier(sums(end)); }
+  // The most that a needle and a speck before it explain, in line with the wall at that side.
   [[nodiscard]] double gain_with_speck(const CutEnd& end, double side) const;
   // What specks and granules leave of the picture, over what the noise alone would, at least 1.
   [[nodiscard]] double misfit(double gain) const {
@@ -179,6 +175,10 @@ class CutModel {
   template <class Each>
   void for_lanes(const Seen& row, const Ends& ends, Each each) const;
   [[nodiscard]] Sums<3> sums(const CutEnd& end) const;
+  struct Speck {
+    double at, aside, radius_px;  // behind the tip of the pose and beside its axis, px
+  };
+  [[nodiscard]] Sums<4> with_speck(const Sums<3>& of_needle, const Ends& ends, const Speck& speck) const;
   template <int N>
   [[nodiscard]] double likelier(Sums<N> sums) const;
   [[nodiscard]] double lane_at(std::size_t lane, double half_width) const;
@@ -471,56 +471,60 @@ double CutModel::likelier(Sums<N> of) const {
   return more + 2 * math::log(0.5 * (1 + math::exp(-0.5 * std::abs(open - closed))));
 }
 
+// As dark or bright as it fits best.
+CutModel::Sums<4> CutModel::with_speck(const Sums<3>& of_needle, const Ends& ends, const Speck& speck) const {
+  Sums<4> of{cv::Matx44d::eye(), {}};
+  for (int i = 0; i < 3; ++i) {
+    of.g[i] = of_needle.g[i];
+    for (int j = 0; j < 3; ++j) {
+      of.a(i, j) = of_needle.a(i, j);
+    }
+  }
+  for (const Seen& row : rows_) {
+    if (std::abs(row.s - speck.at) > 3 * speck.radius_px) {
+      continue;
+    }
+    double x0 = 0, x1 = 0, l0 = 0, l1 = 0, b0 = 0, b1 = 0, xb = 0, lb = 0, bb = 0, by = 0;
+    const double along = kBump((row.s - speck.at) / speck.radius_px);
+    for_lanes(row, ends, [&](std::size_t i, double u, const Shown& shown) {
+      const double w = row.weight[i], tilt = u - row.middle, x = shown.walls, l = shown.line,
+                   b = along * kBump((u - speck.aside) / speck.radius_px);
+      x0 += w * x;
+      x1 += w * tilt * x;
+      l0 += w * l;
+      l1 += w * tilt * l;
+      b0 += w * b;
+      b1 += w * tilt * b;
+      xb += w * x * b;
+      lb += w * l * b;
+      bb += w * b * b;
+      by += b * row.grey[i];
+    });
+    xb -= x0 * b0 / row.weights + x1 * b1 / row.tilts;
+    lb -= l0 * b0 / row.weights + l1 * b1 / row.tilts;
+    bb -= b0 * b0 / row.weights + b1 * b1 / row.tilts;
+    of.a(0, 3) += xb;
+    of.a(1, 3) += std::max(0.0, row.s - ends.end.at) * xb;
+    of.a(2, 3) += lb;
+    of.a(3, 3) += bb;
+    of.g[3] += by;
+  }
+  for (int i = 0; i < 3; ++i) {
+    of.a(3, i) = of.a(i, 3);
+  }
+  return of;
+}
+
 double CutModel::gain_with_speck(const CutEnd& end, double side) const {
-  constexpr int kReach_px = 14, kOffLine_px = 1;
+  constexpr double kReach_px = 14, kOffLine_px = 1;
   const Ends ends = ends_at(end);
   const Sums<3> of_needle = sums(end);
   double most = likelier(of_needle);
   for (const double radius_px : {blur_, 1.5 * blur_}) {
-    for (int aside = -kOffLine_px; aside <= kOffLine_px; ++aside) {
-      for (int ahead = 0; ahead <= kReach_px; ++ahead) {
-        const double s = end.at - ahead, u = std::copysign(middle_ + aside, side);
-        Sums<4> of{cv::Matx44d::eye(), {}};
-        for (int i = 0; i < 3; ++i) {
-          of.g[i] = of_needle.g[i];
-          for (int j = 0; j < 3; ++j) {
-            of.a(i, j) = of_needle.a(i, j);
-          }
-        }
-        for (const Seen& row : rows_) {
-          if (std::abs(row.s - s) > 3 * radius_px) {
-            continue;
-          }
-          double x0 = 0, x1 = 0, l0 = 0, l1 = 0, b0 = 0, b1 = 0, xb = 0, lb = 0, bb = 0, by = 0;
-          const double along = kBump((row.s - s) / radius_px);
-          for_lanes(row, ends, [&](std::size_t i, double lane, const Shown& shown) {
-            const double w = row.weight[i], tilt = lane - row.middle, x = shown.walls, l = shown.line,
-                         b = along * kBump((lane - u) / radius_px);
-            x0 += w * x;
-            x1 += w * tilt * x;
-            l0 += w * l;
-            l1 += w * tilt * l;
-            b0 += w * b;
-            b1 += w * tilt * b;
-            xb += w * x * b;
-            lb += w * l * b;
-            bb += w * b * b;
-            by += b * row.grey[i];
-          });
-          xb -= x0 * b0 / row.weights + x1 * b1 / row.tilts;
-          lb -= l0 * b0 / row.weights + l1 * b1 / row.tilts;
-          bb -= b0 * b0 / row.weights + b1 * b1 / row.tilts;
-          const double from_end = std::max(0.0, row.s - end.at);
-          of.a(0, 3) += xb;
-          of.a(1, 3) += from_end * xb;
-          of.a(2, 3) += lb;
-          of.a(3, 3) += bb;
-          of.g[3] += by;
-        }
-        for (int i = 0; i < 3; ++i) {
-          of.a(3, i) = of.a(i, 3);
-        }
-        most = std::max(most, likelier(of));
+    for (double off = -kOffLine_px; off <= kOffLine_px; off += 1) {
+      for (double ahead = 0; ahead <= kReach_px; ahead += 1) {
+        const Speck speck{end.at - ahead, std::copysign(middle_ + off, side), radius_px};
+        most = std::max(most, likelier(with_speck(of_needle, ends, speck)));
       }
     }
   }

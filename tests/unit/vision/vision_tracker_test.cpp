@@ -890,6 +890,20 @@ TEST(Tracker, accepts_rows_with_padding_between_them) {
   EXPECT_EQ(x.outer.contour, y.outer.contour);
 }
 
+// The core guides it to the cell, and measures from it how far that is.
+TEST(ToObservation, has_the_point_of_a_needle_that_is_ground_sharp) {
+  Result r;
+  r.needle.ok = true;
+  r.needle.tip = {319.5, 199.5};
+  r.needle.axis = {-1, 0};
+  r.needle.point_aside = 5;
+  VisionConfig config;
+  config.pixel_m = 1e-6;
+  const rt::Observation o = to_observation(r, config, 640, 400);
+  EXPECT_NEAR(o.tip_m[0], 0, 1e-15);
+  EXPECT_NEAR(o.tip_m[1], -5e-6, 1e-15);
+}
+
 TEST(ToObservation, is_in_metres_from_the_middle_of_the_picture) {
   VisionConfig config;
   config.pixel_m = 1e-6;

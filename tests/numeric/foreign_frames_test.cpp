@@ -381,7 +381,8 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
 // outer membrane, 16 px off, since its zona lies eccentrically; in 101 and 129 the tip was once told 2 and 8
 // px too far back, and so was contact, eleven frames late in 129: of four lines three were taken for the
 // needle, and its cut, hardly steeper than usual, for a right angle. In 103 the dimple's flank is somewhere 4
-// px too deep in two frames.
+// px too deep in two frames. In 106 the dimple was once blunt and on the needle's axis, in the sheets 10 it
+// was drawn to a tip that is seen 4 px too far ahead.
 INSTANTIATE_TEST_SUITE_P(
     Seeds, ReliefFrames,
     testing::Values(Relief{101, Light::hoffman, 0.6, 0.35, 0.7},

@@ -425,7 +425,7 @@ std::optional<NeedlePose> widened(std::initializer_list<LineAlong> lines, double
 TEST(WideNeedle, reaches_to_the_outermost_line_of_its_walls_in_relief) {
   constexpr double kFace_px = 1.3, kAbout_px = 1.2;  // outside the middle of a line
   for (const double sign : {-1.0, 1.0}) {
-    const auto one = widened({{-7, 25}, {-3.3, -18}, {sign * 0.1, 18}, {3.7, -40}}, 4.9);
+    const auto one = widened({{-7, 25 * sign}, {-3.3, -18 * sign}, {0, 18 * sign}, {3.7, -40 * sign}}, 4.9);
     ASSERT_TRUE(one);
     EXPECT_NEAR(one->at(0, one->half_width).y, kAxis_y - 4.9, kAbout_px);
     EXPECT_NEAR(one->at(0, -one->half_width).y, kAxis_y + 7 + kFace_px, kAbout_px);

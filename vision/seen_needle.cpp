@@ -154,6 +154,9 @@ NeedlePose SeenNeedle::locate(const ClearedPicture& picture, const FollowedMembr
 
 void SeenNeedle::put_right_by_membrane(const ClearedPicture& picture, const FollowedMembrane& outer,
                                        NeedlePose& n) {
+  if (n.point_aside != 0) {  // on a sharp point it lies at one wall, and not across the lumen
+    return;
+  }
   const auto on = tip_on_membrane_.ahead(picture.field, picture.noise, outer.edge, n);
   if (on) {
     n.tip += on->ahead * n.axis;

@@ -278,7 +278,7 @@ enum class Light { hoffman, dic, sheets };
 struct Relief {
   int seed;
   Light light;
-  double outer_um, inner_um, tip_px;  // rms at most, before contact
+  double outer_um, inner_um, tip_px;  // rms at most, before contact; of the tip in contact, too
   int astray = 0;                     // frames in contact whose outer membrane is somewhere off by 4 px
   int early = 3;                      // frames at most, of contact
   int dented = 0;                     // frames at least in contact whose outer membrane is right
@@ -311,7 +311,7 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
   config.pixel_m = kPixel_um * 1e-6;
   std::optional<Tracker> tracker;
   std::map<std::string, Score> outer, inner;
-  std::vector<double> tip_px;
+  std::map<std::string, std::vector<double>> tip_px;
   Events begun, told;
   for (int k = 0; k < static_cast<int>(truth.size()); ++k) {
     const cv::Mat picture = drawn(folder, k);
@@ -325,8 +325,8 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
     outer[phase].add(contour_of(t["outer"]), seen.outer);
     inner[phase].add(contour_of(t["inner"]), seen.inner);
     const Point tip(t["tip"][0].get<double>(), t["tip"][1].get<double>());
-    if (phase == "approach" && seen.needle.ok) {
-      tip_px.push_back((seen.needle.tip - tip).dot(seen.needle.axis));
+    if (seen.needle.ok) {
+      tip_px[phase].push_back((seen.needle.tip - tip).dot(seen.needle.axis));
     }
     for (const char* event : {"contact", "puncture"}) {
       mark(begun, event, phase == event, k);
@@ -350,7 +350,9 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
   for (const Score& score : {outer_before, inner_before}) {
     EXPECT_GT(score.within_two / score.nodes, 0.82);
   }
-  expect_near_truth("tip", tip_px, GetParam().tip_px);
+  for (const char* phase : {"approach", "contact"}) {
+    expect_near_truth("tip", tip_px[phase], GetParam().tip_px);
+  }
   const int contact = late(begun["contact"], told["contact"]),
             puncture = late(begun["puncture"], told["puncture"]);
   std::printf("contact %+d frames late, puncture %+d\n", contact, puncture);
@@ -373,7 +375,7 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
 }
 
 // In 106 the needle's tip was once told 6 px too far back, in 2 of DIC 7 px; in 104 it was once seen inside
-// the cell long before it was there, and contact is told five frames early. Of 106 the light comes along the
+// the cell long before it was there, and contact told five frames early. Of 106 the light comes along the
 // needle. Into the mouth of the holding pipette the membrane bulges unseen. In 103 and in the
 // sheets 104 the puncture was once told six and seven frames before it happens, for a dimple hardly shows
 // where the light comes along the needle, and in 104 the membrane was drawn to a tip that is seen 2 px too
@@ -382,16 +384,17 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
 // px too far back, and so was contact, eleven frames late in 129: of four lines three were taken for the
 // needle, and its cut, hardly steeper than usual, for a right angle. In 103 the dimple's flank is somewhere 4
 // px too deep in two frames. In 106 the dimple was once blunt and on the needle's axis, in the sheets 10 it
-// was drawn to a tip that is seen 4 px too far ahead.
+// was drawn to a tip that is seen 4 px too far ahead. In 158 the membrane once drew the tip back by 4 px. In
+// 112 the needle's taper is not seen.
 INSTANTIATE_TEST_SUITE_P(
     Seeds, ReliefFrames,
-    testing::Values(Relief{101, Light::hoffman, 0.6, 0.35, 0.7},
-                    Relief{106, Light::hoffman, 0.55, 0.45, 2, 0, 3, 5},
-                    Relief{103, Light::hoffman, 0.6, 0.4, 0.9, 2}, Relief{112, Light::hoffman, 0.6, 0.4, 0.9},
-                    Relief{129, Light::hoffman, 0.8, 0.4, 0.9},
-                    Relief{104, Light::hoffman, 0.6, 0.4, 5, 0, 6}, Relief{2, Light::dic, 0.7, 0.45, 0.5},
-                    Relief{4, Light::sheets, 0.35, 0.4, 2}, Relief{10, Light::sheets, 0.4, 0.5, 4.5, 3},
-                    Relief{104, Light::sheets, 0.35, 0.4, 3}),
+    testing::Values(Relief{101, Light::hoffman, 0.6, 0.35, 0.5},
+                    Relief{106, Light::hoffman, 0.55, 0.45, 2.2, 0, 3, 5},
+                    Relief{103, Light::hoffman, 0.6, 0.4, 0.6, 2}, Relief{112, Light::hoffman, 0.6, 0.4, 1.6},
+                    Relief{129, Light::hoffman, 0.8, 0.4, 0.6}, Relief{158, Light::hoffman, 0.6, 0.4, 0.6},
+                    Relief{104, Light::hoffman, 0.6, 0.4, 2.2}, Relief{2, Light::dic, 0.7, 0.45, 0.35},
+                    Relief{4, Light::sheets, 0.35, 0.4, 2.6}, Relief{10, Light::sheets, 0.4, 0.5, 2.4, 3},
+                    Relief{104, Light::sheets, 0.35, 0.4, 1.6}),
     [](const auto& of) {
       return (of.param.light == Light::hoffman ? "hoffman_"
               : of.param.light == Light::dic   ? "dic_"

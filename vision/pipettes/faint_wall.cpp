@@ -188,7 +188,7 @@ std::optional<NeedlePose> with_outer_line(const GradientField& field, double noi
   constexpr double kMost_px = 100;
   constexpr int kOfWall_px = 3, kMedium_px = 8;  // from the outer face, inward and outward
   constexpr int kNear_px = 1, kFar_px = 5;       // beyond the face, where the line is looked for
-  constexpr double kNoises = 6, kOfWalls = 0.2, kOneSided = 2, kOuter = 1.5;
+  constexpr double kNoises = 6, kOfWalls = 0.08, kOneSided = 2, kOuter = 1.5;
   constexpr double kHalfOfLine_px = 1.8;
   const double outside = kMedium_px + 1;
   int stations = 0;

@@ -59,9 +59,13 @@ double sd_of(const CutGlass& cut, double half_width) {
   return math::hypot(cut.end.sd, cut.bevel.sd * outer_radius_of_glass(half_width, cut.end.blur));
 }
 
+double radius_at_end(const Bevel& bevel, const NeedlePose& needle, double blur_px) {
+  return bevel.radius > 0 ? bevel.radius : outer_radius_of_glass(needle.half_width, blur_px);
+}
+
 // By which the outermost glass lies ahead of the middle of the end, px.
 double ahead_of_middle(const Bevel& bevel, const NeedlePose& needle, double blur_px) {
-  return std::abs(bevel.tangent) * outer_radius_of_glass(needle.half_width, blur_px);
+  return std::abs(bevel.tangent) * radius_at_end(bevel, needle, blur_px);
 }
 
 // Of its end, what lies beside it, and so much of its shaft.
@@ -373,7 +377,7 @@ void InjectionPipette::weigh_end(const GradientField& field, double noise, Needl
   constexpr double kReach_px = 6;
   NeedlePose middle = needle;
   middle.tip -= ahead_of_middle(bevel_, needle, glass_blur_) * needle.axis;
-  if (const auto end = end_of_known_cut(field, noise, middle, bevel_.tangent, glass_blur_, kReach_px)) {
+  if (const auto end = end_of_known_cut(field, noise, middle, bevel_, glass_blur_, kReach_px)) {
     needle.tip += end->ahead * needle.axis;
     needle.sd = std::max(needle.sd, math::hypot(end->sd, needle.constant_sd));
   }
@@ -381,22 +385,26 @@ void InjectionPipette::weigh_end(const GradientField& field, double noise, Needl
 
 NeedlePose InjectionPipette::as_found(double noise) const { return told(last_, noise); }
 
+bool InjectionPipette::ends_apart() const noexcept {
+  return bevel_.radius > 0 || std::abs(bevel_.tangent) > kSteep;
+}
+
 NeedlePose InjectionPipette::told(NeedlePose needle, double noise) const {
   needle.tip += glass_ahead_ * needle.axis;
-  const bool sharp = std::abs(bevel_.tangent) > kSteep;
   needle.point_aside =
-      sharp ? std::copysign(outer_radius_of_glass(last_.half_width, glass_blur_), -bevel_.tangent) : 0;
+      ends_apart() ? std::copysign(radius_at_end(bevel_, last_, glass_blur_), -bevel_.tangent) : 0;
   // Of a needle whose lumen is not seen only the walls tell the end at first, and its cut is not seen.
   constexpr double kWalls_px = 0.5, kBeyondWalls_px = 0.8, kUnseenCut_px = 0.4;
   const bool by_walls = !lumen_ && glass_frames_ == 0;
   needle.constant_sd = by_walls ? kBeyondWalls_px
-                       : lumen_ ? bevel_.sd * outer_radius_of_glass(last_.half_width, glass_blur_)
+                       : lumen_ ? bevel_.sd * radius_at_end(bevel_, last_, glass_blur_)
                                 : kUnseenCut_px;
   // It is learnt in focus. Out of it the end seems to lie further back; beyond the blurs that are tried, as
   // far as its contrast lasts.
   constexpr double kBeyondBlurs_px = 6;
   const double unsharp = NeedleShape::beyond_blurs(view_) ? kBeyondBlurs_px : NeedleShape::blur_px(view_);
-  needle.sd = math::hypot(math::hypot(by_walls ? kWalls_px : tip_sd(noise), needle.constant_sd), unsharp);
+  needle.sd = math::hypot(
+      math::hypot(by_walls ? kWalls_px : std::max(tip_sd(noise), cut_sd_), needle.constant_sd), unsharp);
   return needle;
 }
 
@@ -558,13 +566,24 @@ bool InjectionPipette::find_end(const GradientField& field, double noise, Needle
   // Its width is known: other lines beside the walls are not them.
   constexpr double kWidth_px = 1;
   const auto fit_to_walls = [&] {
+    const NeedlePose before = needle;
     (void)fit_walls(field, noise, radius_px_, needle, longest_);
     if (std::abs(needle.half_width - last_.half_width) > kWidth_px) {
+      if (bevel_.radius > 0) {  // in relief their middle is then not the needle's either
+        needle = before;
+      }
       needle.half_width = last_.half_width;
       needle.taper = last_.taper;
     }
   };
   fit_to_walls();
+  cut_sd_ = 0;
+  if (bevel_.radius > 0 && go_to_known_cut(field, noise, needle)) {
+    near = true;
+    shape_origin_ = needle.tip - shape_offset_ * needle.axis;
+    walls_agree_ = false;
+    return true;
+  }
   needle.tip -= shape_offset_ * needle.axis;
   // First near where the motion predicts it: what lies further ahead cannot be mistaken for it then.
   std::optional<NeedleShape::End> end;
@@ -595,6 +614,20 @@ bool InjectionPipette::find_end(const GradientField& field, double noise, Needle
   if (walls_agree_) {
     needle.tip += *ahead * needle.axis;
   }
+  return true;
+}
+
+// In relief an oblique end tells its place better than its shape does. False where it is not near.
+bool InjectionPipette::go_to_known_cut(const GradientField& field, double noise, NeedlePose& needle) {
+  constexpr double kReach_px = 10, kEdge_px = 2.5;
+  NeedlePose middle = needle;
+  middle.tip += (glass_ahead_ - ahead_of_middle(bevel_, needle, glass_blur_)) * needle.axis;
+  const auto end = end_of_known_cut(field, noise, middle, bevel_, glass_blur_, kReach_px);
+  if (!end || end->sd > kDoubtMax_px || std::abs(end->ahead) > kReach_px - kEdge_px) {
+    return false;
+  }
+  needle.tip += end->ahead * needle.axis;
+  cut_sd_ = end->sd;
   return true;
 }
 
@@ -637,13 +670,13 @@ void InjectionPipette::learn_glass(const GradientField& field, double noise, con
   if (glass_frames_ >= kFrames) {
     return;
   }
-  const bool steep = walls_tell_ && std::abs(bevel_.tangent) > kSteep;
+  const bool steep = walls_tell_ && ends_apart();
   const double behind = ahead_of_middle(bevel_, followed, glass_blur_);
   NeedlePose middle = followed;  // of its end, as far as it is known
   middle.tip += (glass_ahead_ - behind) * followed.axis;
   std::optional<GlassEnd> end;
   if (steep) {
-    end = end_of_known_cut(field, noise, middle, bevel_.tangent, glass_blur_, kGlassReach_px);
+    end = end_of_known_cut(field, noise, middle, bevel_, glass_blur_, kGlassReach_px);
   } else if (walls_tell_) {
     end = end_of_glass(field, noise, middle, bevel_.tangent, kGlassReach_px, kGlassReach_px);
   } else if (const auto cut = cut_seen(field, noise, middle)) {
@@ -686,7 +719,7 @@ void InjectionPipette::learn(const GradientField& field, const NeedlePose& needl
   }
   NeedlePose followed = needle;
   followed.tip -= glass_ahead_ * needle.axis;
-  if (alone || !walls_tell_) {
+  if ((alone || !walls_tell_) && cut_sd_ == 0) {
     learn_glass(field, noise, followed);
   }
   if (!alone) {

@@ -97,6 +97,7 @@ class InjectionPipette {
   // Along the needle its shaft looks the same everywhere, so there its end tells its place.
   // `near`: it was found near where the motion predicts it.
   [[nodiscard]] bool find_end(const GradientField& field, double noise, NeedlePose& needle, bool& near);
+  [[nodiscard]] bool go_to_known_cut(const GradientField& field, double noise, NeedlePose& needle);
   void calibrate_walls(const GradientField& field, const NeedlePose& walls, double noise);
   void learn_shape_anew(const GradientField& field);
   [[nodiscard]] static std::optional<CutGlass> cut_seen(const GradientField& field, double noise,
@@ -106,6 +107,8 @@ class InjectionPipette {
   void learn_glass(const GlassEnd& end);
   void learn_thin_end(const GradientField& field, double noise, const NeedlePose& followed);
   [[nodiscard]] double tip_sd(double noise) const;
+  // The two walls, along the needle.
+  [[nodiscard]] bool ends_apart() const noexcept;
   // The end that is followed, as the outermost glass.
   [[nodiscard]] NeedlePose told(NeedlePose needle, double noise) const;
   [[nodiscard]] NeedlePose follow(const GradientField& field, double noise);
@@ -145,6 +148,7 @@ class InjectionPipette {
   bool followed_ = false;     // since it was found
   double glass_scatter_ = 0;  // variance of where the end that is followed seems to be from it, px^2
   double glass_blur_ = 0;     // px
+  double cut_sd_ = 0;         // of the end in the last frame, where its cut told it, px
   ThinEnd thin_end_;          // tells the same of a needle whose lumen is not seen
   double step_sign_ = 0;      // +1: it is brighter ahead of the walls, -1: darker, 0: not known yet
   bool walls_tell_ = true;    // where it ends, more finely than the shape does: in focus

@@ -32,6 +32,15 @@ constexpr double kSteepestCut = 0.95;
 // walls do.
 constexpr double kSharpestCut = 2.8, kClearlySharp = 0.02, kClearlyCut = 0.025;
 constexpr double kSteepestFrom = 0.1;  // of the steepest: it may be steeper still
+// In relief a line along the shaft is the slope of the light's path through a face of the glass. That slope
+// is steepest at the face and goes on inwards: in the mean it lies so far from the axis, of the outer radius,
+// by integrating over a tube with a usual bore. So far out the wall of an oblique cut ends.
+constexpr double kOuterFace = 0.88, kInnerFace = 0.51;
+constexpr double kLens_px = 1.2;  // blur of a lens in focus
+constexpr double kLit = 0.02;  // the picture is explained better by so much where light comes from one side
+constexpr double kUnequalWalls = 2;  // the strength of one over the other, from where on it is relief
+constexpr double kCutOverWalls = 2;  // a cut that faces the light is up to so much brighter or darker
+constexpr double kOblique = 0.5;     // cut: of a blunter end in relief the walls tell the radius
 using GlassRow = std::array<double, kAllLanes>;
 
 // A table of a function of the distance in blurs.
@@ -131,9 +140,12 @@ struct Moments {
 // beside the needle: were it not known out of focus, where the walls merge, the end would be half as certain.
 class CutModel {
  public:
+  // radius: outer, of a glass in relief, px; 0: not in relief.
   CutModel(const GradientField& field, const NeedlePose& needle, double noise, double blur_px, double back,
-           double ahead);
+           double ahead, double radius = 0);
   [[nodiscard]] bool stands_out() const noexcept { return clear_; }
+  // As light that comes from one side makes them.
+  [[nodiscard]] bool walls_differ() const noexcept { return walls_differ_; }
   // Log likelihood over no needle, twice.
   [[nodiscard]] double gain(const CutEnd& end) const { return likelier(sums(end)); }
   // The most that a needle and a speck before it explain, in line with the wall at that side.
@@ -189,12 +201,16 @@ class CutModel {
   void tell_how_even_it_is();
   void take_off_mean_and_slope(Seen& row) const;
   void expect_walls(Seen& row) const;
+  void show_in_relief(double radius, double strength);
   double half_width_, blur_, smooth_noise_, unit_;
   double square_ = 0, area_px2_ = 0;  // of what is seen, grey levels squared
   bool clear_ = false;
   Vector<Seen> rows_;
   GlassRow walls_{}, near_{}, line_{};  // of the shaft; the share of the nearer one; of a line across
   double middle_, line_behind_;         // of a wall, from the axis; of the line, behind the end
+  bool walls_differ_ = false, in_relief_ = false;
+  double radius_ = 0;  // in relief: outer, of the glass, px; and the place of the line that is seen in a lane
+  GlassRow face_{};
 };
 
 double CutModel::lane_at(std::size_t lane, double half_width) const {
@@ -209,7 +225,7 @@ double CutModel::lane_width(std::size_t lane, double half_width) const {
 }
 
 CutModel::CutModel(const GradientField& field, const NeedlePose& needle, double noise, double blur_px,
-                   double back, double ahead)
+                   double back, double ahead, double radius)
     : half_width_(needle.half_width),
       blur_(blur_px),
       smooth_noise_(std::max(noise, 0.3) / (2 * field.sigma * std::sqrt(std::numbers::pi))),
@@ -251,7 +267,7 @@ CutModel::CutModel(const GradientField& field, const NeedlePose& needle, double 
   if (shaft[0].size() < kFewest) {
     return;
   }
-  double square = 0, most = 0, of_wall = 0, squares = 0;
+  double square = 0, most = 0, of_wall = 0, of_low = 0, squares = 0;
   for (std::size_t i = 0; i < kAllLanes; ++i) {
     walls_[i] = median_of(shaft[i]);
     square += walls_[i] * walls_[i] / kAllLanes;
@@ -261,10 +277,18 @@ CutModel::CutModel(const GradientField& field, const NeedlePose& needle, double 
     near_[i] = near / std::max(near + far, 1e-9);
     line_[i] = kStep((lumen - u) / blur_) - kStep((-lumen - u) / blur_);
     of_wall += walls_[i] * (near + far);
+    of_low = i < kOneSide ? of_wall : of_low;
     squares += (near + far) * (near + far);
   }
   for (double& l : line_) {
     l *= of_wall / squares;
+  }
+  const double of_high = of_wall - of_low, weaker = std::min(std::abs(of_low), std::abs(of_high)),
+               stronger = std::max(std::abs(of_low), std::abs(of_high));
+  walls_differ_ = of_low * of_high < 0 || stronger > kUnequalWalls * weaker;
+  if (radius > 0) {
+    show_in_relief(radius,
+                   std::copysign(std::sqrt(2 * (of_low * of_low + of_high * of_high)) / squares, of_wall));
   }
   clear_ = square > kLeast_grey * kLeast_grey && square > kMost_noises * kMost_noises * noise * noise;
   for (Seen& row : rows_) {
@@ -283,6 +307,19 @@ CutModel::CutModel(const GradientField& field, const NeedlePose& needle, double 
   }
 }
 
+// All of the cut is a line then: as bright or dark as the light's path rises there, from none to the glass.
+// strength: of the walls, grey levels.
+void CutModel::show_in_relief(double radius, double strength) {
+  in_relief_ = true;
+  radius_ = radius;
+  line_behind_ = 0;
+  for (std::size_t i = 0; i < kAllLanes; ++i) {
+    const double u = lane_at(i, half_width_);
+    face_[i] = std::copysign(std::clamp(std::abs(u), kInnerFace * radius, kOuterFace * radius), u);
+    line_[i] = strength * (kStep((radius - u) / blur_) - kStep((-radius - u) / blur_));
+  }
+}
+
 void CutModel::expect_walls(Seen& row) const {
   double x0 = 0, x1 = 0;
   for (std::size_t i = 0; i < kAllLanes; ++i) {
@@ -298,7 +335,8 @@ void CutModel::expect_walls(Seen& row) const {
 // What is neither the walls nor clear is a speck, wherever the needle ends. most: of the walls, grey levels.
 void CutModel::weigh_without_specks(Seen& row, double most) const {
   constexpr double kNoises = 4, kOfWalls = 0.3, kOfSpeck = 1e-3;
-  const double tolerance = kNoises * smooth_noise_ + kOfWalls * most;
+  const double tolerance = kNoises * smooth_noise_ + kOfWalls * most,
+               of_cut = in_relief_ ? kCutOverWalls * most : 0;
   Vector<double> clear;  // beside the walls and between them
   for (std::size_t i = 0; i < kAllLanes; ++i) {
     if (i % kOneSide >= kWithin || i % kOneSide < kLumenLanes) {
@@ -309,7 +347,7 @@ void CutModel::weigh_without_specks(Seen& row, double most) const {
   for (std::size_t i = 0; i < kAllLanes; ++i) {
     const double grey = row.grey[i] - level;
     const bool speck =
-        grey < std::min(walls_[i], 0.0) - tolerance || grey > std::max(walls_[i], 0.0) + tolerance;
+        grey < std::min(walls_[i], -of_cut) - tolerance || grey > std::max(walls_[i], of_cut) + tolerance;
     row.weight[i] = (speck ? kOfSpeck : 1) * lane_width(i, row.half_width);
   }
 }
@@ -391,7 +429,8 @@ void CutModel::take_off_mean_and_slope(Seen& row) const {
 }
 
 CutModel::Ends CutModel::ends_at(const CutEnd& end) const {
-  const double cut_px = end.tangent * middle_, of_line_px = blur_ * std::sqrt(1 + end.tangent * end.tangent);
+  const double cut_px = end.tangent * (in_relief_ ? radius_ : middle_),
+               of_line_px = blur_ * std::sqrt(1 + end.tangent * end.tangent);
   return {end, cut_px, of_line_px, std::abs(cut_px) + OfBlurs::kFar * of_line_px};
 }
 
@@ -402,8 +441,10 @@ void CutModel::for_lanes(const Seen& row, const Ends& ends, Each each) const {
   for (std::size_t i = 0; i < kAllLanes; ++i) {
     const double u = lane_at(i, row.half_width);
     const double near = i < kOneSide ? low : high, far = i < kOneSide ? high : low;
+    const double begun =
+        in_relief_ ? kStep((along - ends.end.tangent * face_[i]) / blur_) : far + near_[i] * (near - far);
     each(i, u,
-         Shown{walls_[i] * (far + near_[i] * (near - far)),
+         Shown{walls_[i] * begun,
                line_[i] * kBump((along - ends.end.tangent * u - line_behind_) / ends.of_line_px)});
   }
 }
@@ -635,13 +676,84 @@ CutGlass mean_of(const CutModel& model, const EndsAndCuts& tried, double blur_px
     tangents.add(weight, end.tangent);
     of_cut.add(weight, place);
     if (i + 1 == ends.size() || ends[i + 1].end.tangent != end.tangent) {
-      where_cut_is_known += of_cut.weight * of_cut.variance();
+      where_cut_is_known += of_cut.weight > 0 ? of_cut.weight * of_cut.variance() : 0;
       of_cut = {};
     }
   }
   const double with_cut = outermost.variance() - tangents.variance() * radius * radius;
   return {{outermost.mean(), std::sqrt(std::max(with_cut, where_cut_is_known / outermost.weight)), blur_px},
           {tangents.mean(), std::sqrt(tangents.variance())}};
+}
+
+// The likeliest end `ahead` px ahead of the tip of the pose to `back` px behind it, of usual cuts and of
+// sharp ones.
+struct Coarsely {
+  Coarsely(const CutModel& model, double back_px, double ahead_px)
+      : back(back_px),
+        ahead(ahead_px),
+        usual(likeliest_end(model, back, ahead, std::array{-0.6, -0.3, 0.0, 0.3, 0.6})),
+        sharp(likeliest_end(model, back, ahead, std::array{-2.4, -2.0, -1.6, -1.2, 1.2, 1.6, 2.0, 2.4})),
+        gain(std::max(model.gain(usual), model.gain(sharp))),
+        is_sharp(gain > (1 + kClearlySharp) * model.gain(usual)) {}
+  double back, ahead;
+  CutEnd usual, sharp;
+  double gain;
+  bool is_sharp;
+};
+
+// radius: outer, of the glass, px.
+std::optional<CutGlass> cut_by(const CutModel& model, const Coarsely& coarsely, double blur_px,
+                               double radius) {
+  CutEnd best = coarsely.usual;
+  // Ends far from the best one may be as likely: in noise the likelihood falls off in straight lines, not as
+  // a parabola. Where they are not, it is sharp.
+  constexpr double kBeyond_px = 2, kSharp_px2 = 0.1,
+                   kReach_px = 1;  // of the range; variance; round the best end
+  constexpr double kReachOfCut = 0.16;
+  const EndsAndCuts usual{
+      -coarsely.ahead - kBeyond_px, coarsely.back + kBeyond_px, 0.5, -kSteepestCut, kSteepestCut, 0.1};
+  EndsAndCuts tried = usual;
+  const auto try_sharp = [&](const CutEnd& likely) {
+    const bool up = likely.tangent > 0;  // a needle that is cut the other way explains it far worse
+    tried = {usual.from, usual.to, 0.5, up ? 0 : -kSharpestCut, up ? kSharpestCut : 0, 0.2};
+    best = likely;
+  };
+  if (coarsely.is_sharp) {
+    best = likeliest_near(model, best, usual);
+    if (coarsely.gain > (1 + kClearlySharp) * model.gain(best)) {
+      try_sharp(coarsely.sharp);
+    }
+  }
+  constexpr double kEdge_px = 1.5;  // of the range
+  if (best.at < -coarsely.ahead + kEdge_px || best.at > coarsely.back - kEdge_px) {
+    return CutGlass{{std::abs(best.tangent) * radius - best.at, coarsely.back + coarsely.ahead, blur_px},
+                    {best.tangent, 0}};
+  }
+  CutGlass found = mean_of(model, tried, blur_px, radius, best);
+  const auto is_steeper = [&] {
+    return std::abs(best.tangent) > std::max(tried.cut_to, -tried.cut_from) - kSteepestFrom &&
+           gets_likelier_beyond(model, best);
+  };
+  // A cut that is hardly steeper than usual explains the picture hardly better than a usual one, but better
+  // than a right angle, with a speck before it or without.
+  if (tried.cut_from == usual.cut_from && is_steeper()) {
+    try_sharp(best);
+    best = likeliest_near(model, best, tried);
+    if (!is_clearly_cut(model, best, likeliest_end(model, coarsely.back, coarsely.ahead, std::array{0.0}))) {
+      return std::nullopt;
+    }
+    found = mean_of(model, tried, blur_px, radius, best);
+  }
+  if (is_steeper()) {
+    return std::nullopt;
+  }
+  if (const double of_cut = found.bevel.sd * radius;
+      found.end.sd * found.end.sd + of_cut * of_cut < kSharp_px2) {
+    const EndsAndCuts near{best.at - kReach_px,        best.at + kReach_px,        0.1,
+                           best.tangent - kReachOfCut, best.tangent + kReachOfCut, 0.02};
+    found = mean_of(model, near, blur_px, radius, best);
+  }
+  return found;
 }
 
 }  // namespace
@@ -681,58 +793,22 @@ std::optional<CutGlass> cut_of_glass(const GradientField& field, double noise, c
   if (!model.stands_out()) {
     return std::nullopt;
   }
-  CutEnd best = likeliest_end(model, back, ahead, std::array{-0.6, -0.3, 0.0, 0.3, 0.6});
-  const CutEnd sharp =
-      likeliest_end(model, back, ahead, std::array{-2.4, -2.0, -1.6, -1.2, 1.2, 1.6, 2.0, 2.4});
-  const auto clearly_sharp = [&] { return model.gain(sharp) > (1 + kClearlySharp) * model.gain(best); };
-  // Ends far from the best one may be as likely: in noise the likelihood falls off in straight lines, not as
-  // a parabola. Where they are not, it is sharp.
-  constexpr double kBeyond_px = 2, kSharp_px2 = 0.1,
-                   kReach_px = 1;  // of the range; variance; round the best end
-  constexpr double kReachOfCut = 0.16;
-  const double radius = outer_radius_of_glass(needle.half_width, blur_px);
-  const EndsAndCuts usual{-ahead - kBeyond_px, back + kBeyond_px, 0.5, -kSteepestCut, kSteepestCut, 0.1};
-  EndsAndCuts tried = usual;
-  const auto try_sharp = [&](const CutEnd& likely) {
-    const bool up = likely.tangent > 0;  // a needle that is cut the other way explains it far worse
-    tried = {usual.from, usual.to, 0.5, up ? 0 : -kSharpestCut, up ? kSharpestCut : 0, 0.2};
-    best = likely;
-  };
-  if (clearly_sharp()) {
-    best = likeliest_near(model, best, usual);
-    if (clearly_sharp()) {
-      try_sharp(sharp);
+  const Coarsely coarsely(model, back, ahead);
+  if (model.walls_differ()) {
+    // The outer flank of a face's line is steepest one blur outside of it: 0.8 to 1.1 for tubes of all usual
+    // walls.
+    const double radius = needle.half_width - math::hypot(kLens_px, field.sigma);
+    const CutModel in_relief(field, needle, noise, blur_px, back, ahead, radius);
+    const Coarsely lit(in_relief, back, ahead);
+    if (lit.is_sharp || lit.gain > (1 + kLit) * coarsely.gain) {
+      auto cut = cut_by(in_relief, lit, blur_px, radius);
+      if (cut && std::abs(cut->bevel.tangent) > kOblique) {
+        cut->bevel.radius = radius;
+      }
+      return cut;
     }
   }
-  constexpr double kEdge_px = 1.5;  // of the range
-  if (best.at < -ahead + kEdge_px || best.at > back - kEdge_px) {
-    return CutGlass{{std::abs(best.tangent) * radius - best.at, back + ahead, blur_px}, {best.tangent, 0}};
-  }
-  CutGlass found = mean_of(model, tried, blur_px, radius, best);
-  const auto is_steeper = [&] {
-    return std::abs(best.tangent) > std::max(tried.cut_to, -tried.cut_from) - kSteepestFrom &&
-           gets_likelier_beyond(model, best);
-  };
-  // A cut that is hardly steeper than usual explains the picture hardly better than a usual one, but better
-  // than a right angle, with a speck before it or without.
-  if (tried.cut_from == usual.cut_from && is_steeper()) {
-    try_sharp(best);
-    best = likeliest_near(model, best, tried);
-    if (!is_clearly_cut(model, best, likeliest_end(model, back, ahead, std::array{0.0}))) {
-      return std::nullopt;
-    }
-    found = mean_of(model, tried, blur_px, radius, best);
-  }
-  if (is_steeper()) {
-    return std::nullopt;
-  }
-  if (const double of_cut = found.bevel.sd * radius;
-      found.end.sd * found.end.sd + of_cut * of_cut < kSharp_px2) {
-    const EndsAndCuts near{best.at - kReach_px,        best.at + kReach_px,        0.1,
-                           best.tangent - kReachOfCut, best.tangent + kReachOfCut, 0.02};
-    found = mean_of(model, near, blur_px, radius, best);
-  }
-  return found;
+  return cut_by(model, coarsely, blur_px, outer_radius_of_glass(needle.half_width, blur_px));
 }
 
 std::optional<LikelyEnds> likely_ends(const GradientField& field, double noise, const NeedlePose& needle,
@@ -761,15 +837,15 @@ std::optional<LikelyEnds> likely_ends(const GradientField& field, double noise, 
 }
 
 std::optional<GlassEnd> end_of_known_cut(const GradientField& field, double noise, const NeedlePose& needle,
-                                         double tangent, double blur_px, double reach) {
+                                         const Bevel& bevel, double blur_px, double reach) {
   constexpr double kApart_px = 0.5;
-  const CutModel model(field, needle, noise, blur_px, reach, reach);
+  const CutModel model(field, needle, noise, blur_px, reach, reach, bevel.radius);
   if (!model.stands_out()) {
     return std::nullopt;
   }
   Vector<double> gains;
   for (double at = -reach; at <= reach; at += kApart_px) {
-    gains.push_back(model.gain({at, tangent}));
+    gains.push_back(model.gain({at, bevel.tangent}));
   }
   const double most = *std::max_element(gains.begin(), gains.end()),
                misfit = with_granules(model.misfit(most));

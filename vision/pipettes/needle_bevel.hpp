@@ -20,6 +20,7 @@ namespace punctum::vision {
 struct Bevel {
   double tangent = 0;
   double sd = 0;
+  double radius = 0;  // outer, at the end, px; 0: only the walls tell it
 };
 
 // How far a point spreads, px, by the shaft from `back` px behind the tip: it spreads as far along the needle
@@ -57,7 +58,7 @@ struct LikelyEnds {
 
 // Where a glass ends whose cut is known: the middle of its end, within `reach` px of the tip of the pose.
 [[nodiscard]] std::optional<GlassEnd> end_of_known_cut(const GradientField& field, double noise,
-                                                       const NeedlePose& needle, double tangent,
+                                                       const NeedlePose& needle, const Bevel& bevel,
                                                        double blur_px, double reach);
 
 }  // namespace punctum::vision

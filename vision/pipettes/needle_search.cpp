@@ -228,10 +228,14 @@ double NeedleSearch::lie_between_walls(const GradientField& field, double noise,
     go_to_end();
     put_at_end_of_walls(field, noise, back, 10, needle);
   }
-  if (auto wider = with_outer_line(field, noise, needle)) {
-    if (const double s = fit_walls(field, noise, radius_px_, *wider, kLongestWall_px); s >= kStraightWalls) {
-      needle = *wider;
-      straight = s;
+  if (const auto wider = with_outer_line(field, noise, needle)) {
+    constexpr double kWidth_px = 1;
+    NeedlePose fitted = *wider;
+    const double s = fit_walls(field, noise, radius_px_, fitted, kLongestWall_px);
+    if (s >= kStraightWalls || (needle.half_width >= kLeastLumen_px &&
+                                std::abs(fitted.half_width - wider->half_width) <= kWidth_px)) {
+      needle = fitted;
+      straight = std::max(straight, s);
       put_at_end_of_walls(field, noise, back, 10, needle);
     }
   }

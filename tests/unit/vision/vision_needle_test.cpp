@@ -2,9 +2,11 @@
 // microscope: a cone of glass whose walls are about a pixel thick near the tip.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <numbers>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <random>
@@ -440,8 +442,66 @@ TEST(WideNeedle, reaches_to_the_outermost_line_of_its_walls_in_relief) {
 TEST(WideNeedle, is_no_wider_for_a_fringe) {
   EXPECT_FALSE(widened({{-3, -72}, {3, 60}, {7, -40}}, 4.5));
   EXPECT_FALSE(widened({{-4, -40}, {4, -40}, {-7.5, 12}, {7.5, 12}}, 5));
-  EXPECT_FALSE(widened({{-3.3, -18}, {0, 18}, {3.7, -40}, {-7, 5}}, 4.9));
+  EXPECT_FALSE(widened({{-3.3, -18}, {0, 18}, {3.7, -40}, {-7, 2}}, 4.9));
   EXPECT_FALSE(widened({{-4, -40}, {4, -40}}, 5));
+}
+
+// A tube that is cut obliquely, lit from one side: the slope of the light's path through its glass.
+struct Tube {
+  double tangent, light_deg;  // by how much further back it ends, per px across; 0: light comes from the tip
+  double tip = 150.3, radius = 4.7, widens = 0.012;
+};
+
+GradientField lit(const Tube& tube, unsigned seed = 2300) {
+  constexpr int kFine = 3;
+  constexpr double kBore = 0.65, kGain = 9, kMost_grey = 45, kLens_px = 1.2;
+  const double angle = tube.light_deg * std::numbers::pi / 180;
+  cv::Mat path(kH * kFine, kW * kFine, CV_32F, cv::Scalar(0));
+  for (int y = 0; y < path.rows; ++y) {
+    for (int x = 0; x < path.cols; ++x) {
+      const double s = (x + 0.5) / kFine - 0.5 - tube.tip, u = (y + 0.5) / kFine - 0.5 - kAxis_y;
+      if (s > tube.tangent * u + std::abs(tube.tangent) * tube.radius) {
+        const double outer = tube.radius + tube.widens * std::max(s, 0.0), inner = kBore * outer;
+        path.at<float>(y, x) = static_cast<float>(2 * std::sqrt(std::max(outer * outer - u * u, 0.0)) -
+                                                  2 * std::sqrt(std::max(inner * inner - u * u, 0.0)));
+      }
+    }
+  }
+  cv::GaussianBlur(path, path, cv::Size(0, 0), 0.5 * kFine);
+  cv::Mat along, across;
+  cv::Sobel(path, along, CV_32F, 1, 0, 1, 0.5 * kFine);
+  cv::Sobel(path, across, CV_32F, 0, 1, 1, 0.5 * kFine);
+  cv::Mat slope = kGain * (std::cos(angle) * along + std::sin(angle) * across);
+  for (auto g = slope.begin<float>(); g != slope.end<float>(); ++g) {
+    *g = static_cast<float>(150 + kMost_grey * std::tanh(static_cast<double>(*g) / kMost_grey));
+  }
+  cv::GaussianBlur(slope, slope, cv::Size(0, 0), kLens_px * kFine);
+  cv::Mat picture;
+  cv::resize(slope, picture, cv::Size(kW, kH), 0, 0, cv::INTER_AREA);
+  return photographed(picture, seed, kWideNoise);
+}
+
+TEST(WideNeedle, that_is_ground_sharp_ends_with_its_point_wherever_light_comes_from) {
+  constexpr double kPoint_px = 2, kAside_px = 1, kCertain_px = 2, kDeviations = 2;
+  for (const double tangent : {-1.7, -1.1, 1.1, 1.4, 1.7}) {
+    for (const double light_deg : {60.0, 90.0, 200.0, 240.0, 270.0}) {
+      InjectionPipette needle(Side::right, kWideRadius);
+      Tube tube{tangent, light_deg};
+      const auto expect_point = [&](const NeedlePose& seen, const char* when) {
+        EXPECT_NEAR(seen.point().x, tube.tip, std::max(kPoint_px, kDeviations * seen.sd))
+            << when << ' ' << tangent << ' ' << light_deg;
+        EXPECT_NEAR(seen.point().y, kAxis_y - std::copysign(tube.radius, tangent), kAside_px)
+            << when << ' ' << tangent << ' ' << light_deg;
+        EXPECT_LT(seen.sd, kCertain_px) << when << ' ' << tangent << ' ' << light_deg;
+      };
+      ASSERT_TRUE(needle.start(lit(tube), kWideNoise, kClear)) << tangent << ' ' << light_deg;
+      expect_point(needle.as_found(kWideNoise), "found");
+      for (unsigned frame = 1; frame < 5; ++frame) {
+        tube.tip -= 1;
+        expect_point(needle.find(lit(tube, 2300 + frame), kWideNoise, std::nullopt), "followed");
+      }
+    }
+  }
 }
 
 // As where light comes from one side: the strong wall alone looks like a thin needle.

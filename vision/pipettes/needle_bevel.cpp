@@ -793,22 +793,27 @@ std::optional<CutGlass> cut_of_glass(const GradientField& field, double noise, c
   if (!model.stands_out()) {
     return std::nullopt;
   }
-  const Coarsely coarsely(model, back, ahead);
-  if (model.walls_differ()) {
-    // The outer flank of a face's line is steepest one blur outside of it: 0.8 to 1.1 for tubes of all usual
-    // walls.
-    const double radius = needle.half_width - math::hypot(kLens_px, field.sigma);
-    const CutModel in_relief(field, needle, noise, blur_px, back, ahead, radius);
-    const Coarsely lit(in_relief, back, ahead);
-    if (lit.is_sharp || lit.gain > (1 + kLit) * coarsely.gain) {
-      auto cut = cut_by(in_relief, lit, blur_px, radius);
-      if (cut && std::abs(cut->bevel.tangent) > kOblique) {
-        cut->bevel.radius = radius;
-      }
-      return cut;
+  const auto as_in_bright_field = [&](const Coarsely& coarsely) {
+    return cut_by(model, coarsely, blur_px, outer_radius_of_glass(needle.half_width, blur_px));
+  };
+  if (!model.walls_differ()) {
+    return as_in_bright_field({model, back, ahead});
+  }
+  // The outer flank of a face's line is steepest one blur outside of it: 0.8 to 1.1 for tubes of all usual
+  // walls.
+  const double radius = needle.half_width - math::hypot(kLens_px, field.sigma);
+  const CutModel in_relief(field, needle, noise, blur_px, back, ahead, radius);
+  const Coarsely lit(in_relief, back, ahead);
+  if (!lit.is_sharp) {
+    if (const Coarsely coarsely(model, back, ahead); lit.gain <= (1 + kLit) * coarsely.gain) {
+      return as_in_bright_field(coarsely);
     }
   }
-  return cut_by(model, coarsely, blur_px, outer_radius_of_glass(needle.half_width, blur_px));
+  auto cut = cut_by(in_relief, lit, blur_px, radius);
+  if (cut && std::abs(cut->bevel.tangent) > kOblique) {
+    cut->bevel.radius = radius;
+  }
+  return cut;
 }
 
 std::optional<LikelyEnds> likely_ends(const GradientField& field, double noise, const NeedlePose& needle,

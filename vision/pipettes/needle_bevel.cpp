@@ -135,6 +135,32 @@ struct Moments {
   [[nodiscard]] double variance() const { return std::max(squares / weight - mean() * mean(), 0.0); }
 };
 
+// Of what N things show in the lanes of a row, and of what is seen there: the sums of products, those of the
+// things without their mean and slope across.
+template <std::size_t N>
+class RowProducts {
+ public:
+  void add(double weight, double tilt, double grey, const std::array<double, N>& shown) {
+    for (std::size_t a = 0; a < N; ++a) {
+      mean_[a] += weight * shown[a];
+      slope_[a] += weight * tilt * shown[a];
+      seen_[a] += shown[a] * grey;
+      for (std::size_t b = a; b < N; ++b) {
+        of_both_[a][b] += weight * shown[a] * shown[b];
+      }
+    }
+  }
+  // a <= b. weights, tilts: of the row, see CutModel.
+  [[nodiscard]] double of(std::size_t a, std::size_t b, double weights, double tilts) const {
+    return of_both_[a][b] - (mean_[a] * mean_[b] / weights + slope_[a] * slope_[b] / tilts);
+  }
+  [[nodiscard]] double with_seen(std::size_t a) const { return seen_[a]; }
+
+ private:
+  std::array<double, N> mean_{}, slope_{}, seen_{};
+  std::array<std::array<double, N>, N> of_both_{};
+};
+
 // Two walls that stop along an oblique line, each as its own line is blurred, and a line of glass along it,
 // or none. What is neither walls nor clear is a speck and tells nothing. The medium is as even as it is
 // beside the needle: were it not known out of focus, where the walls merge, the end would be half as certain.
@@ -465,22 +491,15 @@ CutModel::Sums<3> CutModel::sums(const CutEnd& end) const {
       of.g[1] += from_end * row.walls_seen;
       continue;
     }
-    double x0 = 0, x1 = 0, l0 = 0, l1 = 0, xx = 0, xl = 0, ll = 0, xy = 0, ly = 0;
+    RowProducts<2> row_of;
     for_lanes(row, ends, [&](std::size_t i, double u, const Shown& shown) {
-      const double w = row.weight[i], tilt = u - row.middle, x = shown.walls, l = shown.line;
-      x0 += w * x;
-      x1 += w * tilt * x;
-      l0 += w * l;
-      l1 += w * tilt * l;
-      xx += w * x * x;
-      xl += w * x * l;
-      ll += w * l * l;
-      xy += x * row.grey[i];
-      ly += l * row.grey[i];
+      row_of.add(row.weight[i], u - row.middle, row.grey[i], {shown.walls, shown.line});
     });
-    xx -= x0 * x0 / row.weights + x1 * x1 / row.tilts;
-    xl -= x0 * l0 / row.weights + x1 * l1 / row.tilts;
-    ll -= l0 * l0 / row.weights + l1 * l1 / row.tilts;
+    const auto product = [&](std::size_t k, std::size_t l) {
+      return row_of.of(k, l, row.weights, row.tilts);
+    };
+    const double xx = product(0, 0), xl = product(0, 1), ll = product(1, 1), xy = row_of.with_seen(0),
+                 ly = row_of.with_seen(1);
     const double from_end = std::max(0.0, row.s - end.at);
     of.a += cv::Matx33d(xx, from_end * xx, xl, from_end * xx, from_end * from_end * xx, from_end * xl, xl,
                         from_end * xl, ll);
@@ -525,30 +544,18 @@ CutModel::Sums<4> CutModel::with_speck(const Sums<3>& of_needle, const Ends& end
     if (std::abs(row.s - speck.at) > 3 * speck.radius_px) {
       continue;
     }
-    double x0 = 0, x1 = 0, l0 = 0, l1 = 0, b0 = 0, b1 = 0, xb = 0, lb = 0, bb = 0, by = 0;
+    RowProducts<3> row_of;
     const double along = kBump((row.s - speck.at) / speck.radius_px);
     for_lanes(row, ends, [&](std::size_t i, double u, const Shown& shown) {
-      const double w = row.weight[i], tilt = u - row.middle, x = shown.walls, l = shown.line,
-                   b = along * kBump((u - speck.aside) / speck.radius_px);
-      x0 += w * x;
-      x1 += w * tilt * x;
-      l0 += w * l;
-      l1 += w * tilt * l;
-      b0 += w * b;
-      b1 += w * tilt * b;
-      xb += w * x * b;
-      lb += w * l * b;
-      bb += w * b * b;
-      by += b * row.grey[i];
+      row_of.add(row.weight[i], u - row.middle, row.grey[i],
+                 {shown.walls, shown.line, along * kBump((u - speck.aside) / speck.radius_px)});
     });
-    xb -= x0 * b0 / row.weights + x1 * b1 / row.tilts;
-    lb -= l0 * b0 / row.weights + l1 * b1 / row.tilts;
-    bb -= b0 * b0 / row.weights + b1 * b1 / row.tilts;
-    of.a(0, 3) += xb;
-    of.a(1, 3) += std::max(0.0, row.s - ends.end.at) * xb;
-    of.a(2, 3) += lb;
-    of.a(3, 3) += bb;
-    of.g[3] += by;
+    const auto with_speck = [&](std::size_t k) { return row_of.of(k, 2, row.weights, row.tilts); };
+    of.a(0, 3) += with_speck(0);
+    of.a(1, 3) += std::max(0.0, row.s - ends.end.at) * with_speck(0);
+    of.a(2, 3) += with_speck(1);
+    of.a(3, 3) += with_speck(2);
+    of.g[3] += row_of.with_seen(2);
   }
   for (int i = 0; i < 3; ++i) {
     of.a(3, i) = of.a(i, 3);
@@ -687,8 +694,8 @@ CutGlass mean_of(const CutModel& model, const EndsAndCuts& tried, double blur_px
 
 // The likeliest end `ahead` px ahead of the tip of the pose to `back` px behind it, of usual cuts and of
 // sharp ones.
-struct Coarsely {
-  Coarsely(const CutModel& model, double back_px, double ahead_px)
+struct CoarseEnds {
+  CoarseEnds(const CutModel& model, double back_px, double ahead_px)
       : back(back_px),
         ahead(ahead_px),
         usual(likeliest_end(model, back, ahead, std::array{-0.6, -0.3, 0.0, 0.3, 0.6})),
@@ -702,31 +709,31 @@ struct Coarsely {
 };
 
 // radius: outer, of the glass, px.
-std::optional<CutGlass> cut_by(const CutModel& model, const Coarsely& coarsely, double blur_px,
+std::optional<CutGlass> cut_by(const CutModel& model, const CoarseEnds& coarse, double blur_px,
                                double radius) {
-  CutEnd best = coarsely.usual;
+  CutEnd best = coarse.usual;
   // Ends far from the best one may be as likely: in noise the likelihood falls off in straight lines, not as
   // a parabola. Where they are not, it is sharp.
   constexpr double kBeyond_px = 2, kSharp_px2 = 0.1,
                    kReach_px = 1;  // of the range; variance; round the best end
   constexpr double kReachOfCut = 0.16;
   const EndsAndCuts usual{
-      -coarsely.ahead - kBeyond_px, coarsely.back + kBeyond_px, 0.5, -kSteepestCut, kSteepestCut, 0.1};
+      -coarse.ahead - kBeyond_px, coarse.back + kBeyond_px, 0.5, -kSteepestCut, kSteepestCut, 0.1};
   EndsAndCuts tried = usual;
   const auto try_sharp = [&](const CutEnd& likely) {
     const bool up = likely.tangent > 0;  // a needle that is cut the other way explains it far worse
     tried = {usual.from, usual.to, 0.5, up ? 0 : -kSharpestCut, up ? kSharpestCut : 0, 0.2};
     best = likely;
   };
-  if (coarsely.is_sharp) {
+  if (coarse.is_sharp) {
     best = likeliest_near(model, best, usual);
-    if (coarsely.gain > (1 + kClearlySharp) * model.gain(best)) {
-      try_sharp(coarsely.sharp);
+    if (coarse.gain > (1 + kClearlySharp) * model.gain(best)) {
+      try_sharp(coarse.sharp);
     }
   }
   constexpr double kEdge_px = 1.5;  // of the range
-  if (best.at < -coarsely.ahead + kEdge_px || best.at > coarsely.back - kEdge_px) {
-    return CutGlass{{std::abs(best.tangent) * radius - best.at, coarsely.back + coarsely.ahead, blur_px},
+  if (best.at < -coarse.ahead + kEdge_px || best.at > coarse.back - kEdge_px) {
+    return CutGlass{{std::abs(best.tangent) * radius - best.at, coarse.back + coarse.ahead, blur_px},
                     {best.tangent, 0}};
   }
   CutGlass found = mean_of(model, tried, blur_px, radius, best);
@@ -739,7 +746,7 @@ std::optional<CutGlass> cut_by(const CutModel& model, const Coarsely& coarsely, 
   if (tried.cut_from == usual.cut_from && is_steeper()) {
     try_sharp(best);
     best = likeliest_near(model, best, tried);
-    if (!is_clearly_cut(model, best, likeliest_end(model, coarsely.back, coarsely.ahead, std::array{0.0}))) {
+    if (!is_clearly_cut(model, best, likeliest_end(model, coarse.back, coarse.ahead, std::array{0.0}))) {
       return std::nullopt;
     }
     found = mean_of(model, tried, blur_px, radius, best);
@@ -793,8 +800,8 @@ std::optional<CutGlass> cut_of_glass(const GradientField& field, double noise, c
   if (!model.stands_out()) {
     return std::nullopt;
   }
-  const auto as_in_bright_field = [&](const Coarsely& coarsely) {
-    return cut_by(model, coarsely, blur_px, outer_radius_of_glass(needle.half_width, blur_px));
+  const auto as_in_bright_field = [&](const CoarseEnds& coarse) {
+    return cut_by(model, coarse, blur_px, outer_radius_of_glass(needle.half_width, blur_px));
   };
   if (!model.walls_differ()) {
     return as_in_bright_field({model, back, ahead});
@@ -803,10 +810,10 @@ std::optional<CutGlass> cut_of_glass(const GradientField& field, double noise, c
   // walls.
   const double radius = needle.half_width - math::hypot(kLens_px, field.sigma);
   const CutModel in_relief(field, needle, noise, blur_px, back, ahead, radius);
-  const Coarsely lit(in_relief, back, ahead);
+  const CoarseEnds lit(in_relief, back, ahead);
   if (!lit.is_sharp) {
-    if (const Coarsely coarsely(model, back, ahead); lit.gain <= (1 + kLit) * coarsely.gain) {
-      return as_in_bright_field(coarsely);
+    if (const CoarseEnds coarse(model, back, ahead); lit.gain <= (1 + kLit) * coarse.gain) {
+      return as_in_bright_field(coarse);
     }
   }
   auto cut = cut_by(in_relief, lit, blur_px, radius);

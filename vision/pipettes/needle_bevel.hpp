@@ -20,7 +20,7 @@ namespace punctum::vision {
 struct Bevel {
   double tangent = 0;
   double sd = 0;
-  double radius = 0;  // outer, at the end, px; 0: only the walls tell it
+  double radius = 0;  // outer, of the glass there, px, where light from one side shows it; else 0
 };
 
 // How far a point spreads, px, by the shaft from `back` px behind the tip: it spreads as far along the needle
@@ -35,9 +35,9 @@ struct CutGlass {
   Bevel bevel;
 };
 
-// Both at once, where the blur is known. By likelihood, with an end as above: the means over all ends and
-// cuts, each as likely as it explains the picture. Specks tell nothing. Empty where the walls do not stand
-// out; an end at the border of the range is one that lies further on.
+// Both at once, where the blur is known, in bright field and in relief. By likelihood, with an end as above:
+// the means over all ends and cuts, each as likely as it explains the picture. Specks tell nothing. Empty
+// where the walls do not stand out; an end at the border of the range is one that lies further on.
 [[nodiscard]] std::optional<CutGlass> cut_of_glass(const GradientField& field, double noise,
                                                    const NeedlePose& needle, double blur_px, double back,
                                                    double ahead);

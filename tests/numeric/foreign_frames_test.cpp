@@ -385,17 +385,16 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
 // needle, and its cut, hardly steeper than usual, for a right angle. In 103 the dimple's flank is somewhere 4
 // px too deep in two frames. In 106 the dimple was once blunt and on the needle's axis, in the sheets 10 it
 // was drawn to a tip that is seen 4 px too far ahead. In 158 the membrane once drew the tip back by 4 px. In
-// 112 the needle's taper is not seen. In 124 the cut is so clear that most others had no weight at all, and
-// the deviation was once no number.
+// 112 the needle's taper is not seen.
 INSTANTIATE_TEST_SUITE_P(
     Seeds, ReliefFrames,
     testing::Values(Relief{101, Light::hoffman, 0.6, 0.35, 0.5},
                     Relief{106, Light::hoffman, 0.55, 0.45, 2.2, 0, 3, 5},
                     Relief{103, Light::hoffman, 0.6, 0.4, 0.6, 2}, Relief{112, Light::hoffman, 0.6, 0.4, 1.6},
                     Relief{129, Light::hoffman, 0.8, 0.4, 0.6}, Relief{158, Light::hoffman, 0.6, 0.4, 0.6},
-                    Relief{124, Light::hoffman, 0.6, 0.4, 1.2}, Relief{104, Light::hoffman, 0.6, 0.4, 2.2},
-                    Relief{2, Light::dic, 0.7, 0.45, 0.35}, Relief{4, Light::sheets, 0.35, 0.4, 2.6},
-                    Relief{10, Light::sheets, 0.4, 0.5, 2.4, 3}, Relief{104, Light::sheets, 0.35, 0.4, 1.6}),
+                    Relief{104, Light::hoffman, 0.6, 0.4, 2.2}, Relief{2, Light::dic, 0.7, 0.45, 0.35},
+                    Relief{4, Light::sheets, 0.35, 0.4, 2.6}, Relief{10, Light::sheets, 0.4, 0.5, 2.4, 3},
+                    Relief{104, Light::sheets, 0.35, 0.4, 1.6}),
     [](const auto& of) {
       return (of.param.light == Light::hoffman ? "hoffman_"
               : of.param.light == Light::dic   ? "dic_"

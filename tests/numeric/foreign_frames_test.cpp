@@ -278,7 +278,7 @@ enum class Light { hoffman, dic, sheets };
 struct Relief {
   int seed;
   Light light;
-  double outer_um, inner_um, tip_px;  // rms at most, before contact; of the tip in contact, too
+  double outer_um, inner_um, tip_px;  // rms at most, before contact; in contact a quarter more of the tip
   int astray = 0;                     // frames in contact whose outer membrane is somewhere off by 4 px
   int early = 3;                      // frames at most, of contact
   int dented = 0;                     // frames at least in contact whose outer membrane is right
@@ -350,9 +350,8 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
   for (const Score& score : {outer_before, inner_before}) {
     EXPECT_GT(score.within_two / score.nodes, 0.82);
   }
-  for (const char* phase : {"approach", "contact"}) {
-    expect_near_truth("tip", tip_px[phase], GetParam().tip_px);
-  }
+  expect_near_truth("tip", tip_px["approach"], GetParam().tip_px);
+  expect_near_truth("tip in contact", tip_px["contact"], 1.25 * GetParam().tip_px);
   const int contact = late(begun["contact"], told["contact"]),
             puncture = late(begun["puncture"], told["puncture"]);
   std::printf("contact %+d frames late, puncture %+d\n", contact, puncture);
@@ -389,11 +388,11 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
 INSTANTIATE_TEST_SUITE_P(
     Seeds, ReliefFrames,
     testing::Values(Relief{101, Light::hoffman, 0.6, 0.35, 0.5},
-                    Relief{106, Light::hoffman, 0.55, 0.45, 2.2, 0, 3, 5},
-                    Relief{103, Light::hoffman, 0.6, 0.4, 0.6, 2}, Relief{112, Light::hoffman, 0.6, 0.4, 1.6},
+                    Relief{106, Light::hoffman, 0.55, 0.45, 2, 0, 3, 5},
+                    Relief{103, Light::hoffman, 0.6, 0.4, 0.6, 2}, Relief{112, Light::hoffman, 0.6, 0.4, 1.4},
                     Relief{129, Light::hoffman, 0.8, 0.4, 0.6}, Relief{158, Light::hoffman, 0.6, 0.4, 0.6},
                     Relief{104, Light::hoffman, 0.6, 0.4, 2.2}, Relief{2, Light::dic, 0.7, 0.45, 0.35},
-                    Relief{4, Light::sheets, 0.35, 0.4, 2.6}, Relief{10, Light::sheets, 0.4, 0.5, 2.4, 3},
+                    Relief{4, Light::sheets, 0.35, 0.4, 2}, Relief{10, Light::sheets, 0.4, 0.5, 2.4, 3},
                     Relief{104, Light::sheets, 0.35, 0.4, 1.6}),
     [](const auto& of) {
       return (of.param.light == Light::hoffman ? "hoffman_"

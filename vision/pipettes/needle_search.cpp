@@ -229,7 +229,7 @@ double NeedleSearch::lie_between_walls(const GradientField& field, double noise,
     put_at_end_of_walls(field, noise, back, 10, needle);
   }
   if (const auto wider = with_outer_line(field, noise, needle)) {
-    constexpr double kWidth_px = 1;
+    constexpr double kWidth_px = 1;  // a faint line is seen at few stations, but tells the width
     NeedlePose fitted = *wider;
     const double s = fit_walls(field, noise, radius_px_, fitted, kLongestWall_px);
     if (s >= kStraightWalls || (needle.half_width >= kLeastLumen_px &&

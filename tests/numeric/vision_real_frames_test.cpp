@@ -96,8 +96,8 @@ TEST_P(IcsiFrames, inner_contour_covers_the_labelled_ooplasm) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Cases, IcsiFrames,
-                         testing::Values(Icsi{"00", 0.93, 14}, Icsi{"01", 0.95, 14}, Icsi{"03", 0.93, 8},
-                                         Icsi{"06", 0.93, 14}),
+                         testing::Values(Icsi{"00", 0.93, 9}, Icsi{"01", 0.95, 4.5}, Icsi{"03", 0.93, 3.5},
+                                         Icsi{"06", 0.93, 2.5}),
                          [](const auto& one) { return std::string("frame_") + one.param.number; });
 
 // Of a cell, with the usual magnification and with one in which other structures have a cell's size.

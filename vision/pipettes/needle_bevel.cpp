@@ -69,9 +69,9 @@ const OfBlurs kStep([](double z) { return 0.5 * blurred_step(z / std::numbers::s
 const OfBlurs kBump([](double z) { return math::exp(-0.5 * z * z); });
 
 // Grey levels across the shaft from `from` to `to` px behind the tip, from its axis outwards, less their
-// mean.
+// mean: the mean of both sides, or, with sign -1, half of what one side has more than the other.
 Vector<double> half_profile(const GradientField& field, const NeedlePose& needle, double from, double to,
-                            double apart_px) {
+                            double apart_px, double sign) {
   constexpr double kOutside_px = 6;
   const double half_width = needle.half_width_at(0.5 * (from + to));
   Vector<double> profile, along;
@@ -79,7 +79,7 @@ Vector<double> half_profile(const GradientField& field, const NeedlePose& needle
     along.clear();
     for (double s = from; s < to; s += kRow_px) {
       const double v = u + needle.half_width_at(s) - half_width;
-      along.push_back(0.5 * (field.grey(needle.at(s, v)) + field.grey(needle.at(s, -v))));
+      along.push_back(0.5 * (field.grey(needle.at(s, v)) + sign * field.grey(needle.at(s, -v))));
     }
     profile.push_back(median_of(along));
   }
@@ -167,9 +167,12 @@ class RowProducts {
 // beside the needle: were it not known out of focus, where the walls merge, the end would be half as certain.
 class CutModel {
  public:
+  // The shaft that tells how the walls look: all of it, or where light comes from one side only what the
+  // noise asks for, since that light shows what the lumen holds, which changes along a needle.
+  enum class Shaft { all, near };
   // radius: outer, of a glass in relief, px; 0: not in relief.
   CutModel(const GradientField& field, const NeedlePose& needle, double noise, double blur_px, double back,
-           double ahead, double radius = 0);
+           double ahead, Shaft shaft = Shaft::all, double radius = 0);
   [[nodiscard]] bool stands_out() const noexcept { return clear_; }
   // As light that comes from one side makes them.
   [[nodiscard]] bool walls_differ() const noexcept { return walls_differ_; }
@@ -252,7 +255,7 @@ double CutModel::lane_width(std::size_t lane, double half_width) const {
 }
 
 CutModel::CutModel(const GradientField& field, const NeedlePose& needle, double noise, double blur_px,
-                   double back, double ahead, double radius)
+                   double back, double ahead, Shaft along, double radius)
     : half_width_(needle.half_width),
       blur_(blur_px),
       smooth_noise_(std::max(noise, 0.3) / (2 * field.sigma * std::sqrt(std::numbers::pi))),
@@ -260,11 +263,15 @@ CutModel::CutModel(const GradientField& field, const NeedlePose& needle, double 
       line_behind_(kHalfOfWall * middle_) {
   constexpr double kMargin_px = 6;  // the blur of the end reaches so far
   constexpr double kLeast_grey = 1.5, kMost_noises = 0.25;
+  constexpr double kLeastShaft_px = 14, kPerNoise = 4;  // px per grey level
+  const double shaft_px = kShaftTo_px - kShaftFrom_px,
+               told_by_px =
+                   along == Shaft::all ? shaft_px : std::clamp(kPerNoise * noise, kLeastShaft_px, shaft_px);
   // What the smoothing leaves of the noise in an end of that blur: it is a peak across, a slope along.
   const double blur2 = blur_ * blur_, of_noise = blur2 / (blur2 + field.sigma * field.sigma);
   unit_ = std::max(noise * noise, 0.1) * of_noise * of_noise / kRow_px;
   std::array<Vector<double>, kAllLanes> shaft;
-  for (double s = -ahead - kMargin_px; s <= back + kShaftTo_px; s += kRow_px) {
+  for (double s = -ahead - kMargin_px; s <= back + kShaftFrom_px + told_by_px; s += kRow_px) {
     GlassRow grey{};
     const double w = needle.half_width + needle.taper * s;
     bool whole = true;
@@ -772,15 +779,22 @@ double outer_radius_of_glass(double half_width, double blur) {
 
 std::optional<double> blur_of_shaft(const GradientField& field, const NeedlePose& needle, double back) {
   constexpr double kApart_px = 0.5, kUnexplained = 0.2;
+  constexpr double kUnequal = 0.5;  // the difference of both sides over what they have in common, squared
   // What it is tried with, and the least that a needle in focus has.
   constexpr double kLeast_px = 1.2, kMost_px = 4.8, kBlurStep_px = 0.1, kMiddleStep_px = 0.25,
                    kSharpest_px = 1.4;
   const double from = back + kShaftFrom_px, to = back + kShaftTo_px;
   const double half_width = needle.half_width_at(0.5 * (from + to));
-  const Vector<double> profile = half_profile(field, needle, from, to, kApart_px);
-  double least = 0;
-  for (const double grey : profile) {
-    least += kUnexplained * grey * grey;
+  const Vector<double> profile = half_profile(field, needle, from, to, kApart_px, 1),
+                       difference = half_profile(field, needle, from, to, kApart_px, -1);
+  double least = 0, in_common = 0, apart = 0;
+  for (std::size_t k = 0; k < profile.size(); ++k) {
+    least += kUnexplained * profile[k] * profile[k];
+    in_common += profile[k] * profile[k];
+    apart += difference[k] * difference[k];
+  }
+  if (apart > kUnequal * in_common) {
+    return std::nullopt;
   }
   std::optional<double> best;
   for (double blur = kLeast_px; blur < kMost_px; blur += kBlurStep_px) {
@@ -797,27 +811,26 @@ std::optional<double> blur_of_shaft(const GradientField& field, const NeedlePose
 
 std::optional<CutGlass> cut_of_glass(const GradientField& field, double noise, const NeedlePose& needle,
                                      double blur_px, double back, double ahead) {
-  const CutModel model(field, needle, noise, blur_px, back, ahead);
-  if (!model.stands_out()) {
-    return std::nullopt;
-  }
-  const auto as_in_bright_field = [&](const CoarseEnds& coarse) {
+  const auto as_in_bright_field = [&](const CutModel& model, const CoarseEnds& coarse) {
     return cut_by(model, coarse, blur_px, outer_radius_of_glass(needle.half_width, blur_px));
   };
-  if (!model.walls_differ()) {
-    return as_in_bright_field({model, back, ahead});
+  if (const CutModel even(field, needle, noise, blur_px, back, ahead); !even.stands_out()) {
+    return std::nullopt;
+  } else if (!even.walls_differ()) {
+    return as_in_bright_field(even, {even, back, ahead});
   }
   // The outer flank of a face's line is steepest one blur outside of it: 0.8 to 1.1 for tubes of all usual
   // walls.
   const double radius = needle.half_width - math::hypot(kLens_px, field.sigma);
-  const CutModel in_relief(field, needle, noise, blur_px, back, ahead, radius);
-  const CoarseEnds lit(in_relief, back, ahead);
-  if (!lit.is_sharp) {
-    if (const CoarseEnds coarse(model, back, ahead); lit.gain <= (1 + kLit) * coarse.gain) {
-      return as_in_bright_field(coarse);
+  const CutModel lit(field, needle, noise, blur_px, back, ahead, CutModel::Shaft::near, radius);
+  const CoarseEnds coarse(lit, back, ahead);
+  if (!coarse.is_sharp) {
+    const CutModel plain(field, needle, noise, blur_px, back, ahead, CutModel::Shaft::near);
+    if (const CoarseEnds of_plain(plain, back, ahead); coarse.gain <= (1 + kLit) * of_plain.gain) {
+      return as_in_bright_field(plain, of_plain);
     }
   }
-  auto cut = cut_by(in_relief, lit, blur_px, radius);
+  auto cut = cut_by(lit, coarse, blur_px, radius);
   if (cut && std::abs(cut->bevel.tangent) > kOblique) {
     cut->bevel.radius = radius;
   }
@@ -852,7 +865,8 @@ std::optional<LikelyEnds> likely_ends(const GradientField& field, double noise, 
 std::optional<GlassEnd> end_of_known_cut(const GradientField& field, double noise, const NeedlePose& needle,
                                          const Bevel& bevel, double blur_px, double reach) {
   constexpr double kApart_px = 0.5;
-  const CutModel model(field, needle, noise, blur_px, reach, reach, bevel.radius);
+  const CutModel model(field, needle, noise, blur_px, reach, reach,
+                       bevel.radius > 0 ? CutModel::Shaft::near : CutModel::Shaft::all, bevel.radius);
   if (!model.stands_out()) {
     return std::nullopt;
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <utility>
 
 #include "hal/math/elementary.hpp"
@@ -157,17 +158,46 @@ bool SeenCell::round_as_if_untouched(const ClearedPicture& picture, const Touch&
   return true;
 }
 
-void SeenCell::measure(const ClearedPicture& picture, const Touch& touch, bool needle_hidden,
+bool SeenCell::measure(const ClearedPicture& picture, const Touch& touch, bool needle_hidden,
                        bool holder_found, Result& result) {
   if (inner_.known && result.inner.ok) {
     result.inner_radius_px = mean_radius(result.inner.contour);
   }
   if (!outer_.known || !result.outer.ok) {
-    return;
+    return true;
   }
   const int fitted = fit_undeformed_membrane(picture, touch, needle_hidden, holder_found, result);
+  if (result.undeformed && !may_be_so_large(result.undeformed->r)) {
+    give_up(result);
+    return false;
+  }
   if (fitted > 0 && result.needle.ok) {
     measure_gap(fitted, result);
+  }
+  return true;
+}
+
+// The core allows as much beyond the limits of the scene.
+bool SeenCell::may_be_so_large(double r_px) const {
+  constexpr double kBeyond = 0.1;
+  return r_px > (1 - kBeyond) * config_.px(config_.R_min_m) &&
+         r_px < (1 + kBeyond) * config_.px(config_.R_max_m);
+}
+
+// What was followed is no cell of the scene.
+void SeenCell::give_up(Result& result) {
+  const auto um = [this](double px) { return std::to_string(std::lround(px * config_.pixel_m * 1e6)); };
+  const std::string reason = "radius of " + um(result.undeformed->r) + " um, where " +
+                             um(config_.px(config_.R_min_m)) + " to " + um(config_.px(config_.R_max_m)) +
+                             " um are expected";
+  outer_ = {};
+  inner_ = {};
+  undeformed_.forget();
+  result.undeformed.reset();
+  result.inner_radius_px.reset();
+  for (Membrane* m : {&result.outer, &result.inner}) {
+    *m = {};
+    m->reason = reason;
   }
 }
 

@@ -37,9 +37,10 @@ class SeenCell {
   // Sets the membranes of the result.
   void follow(const ClearedPicture& picture, const SeenNeedle& needle, const Touch& touch, Result& result,
               Stopwatch& watch);
-  // Sets its undeformed membrane, its entry and its gap. needle_hidden: it may touch the cell.
-  void measure(const ClearedPicture& picture, const Touch& touch, bool needle_hidden, bool holder_found,
-               Result& result);
+  // Sets its undeformed membrane, its entry and its gap. needle_hidden: it may touch the cell. False where it
+  // is larger or smaller than cells of the scene: then it is none, and given up.
+  [[nodiscard]] bool measure(const ClearedPicture& picture, const Touch& touch, bool needle_hidden,
+                             bool holder_found, Result& result);
 
  private:
   [[nodiscard]] std::optional<StartedMembranes> search(const ClearedPicture& picture, bool at_once);
@@ -50,6 +51,8 @@ class SeenCell {
                                            const Result& result) const;
   [[nodiscard]] int fit_undeformed_membrane(const ClearedPicture& picture, const Touch& touch,
                                             bool needle_hidden, bool holder_found, Result& result);
+  [[nodiscard]] bool may_be_so_large(double r_px) const;
+  void give_up(Result& result);
   void measure_gap(int fitted_points, Result& result);
 
   static constexpr int kFirstDoubt = 5;  // frames without the inner membrane; after twice as many again, ..

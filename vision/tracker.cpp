@@ -122,14 +122,16 @@ const Result& Tracker::Impl::process(const hal::Frame& frame, const std::optiona
   clear_picture(kNeedleMargin_px + (starting ? 0.7 * result.needle.half_width : 0));
   result.us.erase = watch.lap_us();
 
-  const bool found = !starting || start();
+  bool found = !starting || start();
   if (starting) {
     result.us.start = watch.lap_us();
   }
   if (found) {
     cell.follow(picture, needle, events.touch(), result, watch);
-    cell.measure(picture, events.touch(), needle.hidden(result.needle), holder.found(), result);
+    found = cell.measure(picture, events.touch(), needle.hidden(result.needle), holder.found(), result);
     result.us.measure = watch.lap_us();
+  }
+  if (found) {
     if (config.method == Method::paper) {
       events.decide_as_paper(picture, needle, cell, result, watch);
     } else {

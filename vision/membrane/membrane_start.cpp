@@ -306,18 +306,45 @@ std::optional<StartedMembranes> CellSearch::advance(const ClearedPicture& pictur
     try_circles(picture, config);
     return std::nullopt;
   }
-  if (!candidates_.empty()) {
-    const Circle strongest = candidates_.front().circle;
-    candidates_.erase(candidates_.begin());
-    if (auto begun = begin_round(strongest, picture, config)) {
+  if (!candidates_.empty() && (!alone_ || candidates_.front().strength > alone_strength_)) {
+    if (auto begun = try_strongest(picture, config)) {
       return begun;
     }
+    if (!candidates_.empty() || alone_) {
+      return std::nullopt;
+    }
   }
-  if (!candidates_.empty()) {
-    return std::nullopt;
+  if (alone_) {
+    return std::exchange(alone_, std::nullopt);
   }
   nothing.reason = "no closed edge stands out";
   return nothing;
+}
+
+// An edge with no other membrane in or round it may be that of a half of the cell, whose other border is the
+// needle or a furrow: an edge as strong round a place beside its middle is then that of the whole.
+std::optional<StartedMembranes> CellSearch::try_strongest(const ClearedPicture& picture,
+                                                          const VisionConfig& config) {
+  constexpr int kLooks = 2;
+  const Candidate strongest = candidates_.front();
+  candidates_.erase(candidates_.begin());
+  auto begun = begin_round(strongest.circle, picture, config);
+  if (!begun || seeded_ || !config.inner || looks_ == kLooks || (begun->outer.known && begun->inner.known)) {
+    return begun;
+  }
+  alone_ = std::move(begun);
+  alone_strength_ = strongest.strength;
+  look_round(strongest.circle);
+  ++looks_;
+  return std::nullopt;
+}
+
+void CellSearch::look_round(const Circle& circle) {
+  constexpr int kWays = 8;
+  constexpr double kAside = 0.8;  // of the radius
+  for (int i = 0; i < kWays; ++i) {
+    circles_.push_back({on_ray(circle.centre, i, kWays, kAside * circle.r), circle.r});
+  }
 }
 
 void CellSearch::vote(const ClearedPicture& picture, const VisionConfig& config) {

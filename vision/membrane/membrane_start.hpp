@@ -26,7 +26,7 @@ class CellSearch {
                       const std::optional<Circle>& last_seen = std::nullopt);
 
   // Does one part. Empty while there is more to do; after kMostParts there is not.
-  static constexpr int kMostParts = 15;
+  static constexpr int kMostParts = 39;
   [[nodiscard]] std::optional<StartedMembranes> advance(const ClearedPicture& picture,
                                                         const VisionConfig& config);
 
@@ -38,6 +38,9 @@ class CellSearch {
   void vote(const ClearedPicture& picture, const VisionConfig& config);
   void choose_circles(CircleSearch& votes);
   void try_circles(const ClearedPicture& picture, const VisionConfig& config);
+  void look_round(const Circle& circle);
+  [[nodiscard]] std::optional<StartedMembranes> try_strongest(const ClearedPicture& picture,
+                                                              const VisionConfig& config);
   [[nodiscard]] std::optional<StartedMembranes> begin_round(const Circle& circle,
                                                             const ClearedPicture& picture,
                                                             const VisionConfig& config) const;
@@ -46,10 +49,14 @@ class CellSearch {
   std::optional<Circle> last_seen_;
   std::optional<CircleSearch> votes_;
   int parts_voted_ = 0;
-  Vector<Circle> circles_;  // still to be tried
-  Vector<Point> tried_;     // centres of the edges round those that were
-  double saturation_ = 0;   // grey levels per px, the same for all circles
-  Vector<Candidate> candidates_;
+  Vector<Circle> circles_;        // still to be tried
+  Vector<Point> tried_;           // centres of the edges round those that were
+  double saturation_ = 0;         // grey levels per px, the same for all circles
+  Vector<Candidate> candidates_;  // the strongest first
+  // A membrane that was found alone, which may be a part of a cell.
+  std::optional<StartedMembranes> alone_;
+  double alone_strength_ = 0;
+  int looks_ = 0;
 };
 
 // The inner membrane alone, inside an outer membrane that is followed. faint_too: even if single rays do not

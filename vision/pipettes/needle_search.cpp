@@ -137,7 +137,11 @@ bool NeedleSearch::trace_next_border(const GradientField& field, double noise) {
     trace_.reset();
     if (t && t->edge_share > 0.5 && t->similarity > 0.5 && t->length > 12 &&
         (side_ == Side::automatic || side_ == entered_from(t->axis))) {
-      const auto like = [](const TubeTrace& tube) { return tube.edge_share * tube.similarity; };
+      // What looks like itself over a short length only is hardly a needle.
+      constexpr double kLong = 3;  // half-widths
+      const auto like = [](const TubeTrace& tube) {
+        return tube.edge_share * tube.similarity * std::min(1.0, tube.length / (kLong * tube.half_width));
+      };
       const auto less = [&](const TubeTrace& other) { return like(other) < like(*t); };
       tubes_.insert(std::find_if(tubes_.begin(), tubes_.end(), less), *t);
     }

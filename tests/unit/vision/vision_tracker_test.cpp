@@ -287,6 +287,31 @@ TEST(Tracker, does_not_look_for_what_a_scene_does_not_have) {
   }
 }
 
+// Its circle is found by the inner membrane, which is within the limits: of the outer one, 61 um.
+TEST(Tracker, claims_no_cell_beyond_the_limits_of_the_scene) {
+  const cv::Mat picture = draw({.needle = false, .holder = false});
+  for (const double most_um : {54.0, 58.0}) {
+    VisionConfig config;
+    config.needle = false;
+    config.holder.reset();
+    config.R_max_m = most_um * 1e-6;
+    Tracker tracker(config, kW, kH);
+    for (std::uint64_t n = 0; n < 3; ++n) {
+      const Result& r = tracker.process(frame_of(picture, n));
+      if (most_um < 55) {
+        EXPECT_FALSE(r.outer.ok || r.inner.ok || r.undeformed || r.inner_radius_px);
+      } else {
+        EXPECT_EQ(r.verdict, "ok");
+        EXPECT_NEAR(r.undeformed.value().r, kR, 1);
+      }
+      if (n == 0 && most_um < 55) {
+        EXPECT_NE(r.verdict.find("radius of 61 um, where 35 to 54 um are expected"), std::string::npos)
+            << r.verdict;
+      }
+    }
+  }
+}
+
 TEST(Tracker, does_not_run_the_contact_stages_far_from_the_cell) {
   const double surface = kCentre.x + kR;
   Tracker tracker(VisionConfig{}, kW, kH);

@@ -153,21 +153,52 @@ double straight_share(const Contour& contour) {
   return straight / static_cast<double>(n);
 }
 
+constexpr double kWeakOf = 0.4;  // of the usual edge
+
+// Share of the places at which light comes across the edge and little of it is seen.
+double weak_share_in_light(const ClosedEdge& edge) {
+  constexpr double kAcross = 0.5;  // cosine
+  constexpr int kApart = 3;        // points of the contour, from either side of a place to it
+  const Contour contour = from_polar(edge.centre, edge.path.r);
+  const std::size_t n = contour.size();
+  Vector<double> lit;  // the edge if light came straight across it
+  for (std::size_t i = 0; i < n; ++i) {
+    const Point along = contour[(i + kApart) % n] - contour[(i + n - kApart) % n];
+    const double across = std::abs(edge.relief.along.cross(along)) / std::max(cv::norm(along), 1e-9);
+    if (edge.path.strength[i] != 0 && across > kAcross) {
+      lit.push_back(static_cast<double>(edge.path.strength[i]) / across);
+    }
+  }
+  if (lit.empty()) {
+    return 1;
+  }
+  const double usual = median_of(lit);
+  const auto weak = std::count_if(lit.begin(), lit.end(), [&](double e) { return e < kWeakOf * usual; });
+  return static_cast<double>(weak) / static_cast<double>(lit.size());
+}
+
 // Glass, its shadows and dirt have closed paths of strong gradient as well. Round a cell the edge stands out
 // of what is beside it, single places of it lie on one curve, and that bends nearly everywhere and fades
-// nowhere.
+// nowhere, in relief nowhere that light comes across it.
 bool bounds_a_cell(const ClosedEdge& edge) {
-  constexpr double kAboveBackground = 3.5, kMostScatter_px = 1.1, kMostOff = 0.075;
-  constexpr double kStraight = 0.155, kOff = 0.045, kWeak = 0.25, kWeakOf = 0.4;
+  constexpr double kAboveBackground = 3.5, kMostScatter_px = 0.75, kMostOff = 0.075;
+  constexpr double kAboveInRelief = 5, kWeakInLight = 0.15, kWeakOfOneSign = 0.15;
+  constexpr double kStraight = 0.155, kOff = 0.045, kWeak = 0.25;
   const EdgePath& path = edge.path;
+  const bool relief = edge.polarity == Polarity::relief;
   const double off = off_an_oval(path.r);
-  if (path.level < kAboveBackground * path.background || path.residual > kMostScatter_px || off > kMostOff) {
+  if (path.level < (relief ? kAboveInRelief : kAboveBackground) * path.background ||
+      path.residual > kMostScatter_px || off > kMostOff ||
+      (relief && weak_share_in_light(edge) > kWeakInLight)) {
     return false;
   }
   int shown = 0, weak = 0;
   for (const float e : path.strength) {
     shown += e != 0 ? 1 : 0;
     weak += e != 0 && static_cast<double>(e) < kWeakOf * path.level ? 1 : 0;
+  }
+  if (!relief && edge.polarity != Polarity::any && weak > kWeakOfOneSign * shown) {
+    return false;
   }
   return straight_share(from_polar(edge.centre, path.r)) < kStraight || (off < kOff && weak < kWeak * shown);
 }

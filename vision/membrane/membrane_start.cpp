@@ -310,18 +310,18 @@ std::optional<StartedMembranes> CellSearch::advance(const ClearedPicture& pictur
     if (auto begun = try_strongest(picture, config)) {
       return begun;
     }
-    if (!candidates_.empty() || alone_) {
+    if (!candidates_.empty() || !circles_.empty() || alone_) {
       return std::nullopt;
     }
   }
   if (alone_) {
     return std::exchange(alone_, std::nullopt);
   }
-  nothing.reason = "no closed edge stands out";
+  nothing.reason = reason_.empty() ? "no closed edge stands out" : reason_;
   return nothing;
 }
 
-// An edge with no other membrane in or round it may be that of a half of the cell, whose other border is the
+// An edge with no other membrane in or round it may be that of a part of the cell, whose other border is the
 // needle or a furrow: an edge as strong round a place beside its middle is then that of the whole.
 std::optional<StartedMembranes> CellSearch::try_strongest(const ClearedPicture& picture,
                                                           const VisionConfig& config) {
@@ -329,13 +329,19 @@ std::optional<StartedMembranes> CellSearch::try_strongest(const ClearedPicture& 
   const Candidate strongest = candidates_.front();
   candidates_.erase(candidates_.begin());
   auto begun = begin_round(strongest.circle, picture, config);
-  if (!begun || seeded_ || !config.inner || looks_ == kLooks || (begun->outer.known && begun->inner.known)) {
+  if (begun && begun->outer.known && (begun->inner.known || !config.inner)) {
     return begun;
   }
-  alone_ = std::move(begun);
-  alone_strength_ = strongest.strength;
-  look_round(strongest.circle);
-  ++looks_;
+  if (begun && !seeded_ && looks_ < kLooks) {
+    ++looks_;
+    look_round(strongest.circle);
+  }
+  if (begun && (begun->outer.known || begun->inner.known)) {
+    alone_ = std::move(begun);
+    alone_strength_ = strongest.strength;
+  } else if (begun) {
+    reason_ = begun->reason;
+  }
   return std::nullopt;
 }
 

@@ -57,6 +57,7 @@ class CellSearch {
   std::optional<StartedMembranes> alone_;
   double alone_strength_ = 0;
   int looks_ = 0;
+  std::string reason_;  // why the last edge that was told apart is none
 };
 
 // The inner membrane alone, inside an outer membrane that is followed. faint_too: even if single rays do not

@@ -10,6 +10,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
+#include <vector>
 
 #include "hal/recorded/recorded_camera.hpp"
 #include "tests/support/pictures.hpp"
@@ -45,49 +46,64 @@ struct Icsi {
   double tip_px;  // from the labelled tip, at most; the tips are bevelled
 };
 
+struct Still {
+  cv::Mat picture, label;
+};
+
+Still icsi(const std::string& number) {
+  const std::string stem = data("icsi/icsi_") + number;
+  return {cv::imread(stem + "_img.png", cv::IMREAD_GRAYSCALE),
+          cv::imread(stem + "_label.png", cv::IMREAD_GRAYSCALE)};
+}
+
+// Intersection over union with the labelled ooplasm; needle and sperm inside it belong to it.
+double covers_ooplasm(const Contour& contour, const cv::Mat& label, double size) {
+  const int gap = 2 * static_cast<int>(15 * std::max(1.0, size)) + 1;
+  const cv::Mat ooplasm = label == 170;
+  cv::Mat closed;
+  cv::morphologyEx(ooplasm, closed, cv::MORPH_CLOSE,
+                   cv::getStructuringElement(cv::MORPH_ELLIPSE, {gap, gap}));
+  const cv::Mat wanted = ooplasm | (closed & ((label == 85) | (label == 255)));
+  cv::Mat seen = cv::Mat::zeros(label.size(), CV_8U);
+  std::vector<cv::Point> line;
+  for (const Point& p : contour) {
+    line.emplace_back(static_cast<int>(std::lround(p.x * 16)), static_cast<int>(std::lround(p.y * 16)));
+  }
+  cv::fillPoly(seen, std::vector<std::vector<cv::Point>>{line}, cv::Scalar(255), cv::LINE_8, 4);
+  return static_cast<double>(cv::countNonZero(seen & wanted)) / cv::countNonZero(seen | wanted);
+}
+
+// The labelled needle's point that is furthest along the axis.
+Point labelled_tip(const cv::Mat& label, const Point& axis) {
+  Point tip;
+  double furthest = -1e9;
+  for (int y = 0; y < label.rows; ++y) {
+    for (int x = 0; x < label.cols; ++x) {
+      const double s = Point(x, y).dot(axis);
+      if (label.at<std::uint8_t>(y, x) == 85 && s > furthest) {
+        furthest = s;
+        tip = Point(x, y);
+      }
+    }
+  }
+  return tip;
+}
+
 class IcsiFrames : public testing::TestWithParam<Icsi> {};
 
 TEST_P(IcsiFrames, inner_contour_covers_the_labelled_ooplasm) {
   SKIP_WITHOUT("icsi")
-  const std::string stem = data("icsi/icsi_") + GetParam().number;
-  const cv::Mat picture = cv::imread(stem + "_img.png", cv::IMREAD_GRAYSCALE);
-  const cv::Mat label = cv::imread(stem + "_label.png", cv::IMREAD_GRAYSCALE);
+  const auto [picture, label] = icsi(GetParam().number);
   ASSERT_FALSE(picture.empty() || label.empty());
   Tracker tracker(oocyte(), picture.cols, picture.rows);
   const Result& r = tracker.process(frame_of(picture));
   ASSERT_TRUE(r.inner.ok) << r.verdict;
-  // Needle and sperm inside the ooplasm belong to it.
-  const cv::Mat ooplasm = label == 170;
-  cv::Mat closed;
-  cv::morphologyEx(ooplasm, closed, cv::MORPH_CLOSE, cv::getStructuringElement(cv::MORPH_ELLIPSE, {31, 31}));
-  const cv::Mat wanted = ooplasm | (closed & ((label == 85) | (label == 255)));
-  cv::Mat seen = cv::Mat::zeros(label.size(), CV_8U);
-  std::vector<cv::Point> line;
-  for (const Point& p : r.inner.contour) {
-    line.emplace_back(static_cast<int>(std::lround(p.x * 16)), static_cast<int>(std::lround(p.y * 16)));
-  }
-  cv::fillPoly(seen, std::vector<std::vector<cv::Point>>{line}, cv::Scalar(255), cv::LINE_8, 4);
-  const double iou = static_cast<double>(cv::countNonZero(seen & wanted)) / cv::countNonZero(seen | wanted);
-  // The labelled needle's point nearest to the cell.
-  double tip_error = -1;
-  if (r.needle.ok) {
-    Point tip;
-    double furthest = -1e9;
-    for (int y = 0; y < label.rows; ++y) {
-      for (int x = 0; x < label.cols; ++x) {
-        const double s = Point(x, y).dot(r.needle.axis);
-        if (label.at<std::uint8_t>(y, x) == 85 && s > furthest) {
-          furthest = s;
-          tip = Point(x, y);
-        }
-      }
-    }
-    tip_error = cv::norm(tip - r.needle.tip);
-  }
+  ASSERT_TRUE(r.needle.ok) << r.verdict;
+  const double iou = covers_ooplasm(r.inner.contour, label, 1),
+               tip_error = cv::norm(labelled_tip(label, r.needle.axis) - r.needle.tip);
   std::printf("icsi_%s: IoU %.3f, tip %.1f px from the label, %s\n", GetParam().number, iou, tip_error,
               r.verdict.c_str());
   EXPECT_GT(iou, GetParam().iou);
-  ASSERT_TRUE(r.needle.ok) << r.verdict;
   EXPECT_LT(tip_error, GetParam().tip_px);
   // The outer face of the zona is outside of the picture or too faint here, so it must not be reported.
   if (std::string(GetParam().number) != "06") {
@@ -100,14 +116,117 @@ INSTANTIATE_TEST_SUITE_P(Cases, IcsiFrames,
                                          Icsi{"06", 0.93, 2.5}),
                          [](const auto& one) { return std::string("frame_") + one.param.number; });
 
+// What another microscope, camera or operator would have made of a still.
+struct Change {
+  const char* name;
+  double size = 1;  // in pixels, of what is shown
+  double turned_deg = 0;
+  bool mirrored = false, upside_down = false, negative = false;
+  double noise = 0, gamma = 1, contrast = 1, blur_px = 0;  // grey levels; of the picture alone
+
+  [[nodiscard]] cv::Mat seen_from(const cv::Mat& still, cv::InterpolationFlags between) const {
+    cv::Mat out = still.clone();
+    if (mirrored || upside_down) {
+      cv::flip(out, out, mirrored && upside_down ? -1 : mirrored ? 1 : 0);
+    }
+    if (size != 1) {
+      cv::resize(out, out, {}, size, size, between);
+    }
+    if (turned_deg != 0) {  // and cut to what is known of it
+      const double t = turned_deg * CV_PI / 180;
+      cv::warpAffine(
+          out, out,
+          cv::getRotationMatrix2D(cv::Point2f(static_cast<float>(out.cols), static_cast<float>(out.rows)) / 2,
+                                  turned_deg, 1),
+          out.size(), between, cv::BORDER_REPLICATE);
+      const int cut = 2 + static_cast<int>(out.cols * (1 - 1 / (std::cos(t) + std::abs(std::sin(t)))) / 2);
+      out = out(cv::Rect(cut, cut, out.cols - 2 * cut, out.rows - 2 * cut)).clone();
+    }
+    return out;
+  }
+  [[nodiscard]] cv::Mat of_picture(const cv::Mat& still) const {
+    cv::Mat out;
+    seen_from(still, cv::INTER_CUBIC).convertTo(out, CV_32F, contrast, 128 * (1 - contrast));
+    if (negative) {
+      out = 255 - out;
+    }
+    if (gamma != 1) {
+      cv::pow(cv::max(out, 0) / 255, gamma, out);
+      out *= 255;
+    }
+    if (blur_px > 0) {
+      cv::GaussianBlur(out, out, {}, blur_px);
+    }
+    if (noise > 0) {
+      cv::Mat grain(out.size(), CV_32F);
+      cv::RNG(3).fill(grain, cv::RNG::NORMAL, 0, noise);
+      out += grain;
+    }
+    out.convertTo(out, CV_8U);
+    return out;
+  }
+  [[nodiscard]] cv::Mat of_label(const cv::Mat& label) const { return seen_from(label, cv::INTER_NEAREST); }
+};
+
+const std::vector<Change>& changes() {
+  static const std::vector<Change> all = {
+      {.name = "mirrored", .mirrored = true},    {.name = "upside down", .upside_down = true},
+      {.name = "negative", .negative = true},    {.name = "smaller", .size = 0.75},
+      {.name = "larger", .size = 1.5},           {.name = "turned", .turned_deg = 7},
+      {.name = "turned back", .turned_deg = -7}, {.name = "noise 3", .noise = 3},
+      {.name = "noise 6", .noise = 6},           {.name = "brighter", .gamma = 0.7},
+      {.name = "darker", .gamma = 1.5},          {.name = "less contrast", .contrast = 0.3},
+      {.name = "blurred", .blur_px = 1}};
+  return all;
+}
+
+// Half a cell, or one with what clings to it, is worse than none. 03 touches the border of the picture.
+TEST(ChangedIcsiFrames, show_the_same_cell_or_none) {
+  SKIP_WITHOUT("icsi")
+  int pictures = 0, right = 0, wrong = 0, tips = 0, tips_right = 0, tips_far_off = 0;
+  for (const std::string number : {"00", "01", "03", "06"}) {
+    const Still still = icsi(number);
+    for (const Change& change : changes()) {
+      if (number == "03" && change.turned_deg != 0) {
+        continue;
+      }
+      const cv::Mat picture = change.of_picture(still.picture), label = change.of_label(still.label);
+      VisionConfig config = oocyte();
+      config.pixel_m /= change.size;
+      Tracker tracker(config, picture.cols, picture.rows);
+      const Result& r = tracker.process(frame_of(picture));
+      const double iou = r.inner.ok ? covers_ooplasm(r.inner.contour, label, change.size) : 0;
+      const double ahead =
+          r.needle.ok ? (r.needle.tip - labelled_tip(label, r.needle.axis)).dot(r.needle.axis) / change.size
+                      : 0;
+      std::printf("icsi_%s %-14s IoU %.3f, tip %+6.1f px: %s\n", number.c_str(), change.name, iou, ahead,
+                  r.verdict.c_str());
+      ++pictures;
+      right += iou > 0.9 ? 1 : 0;
+      wrong += (r.inner.ok && iou < 0.9) || (r.outer.ok && number != "06") ? 1 : 0;
+      tips += r.needle.ok ? 1 : 0;
+      tips_right += r.needle.ok && std::abs(ahead) < 3 ? 1 : 0;
+      tips_far_off += r.needle.ok && std::abs(ahead) > 15 ? 1 : 0;
+    }
+  }
+  std::printf(
+      "%d pictures: ooplasm right in %d, wrong in %d; needle claimed in %d, its tip within 3 px in %d\n",
+      pictures, right, wrong, tips, tips_right);
+  EXPECT_EQ(wrong, 0);
+  EXPECT_GE(right, 45);
+  EXPECT_GE(tips_right, 30);
+  EXPECT_EQ(tips_far_off, 0);
+}
+
 // Of a cell, with the usual magnification and with one in which other structures have a cell's size.
-bool claims_a_cell(const std::string& file) {
-  const cv::Mat picture = cv::imread(data(file), cv::IMREAD_GRAYSCALE);
-  EXPECT_FALSE(picture.empty()) << file;
+bool claims_a_cell(const std::string& file, const Change& change = {.name = "as it is"}) {
+  const cv::Mat still = cv::imread(data(file), cv::IMREAD_GRAYSCALE);
+  EXPECT_FALSE(still.empty()) << file;
+  const cv::Mat picture = change.of_picture(still);
   bool claims = false;
   for (const double pixel_m : {0.85e-6, 0.3e-6}) {
     VisionConfig config;
-    config.pixel_m = pixel_m;
+    config.pixel_m = pixel_m / change.size;
     Tracker tracker(config, picture.cols, picture.rows);
     const Result& r = tracker.process(frame_of(picture));
     claims = claims || r.outer.ok || r.inner.ok;
@@ -122,11 +241,19 @@ TEST(NoCell, is_claimed_where_there_is_only_a_needle) {
 
 TEST(NoCell, is_claimed_in_a_pipette_and_its_shadows) {
   SKIP_WITHOUT("pipette-focus")
-  // 02 is wrong: the shadow there has an oval.
-  for (const char* number :
-       {"00", "04", "06", "08", "10", "12", "14", "16", "18", "20", "22", "24", "26", "28"}) {
-    EXPECT_FALSE(claims_a_cell(std::string("pipette-focus/focus_") + number + ".png")) << number;
+  int claims = 0;
+  for (int i = 0; i <= 28; i += 2) {
+    const std::string file =
+        "pipette-focus/focus_" + std::string(i < 10 ? "0" : "") + std::to_string(i) + ".png";
+    EXPECT_FALSE(claims_a_cell(file)) << file;
+    for (const Change& change : changes()) {
+      if (claims_a_cell(file, change)) {
+        ++claims;
+        std::printf("%s, %s: a cell is claimed\n", file.c_str(), change.name);
+      }
+    }
   }
+  EXPECT_LE(claims, 2) << "of 195 changed pictures";
 }
 
 // The glass widens by a third of its length, and its end is in focus in 22 alone. By hand there: the middle

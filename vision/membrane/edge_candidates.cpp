@@ -181,7 +181,7 @@ double weak_share_in_light(const ClosedEdge& edge) {
 // of what is beside it, single places of it lie on one curve, and that bends nearly everywhere and fades
 // nowhere, in relief nowhere that light comes across it.
 bool bounds_a_cell(const ClosedEdge& edge) {
-  constexpr double kAboveBackground = 3.5, kMostScatter_px = 0.75, kMostOff = 0.075;
+  constexpr double kAboveBackground = 3.5, kMostScatter_px = 0.75, kMostOff = 0.055;
   constexpr double kAboveInRelief = 5, kWeakInLight = 0.15, kWeakOfOneSign = 0.15;
   constexpr double kStraight = 0.155, kOff = 0.045, kWeak = 0.25;
   const EdgePath& path = edge.path;

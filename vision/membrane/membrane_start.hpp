@@ -25,8 +25,7 @@ class CellSearch {
   explicit CellSearch(const std::optional<Circle>& seed,
                       const std::optional<Circle>& last_seen = std::nullopt);
 
-  // Does one part. Empty while there is more to do; after kMostParts there is not.
-  static constexpr int kMostParts = 39;
+  // Does one part, of forty at most. Empty while there is more to do.
   [[nodiscard]] std::optional<StartedMembranes> advance(const ClearedPicture& picture,
                                                         const VisionConfig& config);
 

@@ -182,7 +182,7 @@ double weak_share_in_light(const ClosedEdge& edge) {
 // nowhere, in relief nowhere that light comes across it.
 bool bounds_a_cell(const ClosedEdge& edge) {
   constexpr double kAboveBackground = 3.5, kMostScatter_px = 0.75, kMostOff = 0.055;
-  constexpr double kAboveInRelief = 5, kWeakInLight = 0.15, kWeakOfOneSign = 0.15;
+  constexpr double kAboveInRelief = 5, kWeakInLight = 0.15, kWeakUnlit = 0.2;
   constexpr double kStraight = 0.155, kOff = 0.045, kWeak = 0.25;
   const EdgePath& path = edge.path;
   const bool relief = edge.polarity == Polarity::relief;
@@ -197,7 +197,7 @@ bool bounds_a_cell(const ClosedEdge& edge) {
     shown += e != 0 ? 1 : 0;
     weak += e != 0 && static_cast<double>(e) < kWeakOf * path.level ? 1 : 0;
   }
-  if (!relief && edge.polarity != Polarity::any && weak > kWeakOfOneSign * shown) {
+  if (!relief && weak > kWeakUnlit * shown) {
     return false;
   }
   return straight_share(from_polar(edge.centre, path.r)) < kStraight || (off < kOff && weak < kWeak * shown);

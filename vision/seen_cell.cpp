@@ -167,7 +167,7 @@ bool SeenCell::measure(const ClearedPicture& picture, const Touch& touch, bool n
     return true;
   }
   const int fitted = fit_undeformed_membrane(picture, touch, needle_hidden, holder_found, result);
-  if (result.undeformed && !may_be_so_large(result.undeformed->r)) {
+  if (result.undeformed && !is_of_the_scene(result.undeformed->r)) {
     give_up(result);
     return false;
   }
@@ -177,8 +177,8 @@ bool SeenCell::measure(const ClearedPicture& picture, const Touch& touch, bool n
   return true;
 }
 
-// The core allows as much beyond the limits of the scene.
-bool SeenCell::may_be_so_large(double r_px) const {
+// By its radius. The core allows as much beyond the limits of the scene.
+bool SeenCell::is_of_the_scene(double r_px) const {
   constexpr double kBeyond = 0.1;
   return r_px > (1 - kBeyond) * config_.px(config_.R_min_m) &&
          r_px < (1 + kBeyond) * config_.px(config_.R_max_m);
@@ -186,10 +186,9 @@ bool SeenCell::may_be_so_large(double r_px) const {
 
 // What was followed is no cell of the scene.
 void SeenCell::give_up(Result& result) {
-  const auto um = [this](double px) { return std::to_string(std::lround(px * config_.pixel_m * 1e6)); };
-  const std::string reason = "radius of " + um(result.undeformed->r) + " um, where " +
-                             um(config_.px(config_.R_min_m)) + " to " + um(config_.px(config_.R_max_m)) +
-                             " um are expected";
+  const auto um = [](double m) { return std::to_string(std::lround(m * 1e6)); };
+  const std::string reason = "radius of " + um(result.undeformed->r * config_.pixel_m) + " um, where " +
+                             um(config_.R_min_m) + " to " + um(config_.R_max_m) + " um are expected";
   outer_ = {};
   inner_ = {};
   undeformed_.forget();

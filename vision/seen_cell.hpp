@@ -51,7 +51,7 @@ class SeenCell {
                                            const Result& result) const;
   [[nodiscard]] int fit_undeformed_membrane(const ClearedPicture& picture, const Touch& touch,
                                             bool needle_hidden, bool holder_found, Result& result);
-  [[nodiscard]] bool may_be_so_large(double r_px) const;
+  [[nodiscard]] bool is_of_the_scene(double r_px) const;
   void give_up(Result& result);
   void measure_gap(int fitted_points, Result& result);
 

@@ -389,11 +389,11 @@ INSTANTIATE_TEST_SUITE_P(
     Seeds, ReliefFrames,
     testing::Values(Relief{101, Light::hoffman, 0.6, 0.35, 0.5},
                     Relief{106, Light::hoffman, 0.55, 0.45, 2, 0, 3, 5},
-                    Relief{103, Light::hoffman, 0.6, 0.4, 0.6, 2}, Relief{112, Light::hoffman, 0.6, 0.4, 1.4},
+                    Relief{103, Light::hoffman, 0.6, 0.4, 0.6, 2}, Relief{112, Light::hoffman, 0.6, 0.4, 0.9},
                     Relief{129, Light::hoffman, 0.8, 0.4, 0.6}, Relief{158, Light::hoffman, 0.6, 0.4, 0.6},
-                    Relief{104, Light::hoffman, 0.6, 0.4, 2.2}, Relief{2, Light::dic, 0.7, 0.45, 0.35},
-                    Relief{4, Light::sheets, 0.35, 0.4, 2}, Relief{10, Light::sheets, 0.4, 0.5, 2.4, 3},
-                    Relief{104, Light::sheets, 0.35, 0.4, 1.6}),
+                    Relief{104, Light::hoffman, 0.6, 0.4, 1.9}, Relief{2, Light::dic, 0.7, 0.45, 0.35},
+                    Relief{4, Light::sheets, 0.35, 0.4, 2}, Relief{10, Light::sheets, 0.4, 0.5, 2.1, 3},
+                    Relief{104, Light::sheets, 0.35, 0.4, 1.3}),
     [](const auto& of) {
       return (of.param.light == Light::hoffman ? "hoffman_"
               : of.param.light == Light::dic   ? "dic_"

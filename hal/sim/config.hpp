@@ -173,6 +173,14 @@ constexpr auto keys_of(const ForceSensorParams*) {
                    hal::milli("lag_ms", &ForceSensorParams::lag_s, 0, 1000));
 }
 
+// Light from one side, as in Hoffman modulation contrast: an edge is bright where it faces the light.
+struct ReliefParams {
+  double light_deg = -135;  // where it comes from, in the picture: from x (right) towards y (down)
+};
+constexpr auto keys_of(const ReliefParams*) {
+  return hal::keys(hal::real("light_deg", &ReliefParams::light_deg, -360, 360));
+}
+
 struct MicroscopeParams {
   int width = 727;
   int height = 485;
@@ -185,6 +193,7 @@ struct MicroscopeParams {
   double noise = 2;        // grey levels, on mid grey; shot noise scales with the root
   double gradient = 0.15;  // relative illumination difference across the picture
   int impurities = 12;
+  std::optional<ReliefParams> relief;  // absent: bright field
 };
 // [camera]: what any camera of this kind has
 inline constexpr auto kCameraKeys = hal::keys(hal::whole("width_px", &MicroscopeParams::width, 64, 4096),

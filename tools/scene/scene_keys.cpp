@@ -359,6 +359,16 @@ void add_simulation(std::vector<Table>& t) {
                          [](Scene& s) { return bound(*s.sim->force_sensor); }));
   t.push_back(simulation("sim.camera", Kind::settings, {"camera"},
                          [](Scene& s) { return bound(*s.sim->microscope, sim::kMicroscopeKeys); }));
+  t.push_back({"sim.camera.relief",
+               Kind::thing,
+               [](const Scene& s) { return s.sim && s.sim->microscope && s.sim->microscope->relief; },
+               [](Scene& s, bool on) {
+                 if (s.sim && s.sim->microscope) {
+                   have(s.sim->microscope->relief, on);
+                 }
+               },
+               [](Scene& s) { return bound(*s.sim->microscope->relief); },
+               {"camera"}});
 }
 
 std::vector<Table> make_tables() {

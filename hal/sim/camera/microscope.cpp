@@ -10,6 +10,7 @@
 
 #include "hal/sim/camera/area_raster.hpp"
 #include "hal/sim/camera/blurred_layer.hpp"
+#include "hal/sim/camera/optical_path.hpp"
 
 namespace punctum::sim {
 namespace {
@@ -50,7 +51,12 @@ constexpr double kNeedleEnd = 0.14;
 constexpr double kHolderEdge = 0.80;
 constexpr double kHolderBody = 0.10;
 constexpr double kHolderRelief = 0.20;
+constexpr double kHolderLip = 0.5;    // radius of the fire-polished rim, over the outer radius
 constexpr double kHolderBore = 0.42;  // lumen behind the fire-polished mouth, over the outer radius
+
+constexpr double kReliefGain = 2.65;  // relative brightness per slope of the path, at the usual contrast
+constexpr double kReliefOfSpeck =
+    0.5;  // steepest slope, per share of the light that it takes in bright field
 
 constexpr int kGrainSide = 256;  // texture tile, a power of two
 
@@ -243,6 +249,8 @@ struct Microscope::Impl {
   std::vector<float> base;   // with the holding pipette
   std::optional<Vec3> base_mouth_m;
   std::vector<float> light;  // the present picture
+  std::array<double, 2> towards_light{};
+  OpticalPath path;  // in relief
   std::vector<float> noise_row;
 
   AreaRaster levels;
@@ -270,6 +278,11 @@ struct Microscope::Impl {
     finite(params.contrast, -kBackground, kBackground, usual.contrast);
     finite(params.noise, 0, 1000, usual.noise);
     finite(params.gradient, -2, 2, usual.gradient);
+    if (params.relief) {
+      finite(params.relief->light_deg, -360, 360, 0);
+      const double angle = params.relief->light_deg * std::numbers::pi / 180;
+      towards_light = {std::cos(angle), std::sin(angle)};
+    }
     picture = {0, 0, params.width, params.height};
     grain = make_grain(seed);
     lay_illumination();
@@ -299,12 +312,12 @@ struct Microscope::Impl {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(params.width) + static_cast<std::size_t>(x);
   }
 
-  [[nodiscard]] double blur_px(double z_m) const noexcept {
+  [[nodiscard]] double defocus_px(double z_m) const noexcept {
     const double depth_px = (z_m + params.defocus_m) / params.pixel_m;
-    if (!std::isfinite(depth_px)) {
-      return kMaxBlur_px;
-    }
-    return std::min(kMaxBlur_px, std::hypot(params.psf_px, kDefocusSlope * depth_px));
+    return std::isfinite(depth_px) ? std::min(kMaxBlur_px, std::abs(kDefocusSlope * depth_px)) : kMaxBlur_px;
+  }
+  [[nodiscard]] double blur_px(double z_m) const noexcept {
+    return std::min(kMaxBlur_px, std::hypot(params.psf_px, defocus_px(z_m)));
   }
 
   // From metres in the world frame to px. False: it cannot be drawn.
@@ -366,8 +379,7 @@ struct Microscope::Impl {
       return;
     }
     layer.start(box);
-    const double lip =
-        std::max(0.5 * (outer_px - bore_px), 0.5 * outer_px);  // radius of the fire-polished rim
+    const double lip = kHolderLip * outer_px;
     const double wide = std::max(bore_px, kHolderBore * outer_px);
     for (int y = box.y0; y < box.y1; ++y) {
       float* const row = layer.row(y - box.y0);
@@ -404,6 +416,22 @@ struct Microscope::Impl {
     take_away(base);
   }
 
+  void add_holder_to_path(const Vec3& mouth_m) {
+    Tube tube;
+    const double outer_px = holder->outer_radius_m / params.pixel_m;
+    const double bore_px = std::min(holder->inner_radius_m, 0.9 * holder->outer_radius_m) / params.pixel_m;
+    if (!to_px(mouth_m.x(), mouth_m.y(), tube.front) || !(outer_px > 1 && outer_px < kFarAway_px) ||
+        !(bore_px >= 0)) {
+      return;
+    }
+    tube.inwards = {-1, 0};
+    tube.lip_px = kHolderLip * outer_px;
+    const double wide = std::max(bore_px, kHolderBore * outer_px);
+    tube.stations = {
+        {{0, outer_px, bore_px}, {1.3 * outer_px, outer_px, wide}, {2 * outer_px, outer_px, wide}}};
+    path.add_tube(tube, defocus_px(mouth_m.z()));
+  }
+
   void draw_cell(const CellInPicture& cell) {
     Pixel centre;
     if (!to_px(cell.outer, outer) || !to_px(cell.centre_m.x(), cell.centre_m.y(), centre)) {
@@ -417,7 +445,8 @@ struct Microscope::Impl {
       return;
     }
 
-    const double c = params.contrast / kBackground;
+    const double grain_contrast = params.contrast / kBackground;
+    const double c = params.relief ? 0 : grain_contrast;  // in relief the path makes the picture
     levels.start(box);
     levels.add(outer, c);
     add_rim(outer, kOuterRim * c);
@@ -429,6 +458,12 @@ struct Microscope::Impl {
     }
     ooplasm.start(box);
     double reference = 0;
+    if (params.relief) {
+      const std::span<const Pixel> zona_inner =
+          zona_px > 0 ? std::span<const Pixel>(moved) : std::span<const Pixel>();
+      path.add_cell(outer, zona_inner, has_inner ? std::span<const Pixel>(inner) : zona_inner, centre,
+                    defocus_px(cell.centre_m.z()));
+    }
     if (has_inner) {
       levels.add(inner, kInnerStep * c);
       add_rim(inner, kInnerRim * c);
@@ -447,7 +482,7 @@ struct Microscope::Impl {
     const std::uint64_t shift = mix(cell.identity ^ 0x6a09e667f3bcc909ULL);
     const float shift_x = static_cast<float>(shift & 0xff);
     const float shift_y = static_cast<float>((shift >> 8) & 0xff);
-    const float grain_scale = static_cast<float>(kGrain * c);
+    const float grain_scale = static_cast<float>(kGrain * grain_contrast);
     const float shade = static_cast<float>(kOoplasmShade * c / radius);
     const float relief = static_cast<float>(kCellRelief / radius);
     for (int y = 0; y < box.height(); ++y) {
@@ -568,6 +603,19 @@ struct Microscope::Impl {
       return;
     }
 
+    if (params.relief) {
+      const auto station = [](double behind_px, double radius_px) {
+        return Tube::Station{behind_px, radius_px, kNeedleBore * radius_px};
+      };
+      const Tube tube{
+          tip,
+          {-ax, -ay},
+          0,
+          {station(0, tip_radius), station(taper, shaft_radius), station(2 * taper, shaft_radius)}};
+      path.add_tube(tube, defocus_px(n.tip_m.z()));
+      return;
+    }
+
     const double sigma = blur_px(n.tip_m.z());
     const double margin = kBlurReach * sigma + 3;
     const Box near = picture.grown(static_cast<int>(std::ceil(margin)));
@@ -627,6 +675,10 @@ struct Microscope::Impl {
       const double py = b.y + b.vy * t_s + b.wander * std::cos(0.9 * t_s + b.phase) + margin;
       const double cx = px - w * std::floor(px / w) - margin;
       const double cy = py - h * std::floor(py / h) - margin;
+      if (params.relief) {
+        path.add_speck({cx, cy}, std::hypot(b.radius, defocus_px(b.z_m)), kReliefOfSpeck * b.depth);
+        continue;
+      }
       const double s = std::hypot(b.radius, blur_px(b.z_m));
       const double depth = b.depth * b.radius * b.radius / (s * s) * 2.2;
       const int reach = static_cast<int>(std::ceil(4.5 * s));
@@ -674,7 +726,12 @@ struct Microscope::Impl {
       return;
     }
     const bool holding = holder && scene.holder_mouth_m && scene.holder_mouth_m->allFinite();
-    if (holding != base_mouth_m.has_value() || (holding && *scene.holder_mouth_m != *base_mouth_m)) {
+    if (params.relief) {
+      path.start(picture);
+      if (holding) {
+        add_holder_to_path(*scene.holder_mouth_m);
+      }
+    } else if (holding != base_mouth_m.has_value() || (holding && *scene.holder_mouth_m != *base_mouth_m)) {
       base_mouth_m.reset();
       if (holding) {
         draw_holder(*scene.holder_mouth_m);
@@ -691,6 +748,10 @@ struct Microscope::Impl {
       draw_needle(*scene.needle);
     }
     draw_impurities(static_cast<double>(frame_number) / params.fps);
+    if (params.relief) {
+      path.shine(towards_light, kReliefGain * params.contrast / MicroscopeParams{}.contrast, params.psf_px,
+                 light);
+    }
     expose(frame_number, out);
   }
 };

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 using namespace punctum::sim;
@@ -283,6 +284,52 @@ TEST(Microscope, noise_is_independent_between_pixels_and_frames) {
   EXPECT_LT(std::abs(later / variance), limit);
 }
 
+// The picture turned by 180 degrees faces the other way: what was bright is dark.
+TEST(Microscope, in_relief_an_edge_is_bright_towards_the_light) {
+  MicroscopeParams p = quiet();
+  p.width = p.height = 301;
+  const double r = 50e-6;
+  const Contour outer = ellipse(0, 0, r, r), inner = ellipse(0, 0, 0.85 * r, 0.85 * r);
+  const PictureScene scene = cell_scene(outer, inner, 0, 0, 5e-6);
+  Microscope bright_field(p, NeedleParams{}, std::nullopt, 1);
+  const double medium = shoot(bright_field, {}).at(5, 5);
+  for (const double degrees : {0.0, 90.0, 180.0, -90.0}) {
+    p.relief = ReliefParams{degrees};
+    Microscope m(p, NeedleParams{}, std::nullopt, 1);
+    const Shot shot = shoot(m, scene);
+    const double ux = std::cos(degrees * std::numbers::pi / 180),
+                 uy = std::sin(degrees * std::numbers::pi / 180);
+    const auto at_edge = [&](double x, double y) {  // just inside
+      const double d = r - p.pixel_m;
+      return shot.at(px_x(p, x * d), px_y(p, y * d));
+    };
+    EXPECT_GT(at_edge(ux, uy), medium + 10) << degrees;
+    EXPECT_LT(at_edge(-ux, -uy), medium - 10) << degrees;
+    EXPECT_NEAR(at_edge(-uy, ux), medium, 5) << degrees;
+    EXPECT_NEAR(shot.at(5, 5), medium, 1) << degrees;
+  }
+}
+
+TEST(Microscope, in_relief_contrast_is_that_of_the_parameters) {
+  MicroscopeParams p = quiet();
+  p.relief = ReliefParams{0};
+  const double r = 50e-6;
+  const Contour outer = ellipse(0, 0, r, r);
+  const PictureScene scene = cell_scene(outer, {}, 0, 0, 5e-6);
+  const auto brightest = [&](double contrast) {
+    p.contrast = contrast;
+    Microscope m(p, NeedleParams{}, std::nullopt, 1);
+    const Shot shot = shoot(m, scene);
+    double most = 0;
+    for (int x = 0; x < 6; ++x) {
+      most = std::max(most, shot.at(static_cast<int>(px_x(p, r)) - x, static_cast<int>(px_y(p, 0))));
+    }
+    return most - shot.at(5, 5);
+  };
+  EXPECT_NEAR(brightest(0), 0, 1);
+  EXPECT_GT(brightest(30), 1.5 * brightest(15));  // hardly bounded yet
+}
+
 TEST(Microscope, the_same_seed_scene_and_number_give_the_same_bytes) {
   const MicroscopeParams p;
   const Contour outer = ellipse(-40e-6, 0, 60e-6, 60e-6);
@@ -401,6 +448,8 @@ TEST(Microscope, any_size_and_pose_is_drawn_inside_the_buffer) {
     p.width = width;
     p.height = height;
     Microscope m(p, NeedleParams{}, HolderParams{}, 1);
+    p.relief = ReliefParams{};
+    Microscope in_relief(p, NeedleParams{}, HolderParams{}, 1);
     Guarded out(static_cast<std::size_t>(width * height));
     for (const double x : places) {
       for (const double y : places) {
@@ -411,6 +460,7 @@ TEST(Microscope, any_size_and_pose_is_drawn_inside_the_buffer) {
           scene.needle = NeedleInPicture{{x, y, z}, {x, -1, 0.2}};
           scene.holder_mouth_m = Vec3(x, y, z);
           m.render(scene, 1, out.inside());
+          in_relief.render(scene, 1, out.inside());
           ASSERT_TRUE(out.intact()) << width << "x" << height << " at " << x << "," << y;
         }
       }
@@ -419,19 +469,22 @@ TEST(Microscope, any_size_and_pose_is_drawn_inside_the_buffer) {
 }
 
 TEST(Microscope, values_that_are_not_finite_are_not_drawn) {
-  const MicroscopeParams p;
-  Microscope m(p, NeedleParams{}, HolderParams{}, 1);
-  const Shot empty = shoot(m, {}, 7);
-  Contour broken = ellipse(0, 0, 60e-6, 60e-6);
-  broken[17][1] = kNan;
-  PictureScene scene = cell_scene(broken, {}, 0, 0, 4.6e-6);
-  scene.needle = NeedleInPicture{{kNan, 0, 0}, {-1, 0, 0}};
-  scene.holder_mouth_m = Vec3(0, kNan, 0);
-  EXPECT_EQ(shoot(m, scene, 7).pixels, empty.pixels);
-  scene.needle = NeedleInPicture{{0, 0, 0}, {0, 0, 0}};  // no direction
-  EXPECT_EQ(shoot(m, scene, 7).pixels, empty.pixels);
-  scene.needle = NeedleInPicture{{0, 0, 0}, {0, 0, 1}};  // seen end on: defined, and something is drawn
-  EXPECT_NE(shoot(m, scene, 7).pixels, empty.pixels);
+  for (const auto& relief : {std::optional<ReliefParams>(), std::optional(ReliefParams{})}) {
+    MicroscopeParams p;
+    p.relief = relief;
+    Microscope m(p, NeedleParams{}, HolderParams{}, 1);
+    const Shot empty = shoot(m, {}, 7);
+    Contour broken = ellipse(0, 0, 60e-6, 60e-6);
+    broken[17][1] = kNan;
+    PictureScene scene = cell_scene(broken, {}, 0, 0, 4.6e-6);
+    scene.needle = NeedleInPicture{{kNan, 0, 0}, {-1, 0, 0}};
+    scene.holder_mouth_m = Vec3(0, kNan, 0);
+    EXPECT_EQ(shoot(m, scene, 7).pixels, empty.pixels);
+    scene.needle = NeedleInPicture{{0, 0, 0}, {0, 0, 0}};  // no direction
+    EXPECT_EQ(shoot(m, scene, 7).pixels, empty.pixels);
+    scene.needle = NeedleInPicture{{0, 0, 0}, {0, 0, 1}};  // seen end on: defined, and something is drawn
+    EXPECT_NE(shoot(m, scene, 7).pixels, empty.pixels);
+  }
 }
 
 TEST(Microscope, a_buffer_that_is_too_small_is_not_written) {
@@ -455,12 +508,15 @@ TEST(Microscope, degenerate_parameters_give_a_picture) {
     HolderParams h;
     h.outer_radius_m = bad;
     h.inner_radius_m = bad;
-    Microscope m(p, n, h, 1);
     const Contour outer = ellipse(0, 0, 60e-6, 60e-6, 64);
     PictureScene scene = cell_scene(outer, outer, 0, 0, bad);
     scene.needle = NeedleInPicture{{0, 0, 0}, {-1, 0, 0}};
     scene.holder_mouth_m = Vec3(0, 0, 0);
-    (void)shoot(m, scene, 3);
+    for (const auto& relief : {std::optional<ReliefParams>(), std::optional(ReliefParams{bad})}) {
+      p.relief = relief;
+      Microscope m(p, n, h, 1);
+      (void)shoot(m, scene, 3);
+    }
   }
 }
 

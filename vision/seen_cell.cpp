@@ -100,6 +100,7 @@ void SeenCell::follow(const ClearedPicture& picture, const SeenNeedle& needle, c
         .last_tip = needle.motion().last,
         .expected_px = needle.expected_px(result.needle),
         .punctured = touch.punctured,
+        .wall_px = config_.px(config_.h_m),
         .dents_seen = result.needle.ok || !config_.needle || round_as_if_untouched(picture, touch, result),
         .undeformed = undeformed_.shape() ? &*undeformed_.shape() : nullptr};
   };
@@ -107,7 +108,8 @@ void SeenCell::follow(const ClearedPicture& picture, const SeenNeedle& needle, c
   around_outer.within = &inner_;
   result.outer = vision::follow(outer_, picture, config_, around_outer);
   result.us.outer = watch.lap_us();
-  if (config_.inner) {
+  // Where a scene has no inner membrane, one that is stronger than the outer one is kept apart from it.
+  if (config_.inner || inner_.known) {
     const bool outer_seen = outer_.known && result.outer.ok;
     Surroundings around_inner = surroundings();
     if (outer_seen && (!inner_.known || inner_.lost())) {
@@ -118,7 +120,10 @@ void SeenCell::follow(const ClearedPicture& picture, const SeenNeedle& needle, c
     }
     around_inner.outermost = false;
     around_inner.around = outer_seen ? &outer_ : nullptr;
-    result.inner = vision::follow(inner_, picture, config_, around_inner);
+    Membrane inner = vision::follow(inner_, picture, config_, around_inner);
+    if (config_.inner) {
+      result.inner = std::move(inner);
+    }
     result.us.inner = watch.lap_us();
   }
 }

@@ -314,11 +314,12 @@ std::optional<double> Dimples::evidence(std::size_t step) const {
 }
 
 // What the inner membrane tells of dimples of the outer one: it is pushed by as much less as the space
-// between them gives way, about as wide, or lies on the tip still when the outer one has left it.
+// between it and the wall gives way, about as wide, or lies on the tip still when the outer one has left it.
 class WithinTells {
  public:
   WithinTells(const MembraneSearch& outer, const FollowedMembrane& inner, double deepest)
-      : gap_(std::max(0.0, mean_radius(outer.m.contour()) - mean_radius(inner.contour()))) {
+      : gives_way_(std::max(0.0, mean_radius(outer.m.contour()) - mean_radius(inner.contour()) -
+                                     outer.surroundings.least_wall_px())) {
     Surroundings around = outer.surroundings;
     around.outermost = false;
     around.within = nullptr;
@@ -329,25 +330,35 @@ class WithinTells {
     }
     dimples.look(deepest + kPast_px);
     first_ = dimples.depth(0);
-    const double on_tip_from = deepest - std::max(kOnTip_px, kOnTip * deepest);
+    const double tip = std::max(dimples.depth_of_tip(), 0.0);
+    on_tip_from_ = tip - std::max(kOnTip_px, kOnTip * tip);
     for (auto [k, end] = shapes_under(around.needle); k < end; ++k) {
       dimples.choose(kShapes[k], deepest_of(kShapes[k], deepest, search));
       for (std::size_t step = 0; step < dimples.steps(); ++step) {
         of_[k].push_back(dimples.evidence(step).value_or(0));
-        if (dimples.depth(step) > on_tip_from) {
-          on_tip_ = std::max(on_tip_, of_[k].back());
+        if (step == of_any_.size()) {
+          of_any_.push_back(kNone);
         }
+        of_any_[step] = std::max(of_any_[step], of_[k].back());
       }
+    }
+    for (std::size_t step = of_any_.size(); step-- > 1;) {
+      of_any_[step - 1] = std::max(of_any_[step - 1], of_any_[step]);
     }
   }
   [[nodiscard]] double evidence(std::size_t shape, double depth, bool outer_on_tip) const {
     const auto step_of = [&](double d) {
       return static_cast<int>(std::lround((d - first_) / kStepOfDepth_px));
     };
-    double best = outer_on_tip ? kNone : on_tip_ - kLetsGoAlone;
+    double best = kNone;
+    const int least = std::max(step_of(depth - gives_way_), 0),
+              on_tip = std::max(step_of(on_tip_from_), least);
+    if (!outer_on_tip && on_tip < static_cast<int>(of_any_.size())) {
+      best = of_any_[static_cast<std::size_t>(on_tip)] - kLetsGoAlone;
+    }
     for (std::size_t k = shape > 0 ? shape - 1 : 0; k < std::min(shape + 2, kDimpleShapes); ++k) {
       const int to = std::min(step_of(depth) + 1, static_cast<int>(of_[k].size()));
-      for (int step = std::max(step_of(depth - gap_), 0); step < to; ++step) {
+      for (int step = least; step < to; ++step) {
         best = std::max(best, of_[k][static_cast<std::size_t>(step)]);
       }
     }
@@ -356,9 +367,10 @@ class WithinTells {
 
  private:
   static constexpr double kNone = -1e9;
-  double gap_, first_ = 0;                        // px
+  double gives_way_, first_ = 0;                  // px; the space inside the wall, and the first depth
   std::array<Vector<double>, kDimpleShapes> of_;  // evidence, step by step
-  double on_tip_ = kNone;
+  Vector<double> of_any_;                         // of any shape, that deep or deeper
+  double on_tip_from_ = 0;                        // px, of its own depths
 };
 
 // Log odds that the membrane has left the tip: it draws the end of the needle back while it slides off, and
@@ -432,7 +444,9 @@ std::optional<SeenDimple> likeliest_dimple(const MembraneSearch& search) {
   }
   double by_shape = pushed && free ? free->evidence - pushed->evidence : 0;
   if (search.free_by_motion) {
-    by_shape = std::clamp(by_shape, -kByShape, kByShape);
+    // Where no edge is seen either, nothing tells that it has gone there.
+    const bool there = free && free->evidence > 0;
+    by_shape = std::clamp(by_shape, -kByShape, there ? kByShape : kStaysInRelief);
     on_tip -= on_tip > 0 ? *search.free_by_motion : 0;
   }
   if (!pushed || (free && on_tip < by_shape)) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <opencv2/core.hpp>
 #include <utility>
 
@@ -236,6 +237,24 @@ std::string why_not_the_same_edge(const MembraneSearch& s, const EdgeFound& foun
   return {};
 }
 
+// Along the needle, from the outer membrane's entry to where an inner membrane lies that is so far inside
+// that it does not move with it: a yolk, beside which a chorion is faint.
+double down_to_the_inner(const MembraneSearch& search, const Point& entry) {
+  constexpr double kFar_px = 15, kMargin_px = 4;
+  const Surroundings& s = search.surroundings;
+  double down = std::numeric_limits<double>::infinity();
+  if (s.within && s.within->known &&
+      mean_radius(search.m.contour()) - mean_radius(s.within->contour()) > s.wall_px + kFar_px) {
+    const Vector<double> rest = s.within->rest.seen_from(s.within->centre);
+    for (const Vector<double>* r : {&s.within->r, &rest}) {
+      if (const auto inner = entry_point(from_polar(s.within->centre, *r), s.needle.tip, s.needle.axis)) {
+        down = std::min(down, (*inner - entry).dot(s.needle.axis) - kMargin_px);
+      }
+    }
+  }
+  return down;
+}
+
 // In relief, where a membrane hardly shows that lies across the relief's axis.
 std::optional<double> odds_of_recoil(FollowedMembrane& m, const MembraneSearch& search) {
   constexpr double kNear_px = 12;   // the tip, outside
@@ -249,7 +268,8 @@ std::optional<double> odds_of_recoil(FollowedMembrane& m, const MembraneSearch& 
       // A hand that turns back at once is seen to; a tip that seems to jump ahead has not.
       const double moved_px =
           s.last_tip ? std::min(s.expected_px, (n.tip - *s.last_tip).dot(n.axis)) : s.expected_px;
-      const auto odds = m.recoil.update(search.picture, n, *entry, moved_px, m.level);
+      const auto odds =
+          m.recoil.update(search.picture, n, *entry, moved_px, m.level, down_to_the_inner(search, *entry));
       const bool pushed = std::max(m.dimple_px, search.depth_of_tip()) > kHardly_px;
       return odds && !pushed ? std::min(*odds, 0.0) : odds;
     }

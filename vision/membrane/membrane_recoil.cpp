@@ -65,7 +65,8 @@ PUNCTUM_WIDE_LOOP void compare_lane(const float* last, const float* last_seen, c
 
 }  // namespace
 
-void MembraneRecoil::look(const ClearedPicture& picture, const NeedlePose& needle, const Point& entry) {
+void MembraneRecoil::look(const ClearedPicture& picture, const NeedlePose& needle, const Point& entry,
+                          double below_px) {
   const Point step = kPlace_px * needle.axis, across(-needle.axis.y, needle.axis.x);
   std::array<float, kPlaces + GradientField::kAtOnce> gx, gy;
   now_ = 1 - now_;
@@ -81,7 +82,8 @@ void MembraneRecoil::look(const ClearedPicture& picture, const NeedlePose& needl
     for (std::size_t q = 0; q < kPlaces; ++q) {
       lane.slope[kMost + q] =
           gx[q] * static_cast<float>(needle.axis.x) + gy[q] * static_cast<float>(needle.axis.y);
-      lane.seen[kMost + q] = picture.hidden(from + static_cast<double>(q) * step) ? 0 : 1;
+      const bool beyond = kFromEntry_px + static_cast<double>(q) * kPlace_px > below_px;
+      lane.seen[kMost + q] = beyond || picture.hidden(from + static_cast<double>(q) * step) ? 0 : 1;
     }
   }
 }
@@ -106,12 +108,13 @@ void MembraneRecoil::compare(double noise, Unlike& unlike) const {
 }
 
 std::optional<double> MembraneRecoil::update(const ClearedPicture& picture, const NeedlePose& needle,
-                                             const Point& entry, double moved_px, double level) {
+                                             const Point& entry, double moved_px, double level,
+                                             double below_px) {
   // By which it may go back and go on, in a frame.
   constexpr double kBack_px = 12, kOn_px = 3, kReach_px = kPlace_px * (kMost - 1);
   // It follows a tip that goes back, which is seen less exactly while it is fast.
   constexpr double kLetsGo_px = 1, kFollows = 1.5;
-  look(picture, needle, entry);
+  look(picture, needle, entry, below_px);
   const double taken_from = kFollows * std::min(moved_px, 0.0) - kLetsGo_px;
   if (!std::exchange(seen_, true) || taken_from <= -kReach_px) {
     return std::nullopt;

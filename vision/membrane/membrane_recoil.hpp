@@ -14,11 +14,13 @@ namespace punctum::vision {
 class MembraneRecoil {
  public:
   // entry: where the needle meets the outline at rest, which moves with the cell. moved_px: of the tip along
-  // the axis since the last frame. level: usual edge, grey levels per px. Log odds that the membrane has gone
+  // the axis since the last frame. level: usual edge, grey levels per px. below_px: from the entry, how far
+  // down nothing but this membrane moves. Log odds that the membrane has gone
   // back against the tip, against that it stayed or went on with it; empty where the last frame was not seen,
   // or the tip went back too far to tell.
   [[nodiscard]] std::optional<double> update(const ClearedPicture& picture, const NeedlePose& needle,
-                                             const Point& entry, double moved_px, double level);
+                                             const Point& entry, double moved_px, double level,
+                                             double below_px);
   void forget() noexcept { seen_ = false; }
 
  private:
@@ -33,7 +35,7 @@ class MembraneRecoil {
   // Of each lane for each shift: squared differences between the two pictures, in all its places.
   using Unlike = std::array<std::array<float, 2 * kMost + 1>, kLanes>;
 
-  void look(const ClearedPicture& picture, const NeedlePose& needle, const Point& entry);
+  void look(const ClearedPicture& picture, const NeedlePose& needle, const Point& entry, double below_px);
   void compare(double noise, Unlike& unlike) const;
   [[nodiscard]] const Lanes& now() const noexcept { return lanes_[now_]; }
   [[nodiscard]] const Lanes& last() const noexcept { return lanes_[1 - now_]; }

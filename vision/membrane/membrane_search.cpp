@@ -73,6 +73,12 @@ void MembraneSearch::keep_membranes_apart() {
   if (within && within->known) {
     const double usual_gap = std::max(0.0, mean_radius(m.contour()) - mean_radius(within->contour()));
     band.lower = polar_radii(within->contour(), band.centre, angles);
+    double by_needle = -4;
+    if (m.polarity == Polarity::relief) {  // an ooplasm may be five times as clear as its zona
+      constexpr double kMayMove_px = 1;
+      const double moved = std::max(surroundings.expected_px, 0.0) + kMayMove_px;
+      by_needle = std::max(by_needle, std::min(surroundings.least_wall_px(), usual_gap) - moved);
+    }
     double tip_angle = 0;
     if (surroundings.last_tip) {
       const Point tip = *surroundings.last_tip - band.centre;
@@ -82,7 +88,7 @@ void MembraneSearch::keep_membranes_apart() {
       // The inner membrane was there one frame ago; near the needle it may have moved since.
       const bool near =
           surroundings.last_tip && angle_between(polar_angle(static_cast<int>(k), angles), tip_angle) < 0.5;
-      band.lower[k] += near ? -4.0 : std::max(2.5, 0.35 * usual_gap);
+      band.lower[k] += near ? by_needle : std::max(2.5, 0.35 * usual_gap);
     }
   }
 }

@@ -17,11 +17,19 @@ struct Surroundings {
   std::optional<Point> last_tip;  // one frame ago
   double expected_px = 0;         // by which it has moved since, along the axis
   bool punctured = false;
+  double wall_px = 0;                        // of the outer membrane, by the scene
   bool dents_seen = true;                    // no needle that is not seen may dent it
   bool outermost = true;                     // the membrane is the outer one
   const FollowedMembrane* around = nullptr;  // the membrane outside of it, if this frame shows it
   const FollowedMembrane* within = nullptr;  // the membrane inside of it, one frame ago
   const Undeformed* undeformed = nullptr;    // of the outer membrane; or null
+
+  // Nearer to the outer membrane's face the inner one never is: the wall of a cell may be thinner than the
+  // scene says.
+  [[nodiscard]] double least_wall_px() const noexcept {
+    constexpr double kThinner = 0.8;
+    return kThinner * wall_px;
+  }
 };
 
 // Where the needle meets a membrane, seen from the centre of the band.

@@ -77,7 +77,7 @@ bool clear_in_relief(const SecondEdge& inside, const FollowedMembrane& outer, co
 
 // Of the level of the other one, at least: two faces of a wall are about as clear as each other, a zona may
 // be much fainter than its ooplasm.
-constexpr double kFaceLevel = 0.4, kZonaLevel = 0.2;
+constexpr double kFaceLevel = 0.4, kZonaLevel = 0.2, kClearZonaLevel = 0.1;
 
 // Equally far from the other one all round, with this standard deviation: two faces of a wall, or ooplasm and
 // zona, between which there is a space.
@@ -132,10 +132,13 @@ bool same_edge(const ClosedEdge& a, const ClosedEdge& b) {
 std::optional<FollowedMembrane> zona_in_relief(const FollowedMembrane& ooplasm, double wall,
                                                const ClearedPicture& picture) {
   constexpr double kFurthest = 0.35, kContrast = 1;  // of the radius; times the median edge of the band
-  SecondEdge zona = find_in_relief(ooplasm.r, ooplasm.centre, ooplasm.relief, wall,
+  constexpr double kClearContrast = 5;  // likewise: as much tells a chorion that is faint beside its yolk
+  constexpr double kNearest_px = 5;     // nearer is a flank of the ooplasm's edge
+  SecondEdge zona = find_in_relief(ooplasm.r, ooplasm.centre, ooplasm.relief, std::max(wall, kNearest_px),
                                    kFurthest * median_of(ooplasm.r), picture);
+  const double least = zona.quality > kClearContrast ? kClearZonaLevel : kZonaLevel;
   return zona.quality > kContrast &&
-                 parallel_in_relief(zona, ooplasm.r, kZonaApart_px, kZonaLevel * ooplasm.level, picture)
+                 parallel_in_relief(zona, ooplasm.r, kZonaApart_px, least * ooplasm.level, picture)
              ? std::optional(
                    started(ooplasm.centre, zona.path.r, Polarity::relief, zona.path.level, zona.relief))
              : std::nullopt;
@@ -161,9 +164,7 @@ StartedMembranes tell_apart_in_relief(const MainEdge& found, const ClearedPictur
       started(main.centre, main.path.r, Polarity::relief, main.path.level, main.relief);
   if (auto zona = zona_in_relief(outermost, wall, picture)) {
     out.outer = *std::move(zona);
-    if (config.inner) {
-      out.inner = std::move(outermost);
-    }
+    out.inner = std::move(outermost);
     return out;
   }
   int further = 0;

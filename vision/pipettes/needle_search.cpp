@@ -222,7 +222,8 @@ double NeedleSearch::lie_between_walls(const GradientField& field, double noise,
     put_at_end_of_walls(field, noise, back, 10, needle);
   }
   if (const auto between =
-          walls_differ(field, needle) ? with_faint_wall(field, noise, radius_px_, needle) : std::nullopt) {
+          walls_differ(field, needle) ? with_faint_wall(field, noise, radius_px_, needle) : std::nullopt;
+      between && between->half_width <= widest_half_width()) {
     needle = *between;
     NeedlePose fitted = needle;
     if (const double s = fit_walls(field, noise, radius_px_, fitted, kLongestWall_px); s >= kStraightWalls) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <opencv2/core.hpp>
 #include <random>
@@ -50,13 +51,14 @@ struct Scene {
   }
 
   std::optional<double> see(double dimple_px, double tip_px, double moved_px, double wide_px = 22,
-                            double noise = 5, const Vector<Polygon>& covered = {}) {
+                            double noise = 5, const Vector<Polygon>& covered = {},
+                            double below_px = std::numeric_limits<double>::infinity()) {
     const cv::Mat pixels = draw(dimple_px, wide_px, noise);
     ClearedPicture picture;
     EXPECT_EQ(picture.load(test::frame_of(pixels), kWidth, kHeight), "");
     picture.compute_gradient({0, 0, kWidth, kHeight});
     picture.cover(covered);
-    return recoil.update(picture, needle(tip_px), entry, moved_px, kLevel);
+    return recoil.update(picture, needle(tip_px), entry, moved_px, kLevel, below_px);
   }
 };
 
@@ -91,6 +93,31 @@ TEST(MembraneRecoil, is_not_told_of_a_cell_that_moves_as_a_whole) {
   (void)scene.see(8, 8, 0);
   scene.entry.x += 4;  // with its outline at rest, against a needle that stays
   EXPECT_LT(scene.see(8, 8, 0).value(), 0);
+}
+
+// As a yolk far below a chorion does.
+TEST(MembraneRecoil, is_told_by_what_lies_above_another_membrane_that_stays) {
+  constexpr double kDown_px = 14;
+  const auto look = [&](Scene& scene, double dimple_px, double tip_px, double below_px) {
+    const cv::Mat outer = scene.draw(dimple_px, 22, 0);
+    cv::Mat still = scene.draw(0, 22, 0);
+    cv::Mat both = outer.clone();
+    still.convertTo(still, -1, 5, -4 * 140);  // five times as clear
+    const cv::Rect below(0, 0, static_cast<int>(scene.entry.x - kDown_px), kHeight);
+    still(below).copyTo(both(below));
+    ClearedPicture picture;
+    EXPECT_EQ(picture.load(test::frame_of(both), kWidth, kHeight), "");
+    picture.compute_gradient({0, 0, kWidth, kHeight});
+    picture.cover({});
+    return scene.recoil.update(picture, scene.needle(tip_px), scene.entry, 1, kLevel, below_px);
+  };
+  for (const double below : {kDown_px - 4, std::numeric_limits<double>::infinity()}) {
+    Scene scene;
+    (void)look(scene, 6, 6, below);
+    const auto back = look(scene, 1, 7, below);
+    ASSERT_TRUE(back);
+    EXPECT_EQ(*back > 3, below < kDown_px) << *back;
+  }
 }
 
 TEST(MembraneRecoil, is_uncertain_where_hardly_anything_is_seen) {

@@ -135,6 +135,7 @@ bool SeenNeedle::search(const ClearedPicture& picture, const FollowedMembrane& o
 
 NeedlePose SeenNeedle::locate(const ClearedPicture& picture, const FollowedMembrane& outer,
                               const Touch& touch, bool at_once) {
+  pipette_.in_relief(outer.known && outer.polarity == Polarity::relief);
   NeedlePose n = search(picture, outer, touch, at_once)
                      ? pipette_.as_found(picture.noise)
                      : pipette_.find(picture.field, picture.noise, by_stage_.moved());

@@ -176,9 +176,11 @@ constexpr auto keys_of(const ForceSensorParams*) {
 // Light from one side, as in Hoffman modulation contrast: an edge is bright where it faces the light.
 struct ReliefParams {
   double light_deg = -135;  // where it comes from, in the picture: from x (right) towards y (down)
+  double aperture = 0.37;  // of the objective, in water: what lies above and below the focus is blurred by it
 };
 constexpr auto keys_of(const ReliefParams*) {
-  return hal::keys(hal::real("light_deg", &ReliefParams::light_deg, -360, 360));
+  return hal::keys(hal::real("light_deg", &ReliefParams::light_deg, -360, 360),
+                   hal::real("aperture", &ReliefParams::aperture, 0.01, 1.2));
 }
 
 struct MicroscopeParams {

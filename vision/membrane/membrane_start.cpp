@@ -77,7 +77,7 @@ bool clear_in_relief(const SecondEdge& inside, const FollowedMembrane& outer, co
 
 // Of the level of the other one, at least: two faces of a wall are about as clear as each other, a zona may
 // be much fainter than its ooplasm.
-constexpr double kFaceLevel = 0.4, kZonaLevel = 0.2, kClearZonaLevel = 0.1;
+constexpr double kFaceLevel = 0.4, kZonaLevel = 0.2, kChorionLevel = 0.1;
 
 // Equally far from the other one all round, with this standard deviation: two faces of a wall, or ooplasm and
 // zona, between which there is a space.
@@ -128,20 +128,26 @@ bool same_edge(const ClosedEdge& a, const ClosedEdge& b) {
   return static_cast<double>(near) > kShare * static_cast<double>(a.path.r.size());
 }
 
-// Round the ooplasm, the outer face of its zona: at both, what the light crosses grows inwards.
+// Round the ooplasm, the outer face of its zona: at both, what the light crosses grows inwards. Where a zona
+// clings to it, the flank of the ooplasm's own edge is near; a chorion is far from its yolk, and faint beside
+// it.
 std::optional<FollowedMembrane> zona_in_relief(const FollowedMembrane& ooplasm, double wall,
                                                const ClearedPicture& picture) {
   constexpr double kFurthest = 0.35, kContrast = 1;  // of the radius; times the median edge of the band
-  constexpr double kClearContrast = 5;  // likewise: as much tells a chorion that is faint beside its yolk
-  constexpr double kNearest_px = 5;     // nearer is a flank of the ooplasm's edge
-  SecondEdge zona = find_in_relief(ooplasm.r, ooplasm.centre, ooplasm.relief, std::max(wall, kNearest_px),
-                                   kFurthest * median_of(ooplasm.r), picture);
-  const double least = zona.quality > kClearContrast ? kClearZonaLevel : kZonaLevel;
-  return zona.quality > kContrast &&
-                 parallel_in_relief(zona, ooplasm.r, kZonaApart_px, least * ooplasm.level, picture)
-             ? std::optional(
-                   started(ooplasm.centre, zona.path.r, Polarity::relief, zona.path.level, zona.relief))
-             : std::nullopt;
+  constexpr double kNearest_px = 5, kFar_px = 8, kFarContrast = 3.5;  // from the ooplasm; likewise
+  const auto look = [&](double from, double contrast, double level) -> std::optional<FollowedMembrane> {
+    const SecondEdge zona = find_in_relief(ooplasm.r, ooplasm.centre, ooplasm.relief, from,
+                                           kFurthest * median_of(ooplasm.r), picture);
+    return zona.quality > contrast &&
+                   parallel_in_relief(zona, ooplasm.r, kZonaApart_px, level * ooplasm.level, picture)
+               ? std::optional(
+                     started(ooplasm.centre, zona.path.r, Polarity::relief, zona.path.level, zona.relief))
+               : std::nullopt;
+  };
+  if (auto near = look(std::max(wall, kNearest_px), kContrast, kZonaLevel)) {
+    return near;
+  }
+  return look(std::max(wall, kFar_px), kFarContrast, kChorionLevel);
 }
 
 // The strongest edge is the ooplasm's, or one of the faces of the wall: the outermost one is where what the

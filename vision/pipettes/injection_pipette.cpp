@@ -315,7 +315,7 @@ bool InjectionPipette::learn_end_anew(const GradientField& field, double noise, 
     return known(*cut);
   }
   bevel_ = {};
-  const auto end = end_of_glass(field, noise, last_, 0, kStartReach_px, kStartReach_px);
+  const auto end = end_of_glass(field, noise, last_, 0, kStartReach_px, kStartReach_px, in_relief_);
   if (!end || end->sd > kEndKnown_px) {
     return false;
   }
@@ -678,7 +678,7 @@ void InjectionPipette::learn_glass(const GradientField& field, double noise, con
   if (steep) {
     end = end_of_known_cut(field, noise, middle, bevel_, glass_blur_, kGlassReach_px);
   } else if (walls_tell_) {
-    end = end_of_glass(field, noise, middle, bevel_.tangent, kGlassReach_px, kGlassReach_px);
+    end = end_of_glass(field, noise, middle, bevel_.tangent, kGlassReach_px, kGlassReach_px, in_relief_);
   } else if (const auto cut = cut_seen(field, noise, middle)) {
     end = cut->end;
   }

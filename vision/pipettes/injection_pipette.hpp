@@ -70,6 +70,8 @@ class InjectionPipette {
   // Its end in all those frames, the last of which it was followed to. False, and to be found anew, where
   // they do not tell it.
   [[nodiscard]] bool look_again(double sigma_px, const Clear& clear_at, GatheredFrames& frames);
+  // Whether the light comes from one side, as the membranes tell.
+  void in_relief(bool relief) noexcept { in_relief_ = relief; }
   // By which it is expected to move in a frame, px.
   [[nodiscard]] const Point& velocity() const noexcept { return velocity_; }
   [[nodiscard]] bool started() const noexcept { return started_; }
@@ -151,6 +153,7 @@ class InjectionPipette {
   double cut_sd_ = 0;         // of the end in the last frame, where its cut told it, px
   ThinEnd thin_end_;          // tells the same of a needle whose lumen is not seen
   double step_sign_ = 0;      // +1: it is brighter ahead of the walls, -1: darker, 0: not known yet
+  bool in_relief_ = false;
   bool walls_tell_ = true;    // where it ends, more finely than the shape does: in focus
   bool walls_agree_ = false;  // with the shape, in the last frame
 };

@@ -194,11 +194,12 @@ constexpr double kHalfWall = 0.17;
 // finer than rows, so there are several phases of rows.
 class EndRows {
  public:
-  EndRows(double half_width, double blur_px) : blur(blur_px) {
+  EndRows(double half_width, double blur_px, bool in_relief) : blur(blur_px) {
     constexpr double kTails = 5;  // blurs ahead of the end, where nothing of it is left
     // The steepest outer face of a thin wall is its middle and the blur.
     const double middle = std::max(half_width - blur, 0.6 * half_width);
-    const double behind = kHalfWall * middle, lumen = middle - behind, spread = std::numbers::sqrt2 * blur;
+    const double wall = kHalfWall * middle, lumen = middle - wall, spread = std::numbers::sqrt2 * blur;
+    const double behind = in_relief ? 0 : wall;  // a line of glass; in relief one where the glass begins
     for (std::size_t i = 0; i < kLanes; ++i) {
       const double u = place(i, half_width);
       line[i] = 0.5 * (blurred_step((lumen - u) / spread) - blurred_step((-lumen - u) / spread));
@@ -405,7 +406,7 @@ std::optional<Ends> best_end(const Rows& rows, std::span<const EndRows> blurred,
 }  // namespace
 
 std::optional<GlassEnd> end_of_glass(const GradientField& field, double noise, const NeedlePose& needle,
-                                     double bevel, double back, double ahead) {
+                                     double bevel, double back, double ahead, bool in_relief) {
   constexpr double kMargin_px = 6;  // the blur of the end reaches so far
   constexpr double kNear_px = 24;   // of the shaft look as its end, however it widens
   constexpr double kAgain_px = 3;   // round the first result
@@ -413,9 +414,9 @@ std::optional<GlassEnd> end_of_glass(const GradientField& field, double noise, c
   if (rows.seen.empty()) {
     return std::nullopt;
   }
-  const std::array<EndRows, 6> blurred{EndRows{needle.half_width, 1.4}, EndRows{needle.half_width, 1.7},
-                                       EndRows{needle.half_width, 2.1}, EndRows{needle.half_width, 2.6},
-                                       EndRows{needle.half_width, 3.2}, EndRows{needle.half_width, 4.0}};
+  const auto end_of = [&](double blur) { return EndRows{needle.half_width, blur, in_relief}; };
+  const std::array<EndRows, 6> blurred{end_of(1.4), end_of(1.7), end_of(2.1),
+                                       end_of(2.6), end_of(3.2), end_of(4.0)};
   // First with the shaft behind the range, then with the shaft just behind the end.
   auto found = best_end(rows, blurred, needle.half_width, -ahead, back, back + kMargin_px,
                         back + kMargin_px + kShaft_px, noise * noise);

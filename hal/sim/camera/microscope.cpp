@@ -23,6 +23,12 @@ constexpr double kMidGrey = 128;  // MicroscopeParams::noise is the deviation he
 constexpr double kDefocusSlope = 0.15;
 constexpr double kMaxBlur_px = 12;
 
+// The same of any aperture.
+double blur_per_depth(double aperture) {
+  constexpr double kWater = 1.33;
+  return 0.5 * std::tan(std::asin(aperture / kWater));
+}
+
 constexpr double kFarAway_px = 1e6;  // anything further away counts as absent
 
 // A little more light comes from the upper left (oblique illumination): unit vector, x right, y down.
@@ -280,6 +286,7 @@ struct Microscope::Impl {
     finite(params.gradient, -2, 2, usual.gradient);
     if (params.relief) {
       finite(params.relief->light_deg, -360, 360, 0);
+      finite(params.relief->aperture, 0.01, 1.2, ReliefParams{}.aperture);
       const double angle = params.relief->light_deg * std::numbers::pi / 180;
       towards_light = {std::cos(angle), std::sin(angle)};
     }
@@ -462,7 +469,7 @@ struct Microscope::Impl {
       const std::span<const Pixel> zona_inner =
           zona_px > 0 ? std::span<const Pixel>(moved) : std::span<const Pixel>();
       path.add_cell(outer, zona_inner, has_inner ? std::span<const Pixel>(inner) : zona_inner, centre,
-                    defocus_px(cell.centre_m.z()));
+                    defocus_px(cell.centre_m.z()), blur_per_depth(params.relief->aperture));
     }
     if (has_inner) {
       levels.add(inner, kInnerStep * c);

@@ -52,17 +52,18 @@ void OpticalPath::start(const Box& picture) {
 }
 
 void OpticalPath::add_cell(std::span<const Pixel> outer, std::span<const Pixel> zona_inner,
-                           std::span<const Pixel> ooplasm, const Pixel& centre, double blur_px) {
+                           std::span<const Pixel> ooplasm, const Pixel& centre, double blur_px,
+                           double defocus) {
   const double sigma = std::hypot(kSharp_px, blur_px);
-  const Box box = box_of(outer, kBlurReach * sigma + 2).meet(picture_);
+  const Box box = box_of(outer, kBlurReach * std::hypot(sigma, kBlurs_px.back()) + 2).meet(picture_);
   if (box.empty()) {
     return;
   }
   layer_.start(box);
   raster_.start(box);
-  const auto take = [&](auto each) {
+  const auto take = [&](const AreaRaster& raster, auto each) {
     for (int y = 0; y < box.height(); ++y) {
-      const float* const from = raster_.row(y);
+      const float* const from = raster.row(y);
       float sum = 0;
       for (int x = 0; x < box.width(); ++x) {
         sum += from[x];
@@ -80,22 +81,27 @@ void OpticalPath::add_cell(std::span<const Pixel> outer, std::span<const Pixel> 
       raster_.add(s.line, s.step);
     }
   }
-  take([&](int x, int y, float index) {
+  take(raster_, [&](int x, int y, float index) {
     index_[static_cast<std::size_t>(box.y0 + y - picture_.y0) * static_cast<std::size_t>(picture_.width()) +
            static_cast<std::size_t>(box.x0 + x - picture_.x0)] = index;
   });
-  raster_.start(box);
+  for (AreaRaster& raster : blurred_) {
+    raster.start(box);
+  }
   for (const Surface& s : surfaces) {
     if (s.line.size() >= 3) {
-      add_body(s.line, centre, s.step);
+      add_body(s.line, centre, s.step, defocus);
     }
   }
-  take([&](int x, int y, float path) { layer_.row(y)[x] = path; });
-  layer_.blur(sigma);
-  add_layer();
+  for (std::size_t i = 0; i < blurred_.size(); ++i) {
+    take(blurred_[i], [&](int x, int y, float path) { layer_.row(y)[x] = path; });
+    layer_.blur(std::hypot(sigma, kBlurs_px[i]));
+    add_layer();
+  }
 }
 
-void OpticalPath::add_body(std::span<const Pixel> equator, const Pixel& centre, double index) {
+void OpticalPath::add_body(std::span<const Pixel> equator, const Pixel& centre, double index,
+                           double defocus) {
   const double radius = std::sqrt(std::abs(signed_area(equator)) / std::numbers::pi);
   slice_.resize(equator.size());
   // They shrink by equal angles, so that they lie close where the body is steep.
@@ -108,7 +114,21 @@ void OpticalPath::add_body(std::span<const Pixel> equator, const Pixel& centre, 
       slice_[i] = {centre.x + shrunk * (equator[i].x - centre.x),
                    centre.y + shrunk * (equator[i].y - centre.y)};
     }
-    raster_.add(slice_, index * 2 * radius * (std::sin((k + 1) * step) - std::sin(k * step)));
+    const double path = index * 2 * radius * (std::sin((k + 1) * step) - std::sin(k * step));
+    // Between two blurs so that the variance is its own.
+    const double blur = std::min(defocus * radius * std::sin((k + 0.5) * step), kBlurs_px.back());
+    std::size_t above = 1;
+    while (above + 1 < kBlurs_px.size() && kBlurs_px[above] < blur) {
+      ++above;
+    }
+    const double low = kBlurs_px[above - 1], high = kBlurs_px[above],
+                 share = (blur * blur - low * low) / (high * high - low * low);
+    if (share < 1) {
+      blurred_[above - 1].add(slice_, path * (1 - share));
+    }
+    if (share > 0) {
+      blurred_[above].add(slice_, path * share);
+    }
   }
 }
 

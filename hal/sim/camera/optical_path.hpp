@@ -30,9 +30,10 @@ struct Tube {
 class OpticalPath {
  public:
   void start(const Box& picture);  // nothing but medium
-  // Surfaces at the height of the focus, from outside inwards; an empty one is not there.
+  // Surfaces at the height of the focus, from outside inwards; an empty one is not there. defocus: px of blur
+  // per px above or below that height.
   void add_cell(std::span<const Pixel> outer, std::span<const Pixel> zona_inner,
-                std::span<const Pixel> ooplasm, const Pixel& centre, double blur_px);
+                std::span<const Pixel> ooplasm, const Pixel& centre, double blur_px, double defocus);
   // Glass takes the place of what the cell has there.
   void add_tube(const Tube& tube, double blur_px);
   // A round grain; the strongest slope of its path.
@@ -42,13 +43,15 @@ class OpticalPath {
   void shine(const std::array<double, 2>& towards, double gain, double blur_px, std::vector<float>& light);
 
  private:
-  void add_body(std::span<const Pixel> equator, const Pixel& centre, double index);
+  void add_body(std::span<const Pixel> equator, const Pixel& centre, double index, double defocus);
   void add_layer() noexcept;
 
   Box picture_;
   std::vector<float> path_;
   std::vector<float> index_;  // of the cell at the height of the focus
   AreaRaster raster_;
+  static constexpr std::array kBlurs_px{0.0, 0.75, 1.5, 3.0, 6.0, 12.0};
+  std::array<AreaRaster, kBlurs_px.size()> blurred_;  // of a cell, by how far they are out of focus
   BlurredLayer layer_;
   std::vector<Pixel> slice_;
 };

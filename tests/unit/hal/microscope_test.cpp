@@ -294,7 +294,7 @@ TEST(Microscope, in_relief_an_edge_is_bright_towards_the_light) {
   Microscope bright_field(p, NeedleParams{}, std::nullopt, 1);
   const double medium = shoot(bright_field, {}).at(5, 5);
   for (const double degrees : {0.0, 90.0, 180.0, -90.0}) {
-    p.relief = ReliefParams{degrees};
+    p.relief = ReliefParams{degrees, 0.37};
     Microscope m(p, NeedleParams{}, std::nullopt, 1);
     const Shot shot = shoot(m, scene);
     const double ux = std::cos(degrees * std::numbers::pi / 180),
@@ -312,7 +312,7 @@ TEST(Microscope, in_relief_an_edge_is_bright_towards_the_light) {
 
 TEST(Microscope, in_relief_contrast_is_that_of_the_parameters) {
   MicroscopeParams p = quiet();
-  p.relief = ReliefParams{0};
+  p.relief = ReliefParams{0, 0.37};
   const double r = 50e-6;
   const Contour outer = ellipse(0, 0, r, r);
   const PictureScene scene = cell_scene(outer, {}, 0, 0, 5e-6);
@@ -512,7 +512,7 @@ TEST(Microscope, degenerate_parameters_give_a_picture) {
     PictureScene scene = cell_scene(outer, outer, 0, 0, bad);
     scene.needle = NeedleInPicture{{0, 0, 0}, {-1, 0, 0}};
     scene.holder_mouth_m = Vec3(0, 0, 0);
-    for (const auto& relief : {std::optional<ReliefParams>(), std::optional(ReliefParams{bad})}) {
+    for (const auto& relief : {std::optional<ReliefParams>(), std::optional(ReliefParams{bad, bad})}) {
       p.relief = relief;
       Microscope m(p, n, h, 1);
       (void)shoot(m, scene, 3);

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -61,7 +62,7 @@ std::vector<Pixel> circle(double r) {
 constexpr double kOuter_px = 120, kWithinZona_px = 112, kOoplasm_px = 104;
 
 void add_cell(OpticalPath& path) {
-  path.add_cell(circle(kOuter_px), circle(kWithinZona_px), circle(kOoplasm_px), kMiddle, 0);
+  path.add_cell(circle(kOuter_px), circle(kWithinZona_px), circle(kOoplasm_px), kMiddle, 0, 0);
 }
 
 // Of the path through the three balls, d from their middle.
@@ -102,6 +103,34 @@ TEST(OpticalPath, an_edge_is_bright_where_it_faces_the_light_and_dark_where_it_d
     EXPECT_NEAR(light.at(kMiddle.x, kMiddle.y + r), 1, 0.02) << r;
     EXPECT_NEAR(light.at(kMiddle.x, kMiddle.y - r), 1, 0.02) << r;
   }
+}
+
+// What lies above and below the focus is blurred: all of the path is there, its rim is as sharp as before.
+TEST(OpticalPath, a_lens_has_a_plane_of_focus) {
+  constexpr double kFaint = 0.05, kSoft_px = 3;  // gain and blur: light in proportion to the slope
+  const auto sum_and_rim = [](double defocus) {
+    OpticalPath path;
+    path.start(kPicture);
+    path.add_cell(circle(60), {}, circle(60), kMiddle, kSoft_px, defocus);
+    Light light{std::vector<float>(static_cast<std::size_t>(kPicture.width() * kPicture.height()), 1.0F)};
+    path.shine({1, 0}, kFaint, kBlur_px, light.value);
+    double moment = 0, rim = 0;  // the moment of the slope is the sum of the path
+    for (int y = 0; y + 1 < kPicture.height(); ++y) {
+      for (int x = 0; x + 1 < kPicture.width(); ++x) {
+        moment += (light.at(x, y) - 1) * (x - kMiddle.x) / kFaint;
+      }
+    }
+    for (const double x : {58.0, 59.0, 60.0}) {
+      rim = std::max(rim, (light.at(kMiddle.x + x, kMiddle.y) - 1) / kFaint);
+    }
+    return std::array{moment, rim};
+  };
+  const auto sharp = sum_and_rim(0), blurred = sum_and_rim(0.15);
+  const double volume = (kZona + kOoplasm) * 4 / 3 * std::numbers::pi * 60 * 60 * 60;
+  EXPECT_NEAR(sharp[0], volume, 0.02 * volume);
+  EXPECT_NEAR(blurred[0], volume, 0.02 * volume);
+  EXPECT_GT(blurred[1], 0.6 * sharp[1]);
+  EXPECT_LT(blurred[1], 0.97 * sharp[1]);
 }
 
 // From the right, straight, with a bore.
@@ -165,7 +194,7 @@ TEST(OpticalPath, what_lies_beyond_the_picture_is_left_out) {
     for (Pixel& p : line) {
       p.x += far;
     }
-    path.add_cell(line, line, line, {kMiddle.x + far, kMiddle.y}, 2);
+    path.add_cell(line, line, line, {kMiddle.x + far, kMiddle.y}, 2, 0.15);
     Tube t = tube(20, 10);
     t.front.y += far;
     path.add_tube(t, 2);

@@ -1,4 +1,5 @@
-// The simulated microscope: a bright-field picture of the cell, the two pipettes and drifting impurities.
+// The simulated microscope: a picture of the cell, the two pipettes and drifting impurities, in bright field
+// or with light from one side (`optical_path.hpp`).
 //
 // Every outline is filled with the exact area it covers of each pixel, then blurred with the point-spread
 // function of its depth, so the given contours are the geometric edges before blur. It runs in the vision

@@ -14,12 +14,13 @@ struct Relief {
   const char* scene;
   int light_deg, seed;
   double contour_px;  // rms at most, in the whole run
+  double tip_px;      // by which the tip may be too far ahead or behind, mean before contact
 };
 
 class ReliefRuns : public Programs, public testing::WithParamInterface<Relief> {};
 
 TEST_P(ReliefRuns, are_done_and_tell_where_the_membrane_is) {
-  const auto& [scene, light_deg, seed, contour_px] = GetParam();
+  const auto& [scene, light_deg, seed, contour_px, tip_px] = GetParam();
   const bool fish = std::string(scene) == "zebrafish";
   ASSERT_EQ(punctum({"run", scene, "--clock", "virtual", "--seed", std::to_string(seed), "--no-figure",
                      "--no-frames", "--set", "sim.camera.relief=on", "--set",
@@ -33,6 +34,14 @@ TEST_P(ReliefRuns, are_done_and_tell_where_the_membrane_is) {
   EXPECT_EQ(r["stale_observations"], 0);
   const double pixel_um = fish ? 3.25 : 0.825;
   EXPECT_LT(r["contour_error_um"]["rms"].get<double>(), contour_px * pixel_um);
+  const Table seen(fs::path(report()) / "obs.csv");
+  double ahead_um = 0;
+  int frames = 0;
+  for (std::size_t i = 0; i < seen.rows.size() && seen.text(i, "phase") == "free"; ++i, ++frames) {
+    ahead_um += seen.number(i, "tip_error_um");
+  }
+  ASSERT_GT(frames, 50);
+  EXPECT_LT(std::abs(ahead_um / frames), tip_px * pixel_um);
   EXPECT_LT(std::abs(r["contact_delay_ms"].get<double>()), 150);
   EXPECT_GT(r["puncture_delay_ms"].get<double>(), 0);
   EXPECT_LT(r["puncture_delay_ms"].get<double>(), 250);  // the picture comes 40 ms late, every 40 ms
@@ -40,17 +49,33 @@ TEST_P(ReliefRuns, are_done_and_tell_where_the_membrane_is) {
 
 // In icsi 3 and 7 the outer membrane was once drawn to the ooplasm's edge by 7 um in contact, and told in
 // a dimple for nine frames after it had gone back. Of zebrafish 1 the yolk was once taken for the chorion, 80
-// um inside of it; in 2 the chorion is a fifth as clear as the yolk; in 3 the needle was not found.
-// outer-only was lost every other frame: its one membrane is fainter than what lies within.
+// um inside of it; in 2 the chorion is a fifth as clear as the yolk.
+// outer-only was lost every other frame: its one membrane is fainter than what lies within. In icsi 9 the tip
+// was once told 0.8 px too far ahead; where the light comes along the needle (7), or along its walls (3), it
+// is still told 0.6 px off.
 INSTANTIATE_TEST_SUITE_P(Scenes, ReliefRuns,
-                         testing::Values(Relief{"icsi", 51, 3, 0.8}, Relief{"icsi", -1, 7, 0.7},
-                                         Relief{"outer-only", -26, 2, 1.2}, Relief{"zebrafish", -103, 1, 0.6},
-                                         Relief{"zebrafish", -26, 2, 0.8}, Relief{"zebrafish", 51, 3, 0.6}),
+                         testing::Values(Relief{"icsi", 51, 3, 0.8, 0.8}, Relief{"icsi", -1, 7, 0.7, 0.8},
+                                         Relief{"icsi", 153, 9, 0.6, 0.35},
+                                         Relief{"outer-only", -26, 2, 1.2, 0.35},
+                                         Relief{"zebrafish", -103, 1, 0.6, 1.6},
+                                         Relief{"zebrafish", -26, 2, 0.8, 1.6}),
                          [](const auto& of) {
                            std::string scene = of.param.scene;
                            std::replace(scene.begin(), scene.end(), '-', '_');
                            return scene + "_" + std::to_string(of.param.seed);
                          });
+
+// The two lines of a wall were once taken for two walls, and the needle refused for being too wide.
+TEST_F(Programs, a_thin_needle_is_found_in_relief) {
+  (void)punctum({"run", "zebrafish", "--clock", "virtual", "--seed", "3", "--seconds", "1", "--no-figure",
+                 "--no-frames", "--set", "sim.camera.relief=on", "--set", "sim.camera.relief.light_deg=51",
+                 "--set", "sim.camera.relief.aperture=0.1"});
+  const Table seen(fs::path(report()) / "obs.csv");
+  ASSERT_GT(seen.rows.size(), 20U) << said_;
+  for (std::size_t i = 0; i < seen.rows.size(); ++i) {
+    EXPECT_FALSE(seen.text(i, "tip_x_px").empty()) << i << ": " << seen.text(i, "verdict");
+  }
+}
 
 }  // namespace
 }  // namespace punctum::e2e

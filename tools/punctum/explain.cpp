@@ -40,8 +40,9 @@ std::string camera_text(const Scene& s) {
     return fmt::format("  camera                {}", s.devices.camera);
   }
   const sim::MicroscopeParams& m = *s.sim->microscope;
-  return fmt::format("  simulated microscope  {} x {} px, {:g} um/px, {:g} per s, seen {:g} ms later",
-                     m.width, m.height, m.pixel_m * 1e6, m.fps, m.latency_s * 1e3);
+  return fmt::format("  simulated microscope  {} x {} px, {:g} um/px, {:g} per s, seen {:g} ms later{}",
+                     m.width, m.height, m.pixel_m * 1e6, m.fps, m.latency_s * 1e3,
+                     m.relief ? fmt::format(", in relief, lit from {:g} degrees", m.relief->light_deg) : "");
 }
 
 std::string cpu(int n) { return n < 0 ? "any CPU" : fmt::format("CPU {}", n); }
@@ -83,6 +84,7 @@ constexpr Saving kSavings[] = {
     {"forbidden.floor", "nothing keeps the needle from the dish floor but the workspace"},
     {"forbidden.holder", "nothing keeps the needle from the holding pipette"},
     {"sim.dish", "the simulated dish has no floor"},
+    {"sim.camera.relief", "the simulated microscope shows bright field"},
     {"cia402", "no CAN bus"},
     {"watchdog", "a machine that hangs stays as it is, with the drives off by the relay"},
     {"stream", "no other machine is told positions and forces"},

@@ -39,6 +39,15 @@ std::optional<InnerOnNeedle> inner_on_needle(const FollowedMembrane& inner, cons
   return nearer;
 }
 
+// Of the membrane on the needle, over that where it faces the light: with the light across the needle, hardly
+// anything of it is seen there.
+double clearness_at_needle(const FollowedMembrane& outer, const Result& result) {
+  constexpr double kLeast = 0.2;
+  return outer.polarity == Polarity::relief
+             ? std::max(std::abs(outer.relief.sign_at(-result.needle.axis)), kLeast)
+             : 1;
+}
+
 }  // namespace
 
 void SeenEvents::go_on_from(const SeenEvents& before, rt::Phase phase, Result& result) {
@@ -85,7 +94,7 @@ void SeenEvents::decide(const ClearedPicture& picture, const SeenNeedle& needle,
     in.tip_px = -in.gap_px;
     in.membrane_px = in.tip_px - *behind_tip;
     in.depth_px = in.membrane_px;
-    in.sd_px = math::hypot(kContactPoint_px, result.needle.sd);
+    in.sd_px = math::hypot(kContactPoint_px, result.needle.sd) / clearness_at_needle(cell.outer(), result);
     in.free = !cell.outer().held;
   }
   touch_.punctured = result.punctured = puncture_.update(in);

@@ -33,6 +33,7 @@ constexpr double kThrough = 12;  // log odds that a membrane is not on the tip t
 constexpr double kStays = 3;     // log odds that it stays on the tip, or off it, for a frame
 // In relief its motion tells it, too; a shape that is none of those tried tells no more than that.
 constexpr double kStaysInRelief = 5, kByShape = 10;
+constexpr double kGivesWay_px = 2.5, kGivesWay = 0.25;  // by which it then goes back at least; of its depth
 constexpr double kLetsGoAlone = 6;  // log odds against an outer membrane off the tip with the inner one on it
 constexpr double kHand_px = 1;      // by which a hand changes the needle's speed in a frame
 constexpr double kJumped = 5;       // log odds at most, by a jump of the tip, that it is off it
@@ -444,9 +445,11 @@ std::optional<SeenDimple> likeliest_dimple(const MembraneSearch& search) {
   }
   double by_shape = pushed && free ? free->evidence - pushed->evidence : 0;
   if (search.free_by_motion) {
-    // Where no edge is seen either, nothing tells that it has gone there.
-    const bool there = free && free->evidence > 0;
-    by_shape = std::clamp(by_shape, -kByShape, there ? kByShape : kStaysInRelief);
+    // Where no edge is seen either, nothing tells that it has gone there; and one that is hardly less deep
+    // than in the last frame has not gone back.
+    const double last = m.held ? m.dimple_px - std::max(kGivesWay_px, kGivesWay * m.dimple_px) : tip;
+    const bool gone = free && free->evidence > 0 && free->depth < last;
+    by_shape = std::clamp(by_shape, -kByShape, gone ? kByShape : kStaysInRelief);
     on_tip -= on_tip > 0 ? *search.free_by_motion : 0;
   }
   if (!pushed || (free && on_tip < by_shape)) {

@@ -220,7 +220,7 @@ std::string on_terminal(const Strings& args, const char* no_color, unsigned shor
 
 TEST_F(LabReport, colour_is_for_terminals_that_want_it_and_the_live_line_fits_them) {
   const auto run = [this](const char* name) {
-    return Strings{"run",        "free",        "--seconds", "1",          "--report",
+    return Strings{"run",        "free",        "--seconds", "2",          "--report",
                    report(name), "--no-figure", "--set",     kPatientRelay};
   };
   const std::regex colour("\033\\[[0-9;]*m");

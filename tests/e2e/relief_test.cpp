@@ -52,18 +52,19 @@ TEST_P(ReliefRuns, are_done_and_tell_where_the_membrane_is) {
 // um inside of it; in 2 the chorion is a fifth as clear as the yolk.
 // outer-only was lost every other frame: its one membrane is fainter than what lies within. In icsi 9 the tip
 // was once told 0.8 px too far ahead; where the light comes along the needle (7), or along its walls (3), it
-// is still told 0.6 px off.
-INSTANTIATE_TEST_SUITE_P(Scenes, ReliefRuns,
-                         testing::Values(Relief{"icsi", 51, 3, 0.8, 0.8}, Relief{"icsi", -1, 7, 0.7, 0.8},
-                                         Relief{"icsi", 153, 9, 0.6, 0.35},
-                                         Relief{"outer-only", -26, 2, 1.2, 0.35},
-                                         Relief{"zebrafish", -103, 1, 0.6, 1.6},
-                                         Relief{"zebrafish", -26, 2, 0.8, 1.6}),
-                         [](const auto& of) {
-                           std::string scene = of.param.scene;
-                           std::replace(scene.begin(), scene.end(), '-', '_');
-                           return scene + "_" + std::to_string(of.param.seed);
-                         });
+// is still told 0.6 px off. In 221 and 242 the light comes across the needle, and the puncture was once told
+// 0.8 and 1.6 s before it happened.
+INSTANTIATE_TEST_SUITE_P(
+    Scenes, ReliefRuns,
+    testing::Values(Relief{"icsi", 51, 3, 0.8, 0.8}, Relief{"icsi", -1, 7, 0.7, 0.8},
+                    Relief{"icsi", 153, 9, 0.6, 0.35}, Relief{"icsi", -83, 221, 0.6, 0.35},
+                    Relief{"icsi", 94, 242, 0.6, 0.35}, Relief{"outer-only", -26, 2, 1.2, 0.35},
+                    Relief{"zebrafish", -103, 1, 0.6, 1.6}, Relief{"zebrafish", -26, 2, 0.8, 1.6}),
+    [](const auto& of) {
+      std::string scene = of.param.scene;
+      std::replace(scene.begin(), scene.end(), '-', '_');
+      return scene + "_" + std::to_string(of.param.seed);
+    });
 
 // The two lines of a wall were once taken for two walls, and the needle refused for being too wide.
 TEST_F(Programs, a_thin_needle_is_found_in_relief) {

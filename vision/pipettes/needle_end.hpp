@@ -21,6 +21,6 @@ struct GlassEnd {
 // not stand out, or do not end.
 [[nodiscard]] std::optional<GlassEnd> end_of_glass(const GradientField& field, double noise,
                                                    const NeedlePose& needle, double bevel, double back,
-                                                   double ahead, bool in_relief = false);
+                                                   double ahead, bool in_relief);
 
 }  // namespace punctum::vision

@@ -105,6 +105,10 @@ void EdgeSamples::sample(const GradientField& field, const EdgeBand& band, const
   constexpr int kMostSamples = 512;
   const std::size_t m = static_cast<std::size_t>(samples);
   float *edges = edge.data() + a * m, *costs = cost.data() + a * m;
+  const auto sample_at = [&](double r) {  // the first one at or beyond that radius
+    return static_cast<std::size_t>(
+        std::clamp(std::ceil((r - ray.first) / band.step), 0.0, static_cast<double>(samples)));
+  };
   if (band.hidden.empty() || band.hidden[a] == 0) {
     const Point from = band.centre + ray.first * ray.direction, step = band.step * ray.direction;
     const auto along = static_cast<float>(ray.normal.x), down = static_cast<float>(ray.normal.y);
@@ -140,13 +144,14 @@ void EdgeSamples::sample(const GradientField& field, const EdgeBand& band, const
         }
       }
     }
+    if (!band.seen_to.empty()) {
+      const std::size_t beyond = sample_at(band.seen_to[a]);
+      std::fill(edges + beyond, edges + m, 0.0F);
+      std::fill(costs + beyond, costs + m, 1.0F);
+    }
     const float* near = costs + (half - half / 2);
     shown[a] = std::find(near, near + 2 * (half / 2) + 1, 0.0F) != near + 2 * (half / 2) + 1 ? 1 : 0;
   }
-  const auto sample_at = [&](double r) {  // the first one at or beyond that radius
-    return static_cast<std::size_t>(
-        std::clamp(std::ceil((r - ray.first) / band.step), 0.0, static_cast<double>(samples)));
-  };
   if (!band.lower.empty()) {
     std::fill_n(costs, sample_at(band.lower[a]), kForbidden);
   }

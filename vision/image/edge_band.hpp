@@ -42,6 +42,7 @@ struct EdgeBand {
   double stiffness = 0.25;           // cost of that change, per (px/px)^2 and angle
   Vector<double> lower, upper;       // hard limits per angle; or empty
   Vector<std::uint8_t> hidden;       // 1: nothing is visible along this ray; or empty
+  Vector<double> seen_to;            // further out nothing is visible, per angle; or empty
   Relief relief;                     // for Polarity::relief
   bool measures_background = false;  // see EdgePath::background
   // CV_8U, of the whole picture; or empty. Not 0: the pixel belongs to something else (a pipette, an

@@ -175,6 +175,9 @@ void ClearedPicture::exclude_holder(EdgeBand& band, const Vector<double>& expect
   if (band.upper.empty()) {
     band.upper.assign(band.middle.size(), 1e9);
   }
+  if (relief) {
+    band.seen_to.assign(band.middle.size(), 1e9);
+  }
   for (int i = 0; i < n; ++i) {
     const Point d = on_ray(Point(0, 0), i, n, 1);
     if (d.dot(axis) > -0.2) {  // this ray does not meet the face
@@ -190,6 +193,8 @@ void ClearedPicture::exclude_holder(EdgeBand& band, const Vector<double>& expect
     }
     if (expected[k] > r - reach) {
       band.hidden[k] = 1;
+    } else if (relief) {
+      band.seen_to[k] = r - reach;
     }
   }
 }

@@ -690,7 +690,7 @@ void InjectionPipette::learn_glass(const GradientField& field, double noise, con
 
 void InjectionPipette::learn_thin_end(const GradientField& field, double noise, const NeedlePose& followed) {
   constexpr int kFrames = 96, kTogether = 8;
-  if (thin_end_.frames() >= kFrames || !thin_end_.add(field, followed) ||
+  if (thin_end_.frames() >= kFrames || !thin_end_.add(field, followed, in_relief_) ||
       thin_end_.frames() % kTogether != 0) {
     return;
   }

@@ -43,7 +43,11 @@ double gain(const Products& p, double line) {
 
 }  // namespace
 
-bool ThinEnd::add(const GradientField& field, const NeedlePose& followed) {
+bool ThinEnd::add(const GradientField& field, const NeedlePose& followed, bool in_relief) {
+  if (in_relief_ != in_relief) {
+    forget();
+  }
+  in_relief_ = in_relief;
   if (frames_ == 0) {
     half_width_ = followed.half_width;
     taken_.assign(kRows, 0.0);
@@ -57,14 +61,18 @@ bool ThinEnd::add(const GradientField& field, const NeedlePose& followed) {
       }
     }
   }
+  // How much of what is beside the needle is also where it is.
+  const double under = in_relief ? inner * (inner + 1.0) / (outer * (outer + 1.0) - inner * (inner + 1.0))
+                                 : (2 * inner + 1) / (2.0 * (outer - inner));
   const double part = 1.0 / ++frames_;
   for (std::size_t j = 0; j < kRows; ++j) {
     const double s = kFirst_px + kRow_px * static_cast<double>(j);
     double inside = 0, beside = 0;
     for (int i = -outer; i <= outer; ++i) {
-      (std::abs(i) <= inner ? inside : beside) += field.grey(followed.at(s, i * kLane_px));
+      const double counts = in_relief ? (i > 0) - (i < 0) : 1;
+      (std::abs(i) <= inner ? inside : beside) += counts * field.grey(followed.at(s, i * kLane_px));
     }
-    const double taken = kLane_px * (inside - beside * (2 * inner + 1) / (2.0 * (outer - inner)));
+    const double taken = kLane_px * (inside - beside * under);
     taken_[j] += part * (taken - taken_[j]);
   }
   return true;
@@ -109,7 +117,7 @@ std::optional<GlassEnd> ThinEnd::end(double noise) const {
         p.ld += line[k] * taken_[j];
       }
       for (std::size_t l = 0; l < kLines; ++l) {
-        *next++ = gain(p, most * static_cast<double>(l) / (kLines - 1));
+        *next++ = gain(p, in_relief_ ? 0 : most * static_cast<double>(l) / (kLines - 1));
       }
     }
   }

@@ -11,12 +11,13 @@ namespace punctum::vision {
 
 // What the needle takes of the light, summed across, is a step along it, and a line of glass that closes it a
 // hump on this step: the walls alone seem to end up to a blur ahead of the glass. A single frame tells step
-// and hump apart badly, so it is told from the mean of many. Taken to be cut at right angles.
+// and hump apart badly, so it is told from the mean of many. In relief what one side shows less what the
+// other does is a step, and a line across shows in neither. Taken to be cut at right angles.
 class ThinEnd {
  public:
   void forget() { frames_ = 0; }
   // One more frame with nothing near the end that is followed. False, and none, at the border of the picture.
-  bool add(const GradientField& field, const NeedlePose& followed);
+  bool add(const GradientField& field, const NeedlePose& followed, bool in_relief);
   [[nodiscard]] int frames() const noexcept { return frames_; }
   // The outermost glass, from the end that is followed. noise: grey levels, of a frame. Empty where that is
   // not certain to 0.45 px.
@@ -24,8 +25,10 @@ class ThinEnd {
 
  private:
   int frames_ = 0;
+  bool in_relief_ = false;
   double half_width_ = 0;  // px
-  Vector<double> taken_;   // of the light in each row: mean of the frames, grey levels times px
+  Vector<double> taken_;   // of the light in each row, or by how much its sides differ: mean of the frames,
+                           // grey levels times px
 };
 
 }  // namespace punctum::vision

@@ -51,6 +51,7 @@ bool ThinEnd::add(const GradientField& field, const NeedlePose& followed, bool i
   if (frames_ == 0) {
     half_width_ = followed.half_width;
     taken_.assign(kRows, 0.0);
+    unlike_.assign(kRows, 0.0);
   }
   const int inner = static_cast<int>(std::lround((half_width_ + kAside_px) / kLane_px)),
             outer = inner + static_cast<int>(kBeside_px / kLane_px);
@@ -61,19 +62,20 @@ bool ThinEnd::add(const GradientField& field, const NeedlePose& followed, bool i
       }
     }
   }
-  // How much of what is beside the needle is also where it is.
-  const double under = in_relief ? inner * (inner + 1.0) / (outer * (outer + 1.0) - inner * (inner + 1.0))
-                                 : (2 * inner + 1) / (2.0 * (outer - inner));
   const double part = 1.0 / ++frames_;
   for (std::size_t j = 0; j < kRows; ++j) {
     const double s = kFirst_px + kRow_px * static_cast<double>(j);
-    double inside = 0, beside = 0;
+    double inside = 0, beside = 0, inside_unlike = 0, beside_unlike = 0;
     for (int i = -outer; i <= outer; ++i) {
-      const double counts = in_relief ? (i > 0) - (i < 0) : 1;
-      (std::abs(i) <= inner ? inside : beside) += counts * field.grey(followed.at(s, i * kLane_px));
+      const double grey = field.grey(followed.at(s, i * kLane_px)), unlike = i < 0 ? -grey : i > 0 ? grey : 0;
+      (std::abs(i) <= inner ? inside : beside) += grey;
+      (std::abs(i) <= inner ? inside_unlike : beside_unlike) += unlike;
     }
-    const double taken = kLane_px * (inside - beside * under);
-    taken_[j] += part * (taken - taken_[j]);
+    // A medium that is even, and one that grows across.
+    const double even = (2 * inner + 1) / (2.0 * (outer - inner)),
+                 grows = inner * (inner + 1.0) / (outer * (outer + 1.0) - inner * (inner + 1.0));
+    taken_[j] += part * (kLane_px * (inside - beside * even) - taken_[j]);
+    unlike_[j] += part * (kLane_px * (inside_unlike - beside_unlike * grows) - unlike_[j]);
   }
   return true;
 }
@@ -83,8 +85,8 @@ std::optional<GlassEnd> ThinEnd::end(double noise) const {
     return std::nullopt;
   }
   double square = 0;
-  for (const double taken : taken_) {
-    square += taken * taken;
+  for (std::size_t j = 0; j < kRows; ++j) {
+    square += taken_[j] * taken_[j] + (in_relief_ ? unlike_[j] * unlike_[j] : 0);
   }
   constexpr int kPerRow = static_cast<int>(kRow_px / kEnd_px);
   constexpr auto kEnds = static_cast<std::size_t>(2 * kReach_px / kEnd_px) + 1,
@@ -92,8 +94,9 @@ std::optional<GlassEnd> ThinEnd::end(double noise) const {
   Vector<double> gains(kBlurs_px.size() * kEnds * kLines), step(kShown), line(kShown);
   auto next = gains.begin();
   for (const double blur : kBlurs_px) {
-    // The middle of the line lies half a wall behind the end.
-    const double radius = outer_radius_of_glass(half_width_, blur), behind = kHalfWall * radius;
+    // The middle of the line lies half a wall behind the end; that of the light's slope at the end itself.
+    const double radius = outer_radius_of_glass(half_width_, blur),
+                 behind = in_relief_ ? 0 : kHalfWall * radius;
     const double furthest = kFirst_px - kReach_px;  // of the first row behind the last end
     for (std::size_t k = 0; k < kShown; ++k) {
       const double t = furthest + kEnd_px * static_cast<double>(k), z = (t - behind) / blur;
@@ -102,7 +105,7 @@ std::optional<GlassEnd> ThinEnd::end(double noise) const {
     }
     const double most = kMostLine * radius / (std::sqrt(2 * std::numbers::pi) * blur);
     for (std::size_t e = 0; e < kEnds; ++e) {
-      Products p;
+      Products p, sides;
       for (std::size_t j = 0; j < kRows; ++j) {
         const std::size_t k = e + kPerRow * j;
         const double place = furthest + kEnd_px * static_cast<double>(k), slope = step[k] * place;
@@ -115,18 +118,29 @@ std::optional<GlassEnd> ThinEnd::end(double noise) const {
         p.sd += step[k] * taken_[j];
         p.td += slope * taken_[j];
         p.ld += line[k] * taken_[j];
+        sides.sd += step[k] * unlike_[j];
+        sides.td += slope * unlike_[j];
+      }
+      if (in_relief_) {
+        sides.ss = p.ss;
+        sides.st = p.st;
+        sides.tt = p.tt;
+        const Products along{.ss = p.ll, .st = p.sl, .tt = p.ss, .sd = p.ld, .td = p.sd};
+        next = std::fill_n(next, kLines, gain(sides, 0) + gain(along, 0));
+        continue;
       }
       for (std::size_t l = 0; l < kLines; ++l) {
-        *next++ = gain(p, in_relief_ ? 0 : most * static_cast<double>(l) / (kLines - 1));
+        *next++ = gain(p, most * static_cast<double>(l) / (kLines - 1));
       }
     }
   }
   // Variance of a row, and of what the fit leaves: some rows are alike.
   constexpr double kAlike = 4;
+  const double rows = static_cast<double>(kRows) * (in_relief_ ? 2 : 1);
   const double top = *std::max_element(gains.begin(), gains.end());
   const double within = half_width_ + kAside_px, across = 2 * within * (1 + within / kBeside_px);
-  const double unit = std::max(noise * noise / frames_ * across / kRow_px,
-                               std::max(kAlike * (square - top) / static_cast<double>(kRows), 1e-9));
+  const double unit =
+      std::max(noise * noise / frames_ * across / kRow_px, std::max(kAlike * (square - top) / rows, 1e-9));
   double sum = 0, sum_e = 0, sum_ee = 0, sum_blur = 0;
   for (std::size_t i = 0; i < gains.size(); ++i) {
     const double weight = math::exp((gains[i] - top) / (2 * unit)),

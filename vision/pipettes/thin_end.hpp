@@ -12,7 +12,7 @@ namespace punctum::vision {
 // What the needle takes of the light, summed across, is a step along it, and a line of glass that closes it a
 // hump on this step: the walls alone seem to end up to a blur ahead of the glass. A single frame tells step
 // and hump apart badly, so it is told from the mean of many. In relief what one side shows less what the
-// other does is a step, and a line across shows in neither. Taken to be cut at right angles.
+// other does is a step, and what both show is a line at the end itself. Taken to be cut at right angles.
 class ThinEnd {
  public:
   void forget() { frames_ = 0; }
@@ -27,8 +27,9 @@ class ThinEnd {
   int frames_ = 0;
   bool in_relief_ = false;
   double half_width_ = 0;  // px
-  Vector<double> taken_;   // of the light in each row, or by how much its sides differ: mean of the frames,
-                           // grey levels times px
+  // In each row, mean of the frames, grey levels times px: what is taken of the light, and what one side
+  // shows less what the other does.
+  Vector<double> taken_, unlike_;
 };
 
 }  // namespace punctum::vision

@@ -152,6 +152,7 @@ CommonShape::CommonShape(const EdgeProfiles& profiles, const Vector<double>& sof
       soft_(soft),
       stiffness_(stiffness),
       beside_(edge.beside),
+      beside_glass_(edge.beside_glass),
       modes_(edge.modes),
       least_lasting_(edge.lasting),
       trust_(profiles.samples, 1.0F),
@@ -252,13 +253,17 @@ void CommonShape::average_first() {
   for (std::size_t j = 0; j < profiles_.samples; ++j) {
     values_.clear();
     for (std::size_t i = 0; i < profiles_.points; i += 2) {
-      if (profiles_.whole(i) && soft_[i] < 0.5) {
+      if (tells_shape(i)) {
         const Lanes& grey = profiles_.grey_of(i / kSideBySide)[j];
         values_.push_back(static_cast<double>(grey[static_cast<int>(i % kSideBySide)]));
       }
     }
     shape_[j] = middle_mean(values_);
   }
+}
+
+bool CommonShape::tells_shape(std::size_t i) const {
+  return profiles_.whole(i) && soft_[i] < 0.5 && (!beside_glass_ || beside_.empty() || beside_[i] == 0);
 }
 
 // Least squares per sample, twice: what is far off the first line counts as if it lay nearer.
@@ -271,7 +276,7 @@ void CommonShape::average_first_in_relief() {
       FittedLine line;
       values_.clear();
       for (std::size_t i = 0; i < profiles_.points; ++i) {
-        if (profiles_.whole(i) && soft_[i] < 0.5) {
+        if (tells_shape(i)) {
           const auto grey =
               static_cast<double>(profiles_.grey_of(i / kSideBySide)[j][static_cast<int>(i % kSideBySide)]);
           const double w = round > 0 && off[i] > kClip * scale ? kClip * scale / off[i] : 1;
@@ -280,7 +285,7 @@ void CommonShape::average_first_in_relief() {
       }
       line.solve(shape_[j], turning_[j]);
       for (std::size_t i = 0; i < profiles_.points; ++i) {
-        if (profiles_.whole(i) && soft_[i] < 0.5) {
+        if (tells_shape(i)) {
           const auto grey =
               static_cast<double>(profiles_.grey_of(i / kSideBySide)[j][static_cast<int>(i % kSideBySide)]);
           values_.push_back(off[i] = std::abs(grey - shape_[j] - lit_[i] * turning_[j]));
@@ -307,7 +312,7 @@ void CommonShape::average() {
   for (std::size_t g = 0; g < profiles_.groups; ++g) {
     Lanes scale{}, use{};
     for (std::size_t l = 0, i = g * kSideBySide; l < kSideBySide && i < profiles_.points; ++l, ++i) {
-      if (profiles_.whole(i) && soft_[i] < 0.5) {
+      if (tells_shape(i)) {
         scale[static_cast<int>(l)] = static_cast<float>(1 / gain_[i]);
         use[static_cast<int>(l)] = 1;
       }

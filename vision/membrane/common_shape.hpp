@@ -45,6 +45,7 @@ class CommonShape {
   void learn(EdgeLearnt& learnt);
   void average_first();
   void average_first_in_relief();
+  [[nodiscard]] bool tells_shape(std::size_t i) const;
   void average();
   void pad(const Vector<double>& shape, Vector<float>& padded, Vector<float>& slope) const;
   void trust_samples();
@@ -62,6 +63,7 @@ class CommonShape {
   const EdgeProfiles& profiles_;
   const Vector<double>&soft_, &stiffness_;
   const Vector<std::uint8_t>& beside_;
+  bool beside_glass_;
   double modes_, least_lasting_;
   Vector<double> lit_;  // per point; empty: not in relief
   Vector<double> shape_, turning_;

@@ -29,6 +29,7 @@ struct EdgeShape {
   Point relief;         // unit, from where the light seems to come: see CommonShape; or zero
   std::optional<double> other_flatness;  // of the other membrane, a body of the same form: see ReliefSteps
   Vector<std::uint8_t> beside;           // per point, 1: beside a line that is not its own; or empty
+  bool beside_glass = false;             // that line is ten times as clear, and hides the edge
 };
 
 // What is learnt of an edge over the frames.

@@ -109,6 +109,7 @@ std::optional<SeenOutline> refined(const MembraneSearch& search, const EdgePath&
       }
     }
     if (surroundings.outermost) {
+      edge.beside_glass = search.m.polarity == Polarity::relief;
       edge.modes = kOuterModes;
       edge.nearby = {-wall, kWallTolerance * wall};
     } else {

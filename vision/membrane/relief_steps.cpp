@@ -18,8 +18,8 @@ namespace {
 constexpr double kFurthestFace_px = 4;   // an own face further from the contour is another edge
 constexpr double kFaceTolerance_px = 1;  // of the nearby face's place, at least
 // The two faces of a wall thinner than that blur into one line. The contour then lies further outside of
-// them, and how far they are apart is hardly seen: it is what the scene says, within that share of it.
-constexpr double kThinWall_px = 2.5, kThinFurthest_px = 5, kThinTolerance = 0.4;
+// them, and how far they are apart is hardly seen: it is what the scene says.
+constexpr double kThinWall_px = 2.5, kThinFurthest_px = 5;
 constexpr double kNearbyNoise = 0.5;  // grey levels that a nearby face one tolerance away is worth
 constexpr double kMostLeft = 0.25;    // of the spread of the shape, rms: a worse fit is none
 constexpr double kLeastBlur_px = 0.7, kMostBlur_px = 4;
@@ -105,9 +105,7 @@ double ReliefSteps::cost_of(const cv::Vec3d& x, Body body) const {
   if (own > 0) {  // it is the inner flank of another face
     return kNoFit;
   }
-  const double off =
-      edge_.nearby ? (x[2] - edge_.nearby->at) / std::max(face_tolerance_px(), edge_.nearby->tolerance_px)
-                   : 0;
+  const double off = edge_.nearby ? (x[2] - edge_.nearby->at) / face_tolerance_px() : 0;
   return std::max(0.0, squares - height.dot(b)) + kNearbyNoise * kNearbyNoise * off * off;
 }
 
@@ -116,7 +114,8 @@ bool ReliefSteps::has_thin_wall() const {
 }
 
 double ReliefSteps::face_tolerance_px() const {
-  return has_thin_wall() ? kThinTolerance * -edge_.nearby->at : kFaceTolerance_px;
+  return has_thin_wall() ? edge_.nearby->tolerance_px
+                         : std::max(kFaceTolerance_px, edge_.nearby->tolerance_px);
 }
 
 double ReliefSteps::furthest_px() const { return has_thin_wall() ? kThinFurthest_px : kFurthestFace_px; }

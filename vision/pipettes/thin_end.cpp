@@ -125,8 +125,8 @@ std::optional<GlassEnd> ThinEnd::end(double noise) const {
         sides.ss = p.ss;
         sides.st = p.st;
         sides.tt = p.tt;
-        const Products along{.ss = p.ll, .st = p.sl, .tt = p.ss, .sd = p.ld, .td = p.sd};
-        next = std::fill_n(next, kLines, gain(sides, 0) + gain(along, 0));
+        const Products lit_along{.ss = p.ll, .st = p.sl, .tt = p.ss, .sd = p.ld, .td = p.sd};
+        next = std::fill_n(next, kLines, gain(sides, 0) + gain(lit_along, 0));
         continue;
       }
       for (std::size_t l = 0; l < kLines; ++l) {

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
-#include <span>
 
 #include "hal/math/elementary.hpp"
 #include "vision/image/blurred_step.hpp"
@@ -17,11 +16,8 @@ namespace {
 
 constexpr double kFurthestFace_px = 4;   // an own face further from the contour is another edge
 constexpr double kFaceTolerance_px = 1;  // of the nearby face's place, at least
-// The two faces of a wall thinner than that blur into one line. The contour then lies further outside of
-// them, and how far they are apart is hardly seen: it is what the scene says.
-constexpr double kThinWall_px = 2.5, kThinFurthest_px = 5;
-constexpr double kNearbyNoise = 0.5;  // grey levels that a nearby face one tolerance away is worth
-constexpr double kMostLeft = 0.25;    // of the spread of the shape, rms: a worse fit is none
+constexpr double kNearbyNoise = 0.5;     // grey levels that a nearby face one tolerance away is worth
+constexpr double kMostLeft = 0.25;       // of the spread of the shape, rms: a worse fit is none
 constexpr double kLeastBlur_px = 0.7, kMostBlur_px = 4;
 constexpr double kNoFit = 1e200;
 constexpr double kLeastLeft = 0.05;  // grey levels, rms: no fit is better
@@ -105,29 +101,19 @@ double ReliefSteps::cost_of(const cv::Vec3d& x, Body body) const {
   if (own > 0) {  // it is the inner flank of another face
     return kNoFit;
   }
-  const double off = edge_.nearby ? (x[2] - edge_.nearby->at) / face_tolerance_px() : 0;
+  const double off = (x[2] - (edge_.nearby ? edge_.nearby->at : 0)) /
+                     std::max(kFaceTolerance_px, edge_.nearby ? edge_.nearby->tolerance_px : 0);
   return std::max(0.0, squares - height.dot(b)) + kNearbyNoise * kNearbyNoise * off * off;
 }
 
-bool ReliefSteps::has_thin_wall() const {
-  return edge_.nearby && edge_.nearby->at < 0 && edge_.nearby->at > -kThinWall_px;
-}
-
-double ReliefSteps::face_tolerance_px() const {
-  return has_thin_wall() ? edge_.nearby->tolerance_px
-                         : std::max(kFaceTolerance_px, edge_.nearby->tolerance_px);
-}
-
-double ReliefSteps::furthest_px() const { return has_thin_wall() ? kThinFurthest_px : kFurthestFace_px; }
-
 // From a few places to begin at, downhill along each of the unknowns, in ever smaller steps.
 ReliefSteps::Trial ReliefSteps::best_of(Body body) const {
-  constexpr std::array kOwn{-2.5, -1.0, 0.5, -4.0};  // the last one for a thin wall
+  constexpr std::array kOwn{-2.5, -1.0, 0.5};
   constexpr double kBlur_px = 1.4;
   constexpr int kRounds = 9;
   constexpr double kShorter = 0.55;
   Trial best{{0, 0, 0}, 1e300};
-  for (const double own : std::span(kOwn).first(has_thin_wall() ? 4 : 3)) {
+  for (const double own : kOwn) {
     const cv::Vec3d from(own, kBlur_px, edge_.nearby ? edge_.nearby->at : 0);
     Trial here{from, cost_of(from, body)};
     cv::Vec3d step(0.5, 0.3, 0.5);
@@ -136,7 +122,7 @@ ReliefSteps::Trial ReliefSteps::best_of(Body body) const {
         for (const double way : {1.0, -1.0}) {
           for (cv::Vec3d x = here.x;;) {
             x[p] += way * step[p];
-            if (std::abs(x[0]) >= furthest_px() + 1 || x[1] <= kLeastBlur_px || x[1] >= kMostBlur_px) {
+            if (std::abs(x[0]) >= kFurthestFace_px + 1 || x[1] <= kLeastBlur_px || x[1] >= kMostBlur_px) {
               break;
             }
             const double cost = cost_of(x, body);
@@ -167,7 +153,7 @@ std::optional<ReliefSteps::Fit> ReliefSteps::fit(double part, double& flatness) 
     square += v * v / n;
   }
   const double left = std::sqrt(best.cost / n);
-  if (std::abs(best.x[0]) > furthest_px() || left > kMostLeft * std::sqrt(square - mean * mean)) {
+  if (std::abs(best.x[0]) > kFurthestFace_px || left > kMostLeft * std::sqrt(square - mean * mean)) {
     return std::nullopt;
   }
   return Fit{best.x[0], left};

@@ -32,9 +32,6 @@ class ReliefSteps {
     cv::Vec3d x;  // own place, blur, place of the nearby face against the own one
     double cost = 0;
   };
-  [[nodiscard]] bool has_thin_wall() const;
-  [[nodiscard]] double face_tolerance_px() const;
-  [[nodiscard]] double furthest_px() const;
   [[nodiscard]] double cost_of(const cv::Vec3d& x, Body body) const;
   [[nodiscard]] Trial best_of(Body body) const;
 

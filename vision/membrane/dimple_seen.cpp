@@ -449,7 +449,10 @@ std::optional<SeenDimple> likeliest_dimple(const MembraneSearch& search) {
     // than in the last frame has not gone back.
     const double last = m.held ? m.dimple_px - std::max(kGivesWay_px, kGivesWay * m.dimple_px) : tip;
     const bool gone = free && free->evidence > 0 && free->depth < last;
-    by_shape = std::clamp(by_shape, -kByShape, gone ? kByShape : kStaysInRelief);
+    // Light across the needle leaves of a dimple's bottom nothing to see, and its walls alone tell less.
+    const double clear = std::abs(m.relief.sign_at(-search.surroundings.needle.axis)),
+                 most = kStaysInRelief + clear * (kByShape - kStaysInRelief);
+    by_shape = std::clamp(by_shape, -kByShape, gone ? most : kStaysInRelief);
     on_tip -= on_tip > 0 ? *search.free_by_motion : 0;
   }
   if (!pushed || (free && on_tip < by_shape)) {

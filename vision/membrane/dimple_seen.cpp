@@ -184,7 +184,7 @@ class Dimples {
         spacing_(s_.usual_r * 2 * std::numbers::pi / s_.angles) {
     const NeedlePose& n = s_.surroundings.needle;
     if (const auto entry = entry_point(outline_, n.point(), n.axis)) {
-      depth_of_tip_ = (n.point() - *entry).dot(n.axis);
+      depth_of_tip_ = (n.point() - *entry).dot(n.axis) - s_.m.path_outside_px;
       meets_the_cell_ = true;
       entry_ = polar_index(*entry - s_.band.centre, s_.angles);
       reach_ =

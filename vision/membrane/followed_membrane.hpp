@@ -27,8 +27,9 @@ struct FollowedMembrane {
   RestOutline rest;
   CarriedOutline carried;
   EdgeLearnt edge;
-  bool held = true;                                 // the needle pushes it, or would where it touched it
-  double dimple_px = 0;                             // depth of its dimple
+  double path_outside_px = 0;  // of an outer one in relief: by which its path and `rest` lie outside its face
+  bool held = true;            // the needle pushes it, or would where it touched it
+  double dimple_px = 0;        // depth of its dimple
   std::array<double, kDimpleShapes> dimple_odds{};  // log odds of the shape of its dimple
   MembraneRecoil recoil;                            // of the outer one in relief
   double recoil_odds = 0;                           // log odds that it has gone back since the last frame

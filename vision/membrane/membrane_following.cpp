@@ -189,6 +189,26 @@ CarriedOutline::Change change_by_needle(const MembraneSearch& search, const Edge
   return out;
 }
 
+// In relief the edge that is sought is the outer flank of what the light makes of a face. Of an inner membrane
+// too, but there nothing asks how deep the tip is to a pixel.
+void learn_path_outside(const MembraneSearch& search, const EdgePath& path, const Contour& contour,
+                        FollowedMembrane& m) {
+  constexpr double kPart = 0.2;  // of a frame
+  if (m.polarity != Polarity::relief || !search.surroundings.outermost) {
+    return;
+  }
+  Vector<double> outside;
+  for (int i = 0; i < search.angles; ++i) {
+    const std::size_t k = static_cast<std::size_t>(i);
+    if (path.seen[k] != 0 && search.from_needle(i) > kNeedleHalf) {
+      outside.push_back(path.r[k] - cv::norm(contour[k] - search.band.centre));
+    }
+  }
+  if (!outside.empty()) {
+    m.path_outside_px += (m.path_outside_px == 0 ? 1 : kPart) * (median_of(outside) - m.path_outside_px);
+  }
+}
+
 // Away from the needle a membrane keeps its outline. An arc that has left the outline follows something else.
 bool left_outline(const MembraneSearch& s, const EdgePath& path) {
   if (s.rest.size() != path.r.size() || !s.needle || !s.m.rest.reliable()) {
@@ -325,6 +345,7 @@ Membrane follow(FollowedMembrane& m, const ClearedPicture& picture, const Vision
     return out;
   }
   m.carried.update(seen, change_by_needle(search, found));
+  learn_path_outside(search, path, seen.contour, m);
   out.contour = m.carried.contour();
   out.sd_px = m.carried.sd();
   out.ok = true;

@@ -133,17 +133,20 @@ Vector<std::pair<int, double>> MembraneSearch::end_face() const {
     const double towards = ray.dot(n.axis);
     if (towards < -0.5 &&
         std::abs((ahead / towards * ray + band.centre - n.tip).cross(n.axis)) < n.half_width) {
-      face.emplace_back(i, ahead / towards);
+      face.emplace_back(i, ahead / towards + m.path_outside_px);
     }
   }
-  return face.empty() ? Vector<std::pair<int, double>>{{needle->tip_index, needle->tip_r}} : face;
+  if (face.empty()) {
+    face.emplace_back(needle->tip_index, needle->tip_r + m.path_outside_px);
+  }
+  return face;
 }
 
 // For a membrane that lies on the tip: the dimple moves with the needle.
 EdgePath MembraneSearch::path_pushed() const {
   EdgeBand pushed = band;
   const int tip = needle->tip_index;
-  const double move = needle->tip_r - pushed.middle[static_cast<std::size_t>(tip)];
+  const double move = needle->tip_r + m.path_outside_px - pushed.middle[static_cast<std::size_t>(tip)];
   const double dimple_px = std::max(4.0, 2.0 * surroundings.needle.half_width);
   for (int i = 0; i < angles; ++i) {
     const double u = angle_between(polar_angle(i, angles), polar_angle(tip, angles)) * usual_r / dimple_px;
@@ -156,7 +159,7 @@ EdgePath MembraneSearch::path_pushed() const {
 }
 
 double MembraneSearch::depth_of_tip() const {
-  return rest[static_cast<std::size_t>(needle->tip_index)] - needle->tip_r;
+  return rest[static_cast<std::size_t>(needle->tip_index)] - m.path_outside_px - needle->tip_r;
 }
 
 namespace {

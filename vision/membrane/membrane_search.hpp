@@ -63,7 +63,7 @@ struct MembraneSearch {
   [[nodiscard]] EdgePath path_free() const;
   [[nodiscard]] EdgePath path_pushed() const;
   [[nodiscard]] Vector<std::pair<int, double>> end_face() const;
-  [[nodiscard]] double depth_of_tip() const;  // px below the rest outline
+  [[nodiscard]] double depth_of_tip() const;  // px below the face of the membrane at rest
 
  private:
   void keep_membranes_apart();

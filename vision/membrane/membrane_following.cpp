@@ -189,8 +189,8 @@ CarriedOutline::Change change_by_needle(const MembraneSearch& search, const Edge
   return out;
 }
 
-// In relief the edge that is sought is the outer flank of what the light makes of a face. Of an inner membrane
-// too, but there nothing asks how deep the tip is to a pixel.
+// In relief the edge that is sought is the outer flank of what the light makes of a face. Of an inner
+// membrane too, but there nothing asks how deep the tip is to a pixel.
 void learn_path_outside(const MembraneSearch& search, const EdgePath& path, const Contour& contour,
                         FollowedMembrane& m) {
   constexpr double kPart = 0.2;  // of a frame

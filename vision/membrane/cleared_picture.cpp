@@ -199,4 +199,20 @@ void ClearedPicture::exclude_holder(EdgeBand& band, const Vector<double>& expect
   }
 }
 
+Vector<std::uint8_t> ClearedPicture::in_shadow_of_holder(const Contour& contour) const {
+  constexpr double kShadow = 0.35;  // of half the width of the glass
+  if (!holder_face) {
+    return {};
+  }
+  const auto& [mouth, axis, half_width] = *holder_face;
+  Vector<std::uint8_t> out;
+  for (const Point& p : contour) {
+    const Point from = p - mouth;
+    out.push_back(
+        from.dot(axis) < kShadow * half_width && std::abs(axis.cross(from)) < (1 + kShadow) * half_width ? 1
+                                                                                                         : 0);
+  }
+  return out;
+}
+
 }  // namespace punctum::vision

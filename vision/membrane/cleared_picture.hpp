@@ -50,6 +50,9 @@ struct ClearedPicture {
   // the membrane per angle of the band.
   // In relief the place of the face is uncertain, and its shadow is wide.
   void exclude_holder(EdgeBand& band, const Vector<double>& expected, bool relief = false) const;
+  // In relief the holding pipette, thick and out of focus, casts a shadow far before its mouth: 1 for each
+  // point of a contour that lies in it. Empty without a pipette.
+  [[nodiscard]] Vector<std::uint8_t> in_shadow_of_holder(const Contour& contour) const;
 
  private:
   void find_strong(double threshold);

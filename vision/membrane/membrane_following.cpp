@@ -109,7 +109,10 @@ std::optional<SeenOutline> refined(const MembraneSearch& search, const EdgePath&
       }
     }
     if (surroundings.outermost) {
-      edge.beside_glass = search.m.polarity == Polarity::relief;
+      if (search.m.polarity == Polarity::relief) {
+        edge.beside = search.picture.in_shadow_of_holder(contour);
+        edge.beside_glass = true;
+      }
       edge.modes = kOuterModes;
       edge.nearby = {-wall, kWallTolerance * wall};
     } else {

@@ -194,7 +194,7 @@ void ClearedPicture::exclude_holder(EdgeBand& band, const Vector<double>& expect
     if (expected[k] > r - reach) {
       band.hidden[k] = 1;
     } else if (relief) {
-      band.seen_to[k] = 1e9;
+      band.seen_to[k] = r - reach;
     }
   }
 }

@@ -8,6 +8,7 @@
 
 #include "hal/math/elementary.hpp"
 #include "vision/image/correlation.hpp"
+#include "vision/pipettes/end_line.hpp"
 #include "vision/pipettes/moving_end.hpp"
 #include "vision/pipettes/needle_bevel.hpp"
 #include "vision/pipettes/needle_end.hpp"
@@ -47,6 +48,7 @@ constexpr int kFurther = 8;
 constexpr double kSteep = 0.8;        // px along per px across: of a steeper cut the two walls end far apart
 constexpr std::size_t kGathered = 4;  // frames that tell an end which one of them does not
 constexpr double kShaft_px = 180;     // of the shaft tell its direction
+constexpr double kUsualBlur_px = 1.5;
 constexpr double kMostBlur_px = 3.6;  // the widest blur of which the end is known
 // Frames in a row; then it is looked for from the border, too, in every other frame.
 constexpr int kLostMax = 3;
@@ -305,6 +307,10 @@ bool InjectionPipette::learn_end_anew(const GradientField& field, double noise, 
   followed_ = false;
   lumen_ = last_.half_width >= kLeastLumen_px;
   thin_end_.forget();
+  end_line_ = 0;
+  if (go_to_end_line(field, noise)) {
+    return true;
+  }
   const auto known = [&](const CutGlass& cut) {
     return cut.end.blur <= kMostBlur_px && math::hypot(sd_of(cut, last_.half_width), motion_sd) <=
                                                (cut.end.blur > kSharp_px ? kUnsharpKnown_px : kStartKnown_px);
@@ -329,7 +335,6 @@ bool InjectionPipette::learn_end_anew(const GradientField& field, double noise, 
 // one.
 std::optional<CutGlass> InjectionPipette::cut_seen(const GradientField& field, double noise,
                                                    const NeedlePose& middle) {
-  constexpr double kUsualBlur_px = 1.5;
   const double blur = blur_of_shaft(field, middle, kStartReach_px).value_or(kUsualBlur_px);
   return blur < kMostBlur_px ? cut_of_glass(field, noise, middle, blur, kStartReach_px, kStartReach_px)
                              : std::nullopt;
@@ -394,7 +399,8 @@ NeedlePose InjectionPipette::told(NeedlePose needle, double noise) const {
   needle.point_aside =
       ends_apart() ? std::copysign(radius_at_end(bevel_, last_, glass_blur_), -bevel_.tangent) : 0;
   // Of a needle whose lumen is not seen only the walls tell the end at first, and its cut is not seen.
-  constexpr double kWalls_px = 0.5, kBeyondWalls_px = 0.8, kUnseenCut_px = 0.4;
+  constexpr double kWalls_px = 0.5, kBeyondWalls_px = 0.8, kUnseenCut_px = 0.4,
+                   kLine_px = 0.1;  // of the end, where the line that it is stands
   const bool by_walls = !lumen_ && glass_frames_ == 0;
   needle.constant_sd = by_walls ? kBeyondWalls_px
                        : lumen_ ? bevel_.sd * radius_at_end(bevel_, last_, glass_blur_)
@@ -403,8 +409,11 @@ NeedlePose InjectionPipette::told(NeedlePose needle, double noise) const {
   // far as its contrast lasts.
   constexpr double kBeyondBlurs_px = 6;
   const double unsharp = NeedleShape::beyond_blurs(view_) ? kBeyondBlurs_px : NeedleShape::blur_px(view_);
-  needle.sd = math::hypot(
-      math::hypot(by_walls ? kWalls_px : std::max(tip_sd(noise), cut_sd_), needle.constant_sd), unsharp);
+  needle.sd = math::hypot(math::hypot(by_walls                        ? kWalls_px
+                                      : end_line_ != 0 && cut_sd_ > 0 ? math::hypot(cut_sd_, kLine_px)
+                                                                      : std::max(tip_sd(noise), cut_sd_),
+                                      needle.constant_sd),
+                          unsharp);
   return needle;
 }
 
@@ -578,7 +587,8 @@ bool InjectionPipette::find_end(const GradientField& field, double noise, Needle
   };
   fit_to_walls();
   cut_sd_ = 0;
-  if (bevel_.radius > 0 && go_to_known_cut(field, noise, needle)) {
+  if (end_line_ != 0 ? go_to_known_line(field, noise, needle)
+                     : bevel_.radius > 0 && go_to_known_cut(field, noise, needle)) {
     near = true;
     shape_origin_ = needle.tip - shape_offset_ * needle.axis;
     walls_agree_ = false;
@@ -628,6 +638,36 @@ bool InjectionPipette::go_to_known_cut(const GradientField& field, double noise,
   }
   needle.tip += end->ahead * needle.axis;
   cut_sd_ = end->sd;
+  return true;
+}
+
+// With light along it the line across its end does. False where that is not near.
+bool InjectionPipette::go_to_known_line(const GradientField& field, double noise, NeedlePose& needle) {
+  constexpr double kReach_px = 8;
+  const auto line = end_line_again(field, noise, needle, end_line_, kReach_px);
+  if (!line) {
+    return false;
+  }
+  needle.tip += line->ahead * needle.axis;
+  cut_sd_ = line->sd;
+  return true;
+}
+
+// Where the line is seen that light along the needle makes of its end, that is its end from then on.
+bool InjectionPipette::go_to_end_line(const GradientField& field, double noise) {
+  const auto line = end_line(field, noise, last_, -kStartReach_px, kStartReach_px);
+  if (!line) {
+    return false;
+  }
+  end_line_ = line->strength;
+  cut_sd_ = line->sd;
+  last_.tip += line->ahead * last_.axis;
+  shape_offset_ += line->ahead;
+  walls_offset_ += line->ahead;
+  bevel_ = {};
+  glass_ahead_ = glass_scatter_ = 0;
+  glass_blur_ = kUsualBlur_px;
+  glass_frames_ = 1;
   return true;
 }
 
@@ -719,7 +759,10 @@ void InjectionPipette::learn(const GradientField& field, const NeedlePose& needl
   }
   NeedlePose followed = needle;
   followed.tip -= glass_ahead_ * needle.axis;
-  if ((alone || !walls_tell_) && cut_sd_ == 0) {
+  if (alone && in_relief_ && end_line_ == 0 && bevel_.radius == 0 && go_to_end_line(field, noise)) {
+    return;
+  }
+  if ((alone || !walls_tell_) && cut_sd_ == 0 && end_line_ == 0) {
     learn_glass(field, noise, followed);
   }
   if (!alone) {
@@ -737,8 +780,9 @@ void InjectionPipette::learn(const GradientField& field, const NeedlePose& needl
     origin.tip = shape_origin_;
     shape_.learn(field, origin);
     constexpr double kFaceRate_px = 0.2;  // per frame: the face moves by no more as the shape is averaged
-    shape_offset_ +=
-        std::clamp(shape_.face().value_or(shape_offset_) - shape_offset_, -kFaceRate_px, kFaceRate_px);
+    shape_offset_ += end_line_ != 0 ? 0
+                                    : std::clamp(shape_.face().value_or(shape_offset_) - shape_offset_,
+                                                 -kFaceRate_px, kFaceRate_px);
   }
   cv::Mat here = kept_picture(template_.size(), CV_32F);
   cv::getRectSubPix(field.smooth, template_.size(),

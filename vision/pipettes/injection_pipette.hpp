@@ -100,6 +100,8 @@ class InjectionPipette {
   // `near`: it was found near where the motion predicts it.
   [[nodiscard]] bool find_end(const GradientField& field, double noise, NeedlePose& needle, bool& near);
   [[nodiscard]] bool go_to_known_cut(const GradientField& field, double noise, NeedlePose& needle);
+  [[nodiscard]] bool go_to_known_line(const GradientField& field, double noise, NeedlePose& needle);
+  [[nodiscard]] bool go_to_end_line(const GradientField& field, double noise);
   void calibrate_walls(const GradientField& field, const NeedlePose& walls, double noise);
   void learn_shape_anew(const GradientField& field);
   [[nodiscard]] static std::optional<CutGlass> cut_seen(const GradientField& field, double noise,
@@ -150,7 +152,8 @@ class InjectionPipette {
   bool followed_ = false;     // since it was found
   double glass_scatter_ = 0;  // variance of where the end that is followed seems to be from it, px^2
   double glass_blur_ = 0;     // px
-  double cut_sd_ = 0;         // of the end in the last frame, where its cut told it, px
+  double cut_sd_ = 0;         // of the end in the last frame, where its cut or a line told it, px
+  double end_line_ = 0;       // that tells its end with light along it, grey levels; 0: none does
   ThinEnd thin_end_;          // tells the same of a needle whose lumen is not seen
   double step_sign_ = 0;      // +1: it is brighter ahead of the walls, -1: darker, 0: not known yet
   bool in_relief_ = false;

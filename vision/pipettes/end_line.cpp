@@ -1,0 +1,150 @@
+#include "vision/pipettes/end_line.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+
+#include "vision/image/kept_vector.hpp"
+#include "vision/image/parabola.hpp"
+
+namespace punctum::vision {
+
+namespace {
+
+constexpr int kSamples = 4;                  // of each stretch across the needle
+constexpr int kHalf_px = 8;                  // along the needle: beyond that nothing is left of the line
+constexpr double kOfWalls = 3, kNoises = 8;  // by so much it is stronger, and clearer
+constexpr double kLeft = 0.2, kEven = 0.35;  // of the line
+
+// Across the needle, grey levels.
+struct Row {
+  double low, high;  // both halves of the needle, over what lies beside it
+  double walls;      // over what lies beside them and between them
+  double apart;      // by which one side of the needle differs from the other
+
+  [[nodiscard]] double core() const { return 0.5 * (low + high); }
+};
+
+// `s` px behind the tip. Empty beside the picture, or where the walls have met.
+std::optional<Row> row_at(const GradientField& field, const NeedlePose& needle, double s) {
+  constexpr double kBeside_px = 3, kBesideTo_px = 6, kCore = 0.7, kLumen = 0.4, kLeast_px = 2;
+  constexpr double kWallTo_px = 1, kWallFrom_px = 3;  // inside of the outer flank
+  const double w = needle.half_width + needle.taper * s, far = w + kBesideTo_px;
+  if (w < kLeast_px || !field.area.contains(needle.at(s, far)) || !field.area.contains(needle.at(s, -far))) {
+    return std::nullopt;
+  }
+  const auto mean = [&](double from, double to) {
+    double sum = 0;
+    for (int i = 0; i < kSamples; ++i) {
+      sum += field.grey(needle.at(s, from + (to - from) * i / (kSamples - 1))) / kSamples;
+    }
+    return sum;
+  };
+  const double left = mean(-far, -w - kBeside_px), right = mean(w + kBeside_px, far),
+               medium = 0.5 * (left + right), lumen = mean(-kLumen * w, kLumen * w),
+               walls =
+                   0.5 * (mean(-w + kWallTo_px, -w + kWallFrom_px) + mean(w - kWallFrom_px, w - kWallTo_px));
+  return Row{mean(-kCore * w, 0) - medium, mean(0, kCore * w) - medium, walls - 0.5 * (medium + lumen),
+             std::abs(left - right)};
+}
+
+// Contrast of the walls over a stretch of the shaft, or of all of a thin one.
+double walls_from(const GradientField& field, const NeedlePose& needle, double from) {
+  constexpr int kStretch_px = 10;
+  double walls = 0, core = 0;
+  for (int i = 0; i < kStretch_px; ++i) {
+    if (const auto row = row_at(field, needle, from + i)) {
+      walls += row->walls / kStretch_px;
+      core += row->core() / kStretch_px;
+    }
+  }
+  return std::max(std::abs(walls), std::abs(core));
+}
+
+// What the smoothing leaves of the noise in a mean across the needle.
+double noise_of_row(const GradientField& field, double noise) {
+  return std::max(noise, 0.5) / (2 * field.sigma * std::sqrt(std::numbers::pi)) / std::sqrt(kSamples / 2.0);
+}
+
+// Each px from `from` px ahead of the tip on.
+Vector<Row> rows_ahead(const GradientField& field, const NeedlePose& needle, double from, double to) {
+  Vector<Row> rows;
+  rows.reserve(static_cast<std::size_t>(to - from) + 1);
+  for (double ahead = from; ahead <= to; ++ahead) {
+    const auto row = row_at(field, needle, -ahead);
+    if (!row) {
+      break;
+    }
+    rows.push_back(*row);
+  }
+  return rows;
+}
+
+// rows: of which the first lies `from` px ahead of the tip.
+EndLine line_at(const Vector<Row>& rows, std::size_t i, double from, double row_noise) {
+  const double before = std::abs(rows[i - 1].core()), top = std::abs(rows[i].core()),
+               after = std::abs(rows[i + 1].core());
+  const double curvature = std::max(2 * top - before - after, 1e-3);
+  return {from + static_cast<double>(i) + vertex_offset(before, top, after), rows[i].core(),
+          row_noise / curvature};
+}
+
+bool is_peak(const Vector<Row>& rows, std::size_t i) {
+  const double top = std::abs(rows[i].core());
+  return top >= std::abs(rows[i - 1].core()) && top >= std::abs(rows[i + 1].core());
+}
+
+// Specks and edges of a cell are bright on one side and dark on the other, or go on beside the needle.
+bool is_alone(const Vector<Row>& rows, std::size_t i) {
+  const double line = rows[i].core(), most = kLeft * std::abs(line);
+  if (std::abs(rows[i].low - rows[i].high) > kEven * std::abs(line)) {
+    return false;
+  }
+  for (std::size_t k = i - kHalf_px; k <= i + kHalf_px; ++k) {
+    const bool beyond = k == i - kHalf_px || k == i + kHalf_px;
+    const double along = std::copysign(1.0, line) * rows[k].core();
+    if (rows[k].apart > most || along < -most || (beyond && along > most)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+std::optional<EndLine> end_line(const GradientField& field, double noise, const NeedlePose& needle,
+                                double from, double to) {
+  const double of_row = noise_of_row(field, noise), first = from - kHalf_px;
+  const double least =
+      std::max(kOfWalls * walls_from(field, needle, kHalf_px - std::min(from, 0.0)), kNoises * of_row);
+  const Vector<Row> rows = rows_ahead(field, needle, first, to + kHalf_px);
+  for (std::size_t i = kHalf_px; i + kHalf_px < rows.size(); ++i) {
+    if (std::abs(rows[i].core()) > least && is_peak(rows, i) && is_alone(rows, i)) {
+      return line_at(rows, i, first, of_row);
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<EndLine> end_line_again(const GradientField& field, double noise, const NeedlePose& needle,
+                                      double strength, double reach) {
+  constexpr double kLeast = 0.5;  // of its strength
+  const Vector<Row> rows = rows_ahead(field, needle, -reach, reach);
+  std::optional<std::size_t> best;
+  for (std::size_t i = 1; i + 1 < rows.size(); ++i) {
+    const double along = std::copysign(1.0, strength) * rows[i].core();
+    if (is_peak(rows, i) && along > kLeast * std::abs(strength) &&
+        (!best || along > std::abs(rows[*best].core()))) {
+      best = i;
+    }
+  }
+  return best ? std::optional(line_at(rows, *best, -reach, noise_of_row(field, noise))) : std::nullopt;
+}
+
+bool walls_fade(const GradientField& field, const NeedlePose& needle) {
+  constexpr double kNear_px = 2, kFar_px = 50, kFades = 0.6;
+  return walls_from(field, needle, kNear_px) < kFades * walls_from(field, needle, kFar_px);
+}
+
+}  // namespace punctum::vision

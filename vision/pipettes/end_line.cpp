@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kSamples = 4;                  // of each stretch across the needle
 constexpr int kHalf_px = 8;                  // along the needle: beyond that nothing is left of the line
-constexpr double kOfWalls = 3, kNoises = 8;  // by so much it is stronger, and clearer
+constexpr double kOfWalls = 2, kNoises = 8;  // by so much it is stronger, and clearer
 constexpr double kLeft = 0.2, kEven = 0.35;  // of the line
 
 // Across the needle, grey levels.
@@ -98,7 +98,10 @@ bool is_peak(const Vector<Row>& rows, std::size_t i) {
 // Specks and edges of a cell are bright on one side and dark on the other, or go on beside the needle.
 bool is_alone(const Vector<Row>& rows, std::size_t i) {
   const double line = rows[i].core(), most = kLeft * std::abs(line);
-  if (std::abs(rows[i].low - rows[i].high) > kEven * std::abs(line)) {
+  // The walls have half of their contrast at the end.
+  const Row& shaft = rows[i - kHalf_px];
+  const double uneven = rows[i].low - rows[i].high - 0.5 * (shaft.low - shaft.high);
+  if (std::abs(uneven) > kEven * std::abs(line)) {
     return false;
   }
   for (std::size_t k = i - kHalf_px; k <= i + kHalf_px; ++k) {

@@ -176,6 +176,9 @@ void SeenNeedle::put_right_by_stage(const ClearedPicture& picture, const Touch& 
   if (n.ok && pipette_.goes_on_to(picture.field, picture.noise, n, *told)) {
     n.ok = seen_.ok = false;
     n.reason = "a speck looks like its end";
+  } else if (by_stage_.picture_strays(n) && touch.punctured) {
+    n.ok = seen_.ok = false;
+    n.reason = "something within the cell looks like its end";
   }
   if (!n.ok) {
     n = pipette_.by_shaft(picture.field, picture.noise, *told).value_or(n);

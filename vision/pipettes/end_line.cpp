@@ -12,10 +12,11 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr int kSamples = 4;                  // of each stretch across the needle
-constexpr int kHalf_px = 8;                  // along the needle: beyond that nothing is left of the line
-constexpr double kOfWalls = 2, kNoises = 8;  // by so much it is stronger, and clearer
-constexpr double kLeft = 0.2, kEven = 0.35;  // of the line
+constexpr int kSamples = 4;  // of each stretch across the needle
+constexpr int kHalf_px = 8;  // along the needle: beyond that nothing is left of the line
+constexpr double kOfWalls = 2, kOfWallsInRelief = 1, kNoises = 6;  // by so much it is stronger, and clearer
+constexpr double kLeft = 0.2, kEven = 0.35;                        // of the line
+constexpr double kNoisesLeft = 3.5;
 
 // Across the needle, grey levels.
 struct Row {
@@ -26,12 +27,18 @@ struct Row {
   [[nodiscard]] double core() const { return 0.5 * (low + high); }
 };
 
-// `s` px behind the tip. Empty beside the picture, or where the walls have met.
+// Its taper may end before it does.
+double half_width_at(const NeedlePose& needle, double s) {
+  constexpr double kNarrowest = 0.6;
+  return std::max(needle.half_width + needle.taper * s, kNarrowest * needle.half_width);
+}
+
+// `s` px behind the tip. Empty beside the picture.
 std::optional<Row> row_at(const GradientField& field, const NeedlePose& needle, double s) {
-  constexpr double kBeside_px = 3, kBesideTo_px = 6, kCore = 0.7, kLumen = 0.4, kLeast_px = 2;
+  constexpr double kBeside_px = 3, kBesideTo_px = 6, kCore = 0.7, kLumen = 0.4;
   constexpr double kWallTo_px = 1, kWallFrom_px = 3;  // inside of the outer flank
-  const double w = needle.half_width + needle.taper * s, far = w + kBesideTo_px;
-  if (w < kLeast_px || !field.area.contains(needle.at(s, far)) || !field.area.contains(needle.at(s, -far))) {
+  const double w = half_width_at(needle, s), far = w + kBesideTo_px;
+  if (!field.area.contains(needle.at(s, far)) || !field.area.contains(needle.at(s, -far))) {
     return std::nullopt;
   }
   const auto mean = [&](double from, double to) {
@@ -95,18 +102,19 @@ bool is_peak(const Vector<Row>& rows, std::size_t i) {
   return top >= std::abs(rows[i - 1].core()) && top >= std::abs(rows[i + 1].core());
 }
 
-// Specks and edges of a cell are bright on one side and dark on the other, or go on beside the needle.
-bool is_alone(const Vector<Row>& rows, std::size_t i) {
-  const double line = rows[i].core(), most = kLeft * std::abs(line);
-  // The walls have half of their contrast at the end.
+// Specks and edges of a cell are bright on one side and dark on the other, or go on beside the needle. The
+// shaft behind it shows what it shows of itself, and half of that at the end.
+bool is_alone(const Vector<Row>& rows, std::size_t i, double row_noise) {
   const Row& shaft = rows[i - kHalf_px];
+  const double line = rows[i].core() - 0.5 * shaft.core(),
+               most = kLeft * std::abs(line) + kNoisesLeft * row_noise;
   const double uneven = rows[i].low - rows[i].high - 0.5 * (shaft.low - shaft.high);
-  if (std::abs(uneven) > kEven * std::abs(line)) {
+  if (line * rows[i].core() < 0 || std::abs(uneven) > kEven * std::abs(line) + kNoisesLeft * row_noise) {
     return false;
   }
   for (std::size_t k = i - kHalf_px; k <= i + kHalf_px; ++k) {
     const bool beyond = k == i - kHalf_px || k == i + kHalf_px;
-    const double along = std::copysign(1.0, line) * rows[k].core();
+    const double along = std::copysign(1.0, line) * (rows[k].core() - (k < i ? shaft.core() : 0));
     if (rows[k].apart > most || along < -most || (beyond && along > most)) {
       return false;
     }
@@ -117,13 +125,14 @@ bool is_alone(const Vector<Row>& rows, std::size_t i) {
 }  // namespace
 
 std::optional<EndLine> end_line(const GradientField& field, double noise, const NeedlePose& needle,
-                                double from, double to) {
+                                double from, double to, bool in_relief) {
   const double of_row = noise_of_row(field, noise), first = from - kHalf_px;
-  const double least =
-      std::max(kOfWalls * walls_from(field, needle, kHalf_px - std::min(from, 0.0)), kNoises * of_row);
+  const double least = std::max(
+      (in_relief ? kOfWallsInRelief : kOfWalls) * walls_from(field, needle, kHalf_px - std::min(from, 0.0)),
+      kNoises * of_row);
   const Vector<Row> rows = rows_ahead(field, needle, first, to + kHalf_px);
   for (std::size_t i = kHalf_px; i + kHalf_px < rows.size(); ++i) {
-    if (std::abs(rows[i].core()) > least && is_peak(rows, i) && is_alone(rows, i)) {
+    if (std::abs(rows[i].core()) > least && is_peak(rows, i) && is_alone(rows, i, of_row)) {
       return line_at(rows, i, first, of_row);
     }
   }
@@ -145,9 +154,17 @@ std::optional<EndLine> end_line_again(const GradientField& field, double noise, 
   return best ? std::optional(line_at(rows, *best, -reach, noise_of_row(field, noise))) : std::nullopt;
 }
 
-bool walls_fade(const GradientField& field, const NeedlePose& needle) {
+void go_to_end_of_fading_walls(const GradientField& field, double noise, NeedlePose& needle) {
+  constexpr double kFrom_px = 8, kTo_px = 150;
   constexpr double kNear_px = 2, kFar_px = 50, kFades = 0.6;
-  return walls_from(field, needle, kNear_px) < kFades * walls_from(field, needle, kFar_px);
+  if (walls_from(field, needle, kNear_px) > kFades * walls_from(field, needle, kFar_px)) {
+    return;
+  }
+  if (const auto line = end_line(field, noise, needle, kFrom_px, kTo_px, false)) {
+    const double half_width = half_width_at(needle, -line->ahead);
+    needle.tip += line->ahead * needle.axis;
+    needle.half_width = half_width;
+  }
 }
 
 }  // namespace punctum::vision

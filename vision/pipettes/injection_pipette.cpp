@@ -8,7 +8,6 @@
 
 #include "hal/math/elementary.hpp"
 #include "vision/image/correlation.hpp"
-#include "vision/pipettes/end_line.hpp"
 #include "vision/pipettes/moving_end.hpp"
 #include "vision/pipettes/needle_bevel.hpp"
 #include "vision/pipettes/needle_end.hpp"
@@ -49,6 +48,7 @@ constexpr double kSteep = 0.8;        // px along per px across: of a steeper cu
 constexpr std::size_t kGathered = 4;  // frames that tell an end which one of them does not
 constexpr double kShaft_px = 180;     // of the shaft tell its direction
 constexpr double kUsualBlur_px = 1.5;
+constexpr int kLooksFar = 3;          // frames
 constexpr double kMostBlur_px = 3.6;  // the widest blur of which the end is known
 // Frames in a row; then it is looked for from the border, too, in every other frame.
 constexpr int kLostMax = 3;
@@ -293,6 +293,18 @@ bool InjectionPipette::learn_end_anew(const GradientField& field, double noise, 
   step_sign_ = 0;
   walls_offset_ = 0.15 * last_.half_width;
   offset_frames_ = 0;
+  end_line_ = 0;
+  if (const auto line = end_line(field, noise, last_, -kStartReach_px, kStartReach_px, in_relief_)) {
+    last_.tip += line->ahead * last_.axis;
+    shape_.forget();
+    shape_.learn(field, last_);
+    shape_offset_ = 0;
+    shape_origin_ = last_.tip;
+    lumen_ = walls_tell_ = true;
+    walls_agree_ = followed_ = false;
+    ends_with(*line);
+    return true;
+  }
   calibrate_walls(field, last_, noise);
   const Point end_by_walls = last_.tip + walls_offset_ * last_.axis;
   learn_shape_anew(field);
@@ -307,10 +319,6 @@ bool InjectionPipette::learn_end_anew(const GradientField& field, double noise, 
   followed_ = false;
   lumen_ = last_.half_width >= kLeastLumen_px;
   thin_end_.forget();
-  end_line_ = 0;
-  if (go_to_end_line(field, noise)) {
-    return true;
-  }
   const auto known = [&](const CutGlass& cut) {
     return cut.end.blur <= kMostBlur_px && math::hypot(sd_of(cut, last_.half_width), motion_sd) <=
                                                (cut.end.blur > kSharp_px ? kUnsharpKnown_px : kStartKnown_px);
@@ -653,22 +661,30 @@ bool InjectionPipette::go_to_known_line(const GradientField& field, double noise
   return true;
 }
 
-// Where the line is seen that light along the needle makes of its end, that is its end from then on.
-bool InjectionPipette::go_to_end_line(const GradientField& field, double noise) {
-  const auto line = end_line(field, noise, last_, -kStartReach_px, kStartReach_px);
+// Where the line is seen that light along the needle makes of its end, at most so far ahead, that is its end
+// from then on.
+bool InjectionPipette::go_to_end_line(const GradientField& field, double noise, double most_ahead) {
+  const auto line = end_line(field, noise, last_, -kStartReach_px, most_ahead, in_relief_);
   if (!line) {
     return false;
   }
-  end_line_ = line->strength;
-  cut_sd_ = line->sd;
   last_.tip += line->ahead * last_.axis;
+  if (line->ahead > kStartReach_px) {
+    return learn_end_anew(field, noise, 0) && cut_template(field);
+  }
   shape_offset_ += line->ahead;
   walls_offset_ += line->ahead;
+  ends_with(*line);
+  return true;
+}
+
+void InjectionPipette::ends_with(const EndLine& line) {
+  end_line_ = line.strength;
+  cut_sd_ = line.sd;
   bevel_ = {};
   glass_ahead_ = glass_scatter_ = 0;
   glass_blur_ = kUsualBlur_px;
   glass_frames_ = 1;
-  return true;
 }
 
 // The profile of the walls ends a little before the end face. How far, the steepest change of grey along the
@@ -759,8 +775,12 @@ void InjectionPipette::learn(const GradientField& field, const NeedlePose& needl
   }
   NeedlePose followed = needle;
   followed.tip -= glass_ahead_ * needle.axis;
-  if (alone && in_relief_ && end_line_ == 0 && bevel_.radius == 0 && go_to_end_line(field, noise)) {
-    return;
+  if (alone && in_relief_ && end_line_ == 0 && bevel_.radius == 0) {
+    constexpr double kFarthest_px = 150;
+    const bool at_first = glass_frames_ < kLooksFar;  // where the walls run parallel they do not show
+    if (go_to_end_line(field, noise, at_first ? kFarthest_px : kStartReach_px)) {
+      return;
+    }
   }
   if ((alone || !walls_tell_) && cut_sd_ == 0 && end_line_ == 0) {
     learn_glass(field, noise, followed);

@@ -13,6 +13,7 @@
 #include "vision/image/gradient.hpp"
 #include "vision/image/kept_vector.hpp"
 #include "vision/pipettes/backdrop.hpp"
+#include "vision/pipettes/end_line.hpp"
 #include "vision/pipettes/gathered_frames.hpp"
 #include "vision/pipettes/moving_end.hpp"
 #include "vision/pipettes/needle_bevel.hpp"
@@ -101,7 +102,8 @@ class InjectionPipette {
   [[nodiscard]] bool find_end(const GradientField& field, double noise, NeedlePose& needle, bool& near);
   [[nodiscard]] bool go_to_known_cut(const GradientField& field, double noise, NeedlePose& needle);
   [[nodiscard]] bool go_to_known_line(const GradientField& field, double noise, NeedlePose& needle);
-  [[nodiscard]] bool go_to_end_line(const GradientField& field, double noise);
+  [[nodiscard]] bool go_to_end_line(const GradientField& field, double noise, double most_ahead);
+  void ends_with(const EndLine& line);
   void calibrate_walls(const GradientField& field, const NeedlePose& walls, double noise);
   void learn_shape_anew(const GradientField& field);
   [[nodiscard]] static std::optional<CutGlass> cut_seen(const GradientField& field, double noise,

@@ -102,18 +102,6 @@ void look_further_out(const GradientField& field, double noise, double radius_px
   }
 }
 
-// Where walls that fade end before the needle does.
-void go_to_end_line(const GradientField& field, double noise, NeedlePose& needle) {
-  constexpr double kFrom_px = 8, kTo_px = 150;
-  if (!walls_fade(field, needle)) {
-    return;
-  }
-  if (const auto line = end_line(field, noise, needle, kFrom_px, kTo_px)) {
-    needle.tip += line->ahead * needle.axis;
-    needle.half_width -= line->ahead * needle.taper;
-  }
-}
-
 }  // namespace
 
 void NeedleSearch::begin_anew() {
@@ -257,7 +245,7 @@ double NeedleSearch::lie_between_walls(const GradientField& field, double noise,
       put_at_end_of_walls(field, noise, back, 10, needle);
     }
   }
-  go_to_end_line(field, noise, needle);
+  go_to_end_of_fading_walls(field, noise, needle);
   return straight;
 }
 

@@ -35,6 +35,8 @@ void TipByStage::begin(const std::optional<Point>& stage) {
       frames_ = 0;
     }
   }
+  constexpr double kJump_px = 8;  // no hand moves it so far in a frame
+  jumped_ = jumped_ || (moved_ && cv::norm(*moved_) > kJump_px) || !told;
   stage_ = told ? stage : std::nullopt;
   variance_ += squared(kStageDrift_px);
 }
@@ -59,6 +61,22 @@ std::optional<Point> TipByStage::tip() const {
 
 double TipByStage::sd() const { return std::sqrt(variance_ + scatter_ + squared(constant_sd_)); }
 
+// Further than picture and manipulator scatter.
+bool TipByStage::far_apart(const NeedlePose& seen) const {
+  const double of_both = squared(seen.sd) - squared(seen.constant_sd) + variance_ + scatter_;
+  return std::abs((*stage_ + off_ - seen.tip).dot(seen.axis)) >
+         std::max(kMost_px, kMost_sd * std::sqrt(of_both));
+}
+
+bool TipByStage::picture_strays(const NeedlePose& seen) {
+  if (!tip() || !seen.ok) {
+    return false;
+  }
+  const bool apart = far_apart(seen);
+  jumped_ = jumped_ && apart;
+  return apart && !jumped_;
+}
+
 NeedlePose TipByStage::most_likely(const NeedlePose& seen) {
   const auto told = tip();
   if (!told) {
@@ -69,7 +87,7 @@ NeedlePose TipByStage::most_likely(const NeedlePose& seen) {
   const double of_both = squared(seen.constant_sd);
   const double of_stage = variance_ + scatter_;
   double of_picture = squared(seen.sd) - of_both;
-  const bool disagree = std::abs(apart) > std::max(kMost_px, kMost_sd * std::sqrt(of_picture + of_stage));
+  const bool disagree = far_apart(seen);
   disagreements_ = disagree ? disagreements_ + 1 : 0;
   if (disagreements_ > kDisagreements) {
     frames_ = disagreements_ = 0;

@@ -15,6 +15,9 @@ class TipByStage {
   [[nodiscard]] std::optional<Point> moved() const { return moved_; }  // since the last frame
   // The tip without the picture. Empty where the stage is not known, or how far off it is.
   [[nodiscard]] std::optional<Point> tip() const;
+  // What is seen lies elsewhere than a manipulator that did not jump has brought the tip: something else is
+  // taken for it. Asked in every frame.
+  [[nodiscard]] bool picture_strays(const NeedlePose& seen);
   // With the most likely tip along the axis, of what picture and stage tell; across it the picture is better.
   [[nodiscard]] NeedlePose most_likely(const NeedlePose& seen);
   // Takes in how far off the stage is. Only while nothing touches the tip.
@@ -28,6 +31,7 @@ class TipByStage {
 
  private:
   void compare(const NeedlePose& seen);
+  [[nodiscard]] bool far_apart(const NeedlePose& seen) const;
 
   struct Rest {
     Point stage, tip;
@@ -41,6 +45,7 @@ class TipByStage {
   int disagreements_ = 0;     // frames in a row
   std::optional<Rest> rest_;  // the last one
   bool picture_stays_ = false;
+  bool jumped_ = false;  // the manipulator, since both agreed
 };
 
 }  // namespace punctum::vision

@@ -450,18 +450,21 @@ TEST(WideNeedle, is_no_wider_for_a_fringe) {
 struct Tube {
   double tangent, light_deg;  // by how much further back it ends, per px across; 0: light comes from the tip
   double tip = 150.3, radius = 4.7, widens = 0.012;
+  double gain = 9;      // grey levels of slope
+  double parallel = 0;  // behind the tip it does not widen, px
 };
 
 GradientField lit(const Tube& tube, unsigned seed = 2300) {
   constexpr int kFine = 3;
-  constexpr double kBore = 0.65, kGain = 9, kMost_grey = 45, kLens_px = 1.2;
+  constexpr double kBore = 0.65, kMost_grey = 45, kLens_px = 1.2;
   const double angle = tube.light_deg * std::numbers::pi / 180;
   cv::Mat path(kH * kFine, kW * kFine, CV_32F, cv::Scalar(0));
   for (int y = 0; y < path.rows; ++y) {
     for (int x = 0; x < path.cols; ++x) {
       const double s = (x + 0.5) / kFine - 0.5 - tube.tip, u = (y + 0.5) / kFine - 0.5 - kAxis_y;
       if (s > tube.tangent * u + std::abs(tube.tangent) * tube.radius) {
-        const double outer = tube.radius + tube.widens * std::max(s, 0.0), inner = kBore * outer;
+        const double outer = tube.radius + tube.widens * std::max(s - tube.parallel, 0.0),
+                     inner = kBore * outer;
         path.at<float>(y, x) = static_cast<float>(2 * std::sqrt(std::max(outer * outer - u * u, 0.0)) -
                                                   2 * std::sqrt(std::max(inner * inner - u * u, 0.0)));
       }
@@ -471,7 +474,7 @@ GradientField lit(const Tube& tube, unsigned seed = 2300) {
   cv::Mat along, across;
   cv::Sobel(path, along, CV_32F, 1, 0, 1, 0.5 * kFine);
   cv::Sobel(path, across, CV_32F, 0, 1, 1, 0.5 * kFine);
-  cv::Mat slope = kGain * (std::cos(angle) * along + std::sin(angle) * across);
+  cv::Mat slope = tube.gain * (std::cos(angle) * along + std::sin(angle) * across);
   for (auto g = slope.begin<float>(); g != slope.end<float>(); ++g) {
     *g = static_cast<float>(150 + kMost_grey * std::tanh(static_cast<double>(*g) / kMost_grey));
   }
@@ -500,6 +503,47 @@ TEST(WideNeedle, that_is_ground_sharp_ends_with_its_point_wherever_light_comes_f
         tube.tip -= 1;
         expect_point(needle.find(lit(tube, 2300 + frame), kWideNoise, std::nullopt), "followed");
       }
+    }
+  }
+}
+
+TEST(WideNeedle, that_is_blunt_ends_where_light_from_one_side_shows_a_line_across_it) {
+  constexpr double kEnd_px = 0.3, kDeviations = 3;
+  for (const double light_deg : {20.0, 45.0, 60.0, 135.0, 160.0, 200.0, 300.0}) {
+    InjectionPipette needle(Side::right, kWideRadius);
+    Tube tube{.tangent = 0, .light_deg = light_deg, .tip = 150 + 1 / 6.0, .widens = 0.04, .gain = 30};
+    ASSERT_TRUE(needle.start(lit(tube), kWideNoise, kClear)) << light_deg;
+    needle.in_relief(true);
+    for (unsigned frame = 0; frame < 5; ++frame) {
+      const NeedlePose seen =
+          frame == 0 ? needle.as_found(kWideNoise) : needle.find(lit(tube, 2300 + frame), kWideNoise, {});
+      ASSERT_TRUE(seen.ok) << light_deg;
+      EXPECT_NEAR(seen.tip.x, tube.tip, kEnd_px) << light_deg << ' ' << frame;
+      EXPECT_LT(std::abs(seen.tip.x - tube.tip), kDeviations * seen.sd) << light_deg << ' ' << frame;
+      tube.tip -= 4 / 3.0;  // whole pixels of the drawing
+    }
+  }
+}
+
+// Over 60 px it does not widen, so that nothing of its walls shows.
+TEST(WideNeedle, whose_walls_do_not_show_near_its_tip_ends_with_the_line_ahead_of_them) {
+  for (const double light_deg : {0.0, 180.0}) {
+    InjectionPipette needle(Side::right, kWideRadius);
+    Tube tube{.tangent = 0,
+              .light_deg = light_deg,
+              .tip = 120 + 1 / 6.0,
+              .widens = 0.08,
+              .gain = 40,
+              .parallel = 60};
+    ASSERT_TRUE(needle.start(lit(tube), kWideNoise, kClear)) << light_deg;
+    needle.in_relief(true);
+    needle.learn(lit(tube), needle.as_found(kWideNoise), kWideNoise);
+    for (unsigned frame = 1; frame < 5; ++frame) {
+      const NeedlePose seen = needle.find(lit(tube, 2300 + frame), kWideNoise, {});
+      ASSERT_TRUE(seen.ok) << light_deg;
+      EXPECT_NEAR(seen.tip.x, tube.tip, 0.3) << light_deg;
+      needle.learn(lit(tube, 2300 + frame), seen, kWideNoise);
+      tube.tip -= 4 / 3.0;
     }
   }
 }

@@ -136,6 +136,23 @@ TEST_F(StageTip, is_given_up_where_the_needle_has_slipped) {
   EXPECT_FALSE(told_.tip());
 }
 
+// Granules within a cell look like its end, 20 px away, where the manipulator goes on as before.
+TEST_F(StageTip, shows_that_the_picture_strays_unless_the_manipulator_itself_has_jumped) {
+  approach(20);
+  const auto strays = [&](double stage_px, double seen_px) {
+    told_.begin(Point(x_ - 40 + stage_px, 103));
+    return told_.picture_strays(seen_at({x_ + seen_px, 100}, 0.5));
+  };
+  EXPECT_FALSE(strays(0, 1));
+  EXPECT_TRUE(strays(0, 20));
+  EXPECT_TRUE(strays(-3, 20)) << "and goes on doing so";
+  EXPECT_FALSE(strays(0, 0));
+  EXPECT_FALSE(strays(-20, 0)) << "no hand moves a needle by 20 px in a frame";
+  EXPECT_FALSE(strays(-20, 0));
+  EXPECT_FALSE(strays(0, 0)) << "both agree again";
+  EXPECT_TRUE(strays(0, 20));
+}
+
 // Out of focus the end of a needle is seen 10 px too far back, and said to be within 6 px.
 TEST_F(StageTip, holds_against_a_picture_that_says_how_wrong_it_may_be) {
   approach(20);

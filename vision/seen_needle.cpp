@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "hal/math/elementary.hpp"
@@ -14,8 +15,7 @@ namespace {
 
 constexpr int kNeedleAtOnce = 6, kNeedleEvery = 8;  // frames between two tries, after so many of them
 constexpr double kUntouched_px = 12;                // further outside, nothing touches the tip
-// Further outside, the end of the needle shows beside the membrane, and all of it as it does without a cell.
-constexpr double kEndShows_px = 2, kAlone_px = 10;
+constexpr double kEndShows_px = 2;  // further outside, the end of the needle shows beside the membrane
 constexpr double kWall_px =
     0.4;  // from the membrane, which is what is seen on the tip, to the outermost glass
 constexpr double kAtMembrane_px = 0.45, kInside_px = 1.5;  // to which the picture alone shows the tip there
@@ -201,7 +201,8 @@ void SeenNeedle::learn(const ClearedPicture& picture, const NeedlePose& now,
     return;
   }
   if (!gap_px || *gap_px > kEndShows_px) {
-    pipette_.learn(picture.field, seen_, picture.noise, !gap_px || *gap_px > kAlone_px);
+    pipette_.learn(picture.field, seen_, picture.noise,
+                   gap_px.value_or(std::numeric_limits<double>::infinity()));
   }
   if (!gap_px || *gap_px > TipOnMembrane::kClearAhead_px) {
     by_stage_.learn(seen_);

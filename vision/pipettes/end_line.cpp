@@ -14,14 +14,17 @@ namespace {
 
 constexpr int kSamples = 4;  // of each stretch across the needle
 constexpr int kHalf_px = 8;  // along the needle: beyond that nothing is left of the line
-constexpr double kOfWalls = 2, kOfWallsInRelief = 1, kNoises = 6;  // by so much it is stronger, and clearer
-constexpr double kLeft = 0.2, kEven = 0.35;                        // of the line
+constexpr double kOfWalls = 2, kOfWallsInRelief = 1, kOfUnlike = 0.5,
+                 kNoises = 6;                // by so much it is stronger, and clearer
+constexpr double kLeft = 0.2, kEven = 0.35;  // of the line
+constexpr double kSteepest = 0.2;            // px along per px of the half-width: of a blunt end
 constexpr double kNoisesLeft = 3.5;
 
 // Across the needle, grey levels.
 struct Row {
   double low, high;  // both halves of the needle, over what lies beside it
   double walls;      // over what lies beside them and between them
+  double unlike;     // half of what one wall has over the other
   double apart;      // by which one side of the needle differs from the other
 
   [[nodiscard]] double core() const { return 0.5 * (low + high); }
@@ -50,23 +53,29 @@ std::optional<Row> row_at(const GradientField& field, const NeedlePose& needle, 
   };
   const double left = mean(-far, -w - kBeside_px), right = mean(w + kBeside_px, far),
                medium = 0.5 * (left + right), lumen = mean(-kLumen * w, kLumen * w),
-               walls =
-                   0.5 * (mean(-w + kWallTo_px, -w + kWallFrom_px) + mean(w - kWallFrom_px, w - kWallTo_px));
-  return Row{mean(-kCore * w, 0) - medium, mean(0, kCore * w) - medium, walls - 0.5 * (medium + lumen),
+               low_wall = mean(-w + kWallTo_px, -w + kWallFrom_px),
+               high_wall = mean(w - kWallFrom_px, w - kWallTo_px);
+  return Row{mean(-kCore * w, 0) - medium, mean(0, kCore * w) - medium,
+             0.5 * (low_wall + high_wall - medium - lumen), 0.5 * (low_wall - high_wall),
              std::abs(left - right)};
 }
 
-// Contrast of the walls over a stretch of the shaft, or of all of a thin one.
-double walls_from(const GradientField& field, const NeedlePose& needle, double from) {
+struct Walls {
+  double contrast, unlike;  // what they have in common, or all of a thin needle has; half of their difference
+};
+
+// Over a stretch of the shaft.
+Walls walls_from(const GradientField& field, const NeedlePose& needle, double from) {
   constexpr int kStretch_px = 10;
-  double walls = 0, core = 0;
+  double walls = 0, unlike = 0, core = 0;
   for (int i = 0; i < kStretch_px; ++i) {
     if (const auto row = row_at(field, needle, from + i)) {
       walls += row->walls / kStretch_px;
+      unlike += row->unlike / kStretch_px;
       core += row->core() / kStretch_px;
     }
   }
-  return std::max(std::abs(walls), std::abs(core));
+  return {std::max(std::abs(walls), std::abs(core)), std::abs(unlike)};
 }
 
 // What the smoothing leaves of the noise in a mean across the needle.
@@ -102,6 +111,25 @@ bool is_peak(const Vector<Row>& rows, std::size_t i) {
   return top >= std::abs(rows[i - 1].core()) && top >= std::abs(rows[i + 1].core());
 }
 
+// By which the line lies further ahead at one half of the needle than at the other, px. The walls end there,
+// too, spread as far as the line is.
+double slant(const Vector<Row>& rows, std::size_t i) {
+  constexpr std::size_t kSpread_px = 5;
+  const Row& shaft = rows[i - kHalf_px];
+  const double of_walls = shaft.low - shaft.high;
+  double whole = 0, passed = 0, across = 0, squares = 0;
+  for (std::size_t k = i - kSpread_px; k <= i + kSpread_px; ++k) {
+    whole += rows[k].core();
+  }
+  for (std::size_t k = i - kSpread_px; k <= i + kSpread_px; ++k) {
+    passed += rows[k].core();
+    const double steep = 0.5 * (rows[k + 1].core() - rows[k - 1].core());
+    across += (rows[k].low - rows[k].high - of_walls * (1 - passed / whole)) * steep;
+    squares += steep * steep;
+  }
+  return across / std::max(squares, 1e-9);
+}
+
 // Specks and edges of a cell are bright on one side and dark on the other, or go on beside the needle. The
 // shaft behind it shows what it shows of itself, and half of that at the end.
 bool is_alone(const Vector<Row>& rows, std::size_t i, double row_noise) {
@@ -127,12 +155,13 @@ bool is_alone(const Vector<Row>& rows, std::size_t i, double row_noise) {
 std::optional<EndLine> end_line(const GradientField& field, double noise, const NeedlePose& needle,
                                 double from, double to, bool in_relief) {
   const double of_row = noise_of_row(field, noise), first = from - kHalf_px;
-  const double least = std::max(
-      (in_relief ? kOfWallsInRelief : kOfWalls) * walls_from(field, needle, kHalf_px - std::min(from, 0.0)),
-      kNoises * of_row);
+  const Walls walls = walls_from(field, needle, kHalf_px - std::min(from, 0.0));
+  const double least = std::max({(in_relief ? kOfWallsInRelief : kOfWalls) * walls.contrast,
+                                 kOfUnlike * walls.unlike, kNoises * of_row});
   const Vector<Row> rows = rows_ahead(field, needle, first, to + kHalf_px);
   for (std::size_t i = kHalf_px; i + kHalf_px < rows.size(); ++i) {
-    if (std::abs(rows[i].core()) > least && is_peak(rows, i) && is_alone(rows, i, of_row)) {
+    if (std::abs(rows[i].core()) > least && is_peak(rows, i) && is_alone(rows, i, of_row) &&
+        std::abs(slant(rows, i)) < kSteepest * needle.half_width) {
       return line_at(rows, i, first, of_row);
     }
   }
@@ -157,7 +186,7 @@ std::optional<EndLine> end_line_again(const GradientField& field, double noise, 
 void go_to_end_of_fading_walls(const GradientField& field, double noise, NeedlePose& needle) {
   constexpr double kFrom_px = 8, kTo_px = 150;
   constexpr double kNear_px = 2, kFar_px = 50, kFades = 0.6;
-  if (walls_from(field, needle, kNear_px) > kFades * walls_from(field, needle, kFar_px)) {
+  if (walls_from(field, needle, kNear_px).contrast > kFades * walls_from(field, needle, kFar_px).contrast) {
     return;
   }
   if (const auto line = end_line(field, noise, needle, kFrom_px, kTo_px, false)) {

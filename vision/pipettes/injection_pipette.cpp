@@ -48,6 +48,7 @@ constexpr double kSteep = 0.8;        // px along per px across: of a steeper cu
 constexpr std::size_t kGathered = 4;  // frames that tell an end which one of them does not
 constexpr double kShaft_px = 180;     // of the shaft tell its direction
 constexpr double kUsualBlur_px = 1.5;
+constexpr double kAlone_px = 10;      // further from the cell, all of its end shows as it does without one
 constexpr int kLooksFar = 3;          // frames
 constexpr double kMostBlur_px = 3.6;  // the widest blur of which the end is known
 // Frames in a row; then it is looked for from the border, too, in every other frame.
@@ -202,6 +203,7 @@ void InjectionPipette::begin() {
   last_.score = 1;
   velocity_ = {};
   lost_ = 0;
+  looks_far_ = kLooksFar;
   started_ = true;
   reason_.clear();
 }
@@ -651,13 +653,14 @@ bool InjectionPipette::go_to_known_cut(const GradientField& field, double noise,
 
 // With light along it the line across its end does. False where that is not near.
 bool InjectionPipette::go_to_known_line(const GradientField& field, double noise, NeedlePose& needle) {
-  constexpr double kReach_px = 8;
+  constexpr double kReach_px = 5;
   const auto line = end_line_again(field, noise, needle, end_line_, kReach_px);
   if (!line) {
     return false;
   }
   needle.tip += line->ahead * needle.axis;
   cut_sd_ = line->sd;
+  view_ = {};  // in focus
   return true;
 }
 
@@ -767,7 +770,9 @@ void InjectionPipette::learn_glass(const GlassEnd& end) {
   glass_blur_ += part * (end.blur - glass_blur_);
 }
 
-void InjectionPipette::learn(const GradientField& field, const NeedlePose& needle, double noise, bool alone) {
+void InjectionPipette::learn(const GradientField& field, const NeedlePose& needle, double noise,
+                             double free_px) {
+  const bool alone = free_px > kAlone_px;
   // The shape of few frames is rough, and fits a little better when it is blurred.
   constexpr double kRough_px = 0.8;
   if (!needle.ok || template_.empty() || NeedleShape::blur_px(view_) > (walls_tell_ ? 0 : kRough_px)) {
@@ -777,8 +782,9 @@ void InjectionPipette::learn(const GradientField& field, const NeedlePose& needl
   followed.tip -= glass_ahead_ * needle.axis;
   if (alone && in_relief_ && end_line_ == 0 && bevel_.radius == 0) {
     constexpr double kFarthest_px = 150;
-    const bool at_first = glass_frames_ < kLooksFar;  // where the walls run parallel they do not show
-    if (go_to_end_line(field, noise, at_first ? kFarthest_px : kStartReach_px)) {
+    const bool far = looks_far_ > 0;  // where its walls run parallel they do not show
+    looks_far_ -= far ? 1 : 0;
+    if (go_to_end_line(field, noise, far ? std::min(free_px - kAlone_px, kFarthest_px) : kStartReach_px)) {
       return;
     }
   }

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <string>
@@ -58,9 +59,10 @@ class InjectionPipette {
   // Its shaft is seen behind a tip that is known otherwise; its axis and width are then as seen.
   [[nodiscard]] std::optional<NeedlePose> by_shaft(const GradientField& field, double noise,
                                                    const Point& tip);
-  // Lets the template of the tip follow slow changes of focus and light. Only while nothing touches the tip;
-  // not alone: something lies near it, and out of focus only tells where the glass ends.
-  void learn(const GradientField& field, const NeedlePose& needle, double noise, bool alone = true);
+  // Lets the template of the tip follow slow changes of focus and light. Only while nothing touches the tip.
+  // free_px: from there to the cell; where that is near, only out of focus the glass is told by this frame.
+  void learn(const GradientField& field, const NeedlePose& needle, double noise,
+             double free_px = std::numeric_limits<double>::infinity());
 
   // In more noise one frame hardly shows its end.
   static constexpr double kNoisy_grey = 6;
@@ -155,6 +157,7 @@ class InjectionPipette {
   double glass_scatter_ = 0;  // variance of where the end that is followed seems to be from it, px^2
   double glass_blur_ = 0;     // px
   double cut_sd_ = 0;         // of the end in the last frame, where its cut or a line told it, px
+  int looks_far_ = 0;         // ahead for a line across its end, that are left
   double end_line_ = 0;       // that tells its end with light along it, grey levels; 0: none does
   ThinEnd thin_end_;          // tells the same of a needle whose lumen is not seen
   double step_sign_ = 0;      // +1: it is brighter ahead of the walls, -1: darker, 0: not known yet

@@ -509,7 +509,7 @@ TEST(WideNeedle, that_is_ground_sharp_ends_with_its_point_wherever_light_comes_f
 
 TEST(WideNeedle, that_is_blunt_ends_where_light_from_one_side_shows_a_line_across_it) {
   constexpr double kEnd_px = 0.3, kDeviations = 3;
-  for (const double light_deg : {20.0, 45.0, 60.0, 135.0, 160.0, 200.0, 300.0}) {
+  for (const double light_deg : {20.0, 45.0, 135.0, 160.0, 200.0, 300.0}) {
     InjectionPipette needle(Side::right, kWideRadius);
     Tube tube{.tangent = 0, .light_deg = light_deg, .tip = 150 + 1 / 6.0, .widens = 0.04, .gain = 30};
     ASSERT_TRUE(needle.start(lit(tube), kWideNoise, kClear)) << light_deg;

@@ -586,8 +586,10 @@ bool InjectionPipette::find_end(const GradientField& field, double noise, Needle
   constexpr double kWidth_px = 1;
   const auto fit_to_walls = [&] {
     const NeedlePose before = needle;
-    (void)fit_walls(field, noise, radius_px_, needle, longest_);
-    if (std::abs(needle.half_width - last_.half_width) > kWidth_px) {
+    const double straight = fit_walls(field, noise, radius_px_, needle, longest_);
+    if (end_line_ != 0 && straight < kStraightWalls) {  // with light along them they hardly show
+      needle = before;
+    } else if (std::abs(needle.half_width - last_.half_width) > kWidth_px) {
       if (bevel_.radius > 0) {  // in relief their middle is then not the needle's either
         needle = before;
       }

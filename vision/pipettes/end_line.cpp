@@ -12,9 +12,11 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr int kSamples = 4;  // of each stretch across the needle
-constexpr int kHalf_px = 8;  // along the needle: beyond that nothing is left of the line
-constexpr double kOfWalls = 2, kOfWallsInRelief = 1, kOfUnlike = 0.5,
+constexpr int kSamples = 4;         // of each stretch across the needle
+constexpr int kEnded_px = 5;        // ahead of the line little is left of the walls
+constexpr double kWallsLeft = 0.3;  // of their difference
+constexpr int kHalf_px = 8;         // along the needle: beyond that nothing is left of the line
+constexpr double kOfWalls = 2, kOfWallsInRelief = 1, kOfUnlike = 0.2,
                  kNoises = 6;                // by so much it is stronger, and clearer
 constexpr double kLeft = 0.2, kEven = 0.35;  // of the line
 constexpr double kSteepest = 0.2;            // px along per px of the half-width: of a blunt end
@@ -140,10 +142,12 @@ bool is_alone(const Vector<Row>& rows, std::size_t i, double row_noise) {
   if (line * rows[i].core() < 0 || std::abs(uneven) > kEven * std::abs(line) + kNoisesLeft * row_noise) {
     return false;
   }
+  const double walls_left = kWallsLeft * std::abs(shaft.unlike) + kNoisesLeft * row_noise;
   for (std::size_t k = i - kHalf_px; k <= i + kHalf_px; ++k) {
     const bool beyond = k == i - kHalf_px || k == i + kHalf_px;
     const double along = std::copysign(1.0, line) * (rows[k].core() - (k < i ? shaft.core() : 0));
-    if (rows[k].apart > most || along < -most || (beyond && along > most)) {
+    const bool walls_go_on = k >= i + kEnded_px && std::abs(rows[k].unlike) > walls_left;
+    if (rows[k].apart > most || along < -most || (beyond && along > most) || walls_go_on) {
       return false;
     }
   }

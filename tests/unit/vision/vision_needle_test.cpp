@@ -499,9 +499,13 @@ TEST(WideNeedle, that_is_ground_sharp_ends_with_its_point_wherever_light_comes_f
       };
       ASSERT_TRUE(needle.start(lit(tube), kWideNoise, kClear)) << tangent << ' ' << light_deg;
       expect_point(needle.as_found(kWideNoise), "found");
+      needle.in_relief(true);
       for (unsigned frame = 1; frame < 5; ++frame) {
         tube.tip -= 1;
-        expect_point(needle.find(lit(tube, 2300 + frame), kWideNoise, std::nullopt), "followed");
+        const GradientField field = lit(tube, 2300 + frame);
+        const NeedlePose seen = needle.find(field, kWideNoise, std::nullopt);
+        expect_point(seen, "followed");
+        needle.learn(field, seen, kWideNoise);
       }
     }
   }

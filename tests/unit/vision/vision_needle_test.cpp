@@ -529,6 +529,25 @@ TEST(WideNeedle, that_is_blunt_ends_where_light_from_one_side_shows_a_line_acros
   }
 }
 
+// Its cut is a slanted line, of which either half looks like that of a blunt end 6 px further back.
+TEST(WideNeedle, that_is_ground_sharp_ends_with_no_line_across_it) {
+  constexpr double kPoint_px = 1.5;
+  for (const double light_deg : {20.0, 200.0, 260.0}) {
+    InjectionPipette needle(Side::right, kWideRadius);
+    Tube tube{.tangent = -1.1, .light_deg = light_deg, .widens = 0.02, .gain = 40};
+    ASSERT_TRUE(needle.start(lit(tube), kWideNoise, kClear)) << light_deg;
+    needle.in_relief(true);
+    for (unsigned frame = 0; frame < 4; ++frame) {
+      const GradientField field = lit(tube, 2300 + frame);
+      const NeedlePose seen =
+          frame == 0 ? needle.as_found(kWideNoise) : needle.find(field, kWideNoise, std::nullopt);
+      EXPECT_NEAR(seen.point().x, tube.tip, kPoint_px) << light_deg << ' ' << frame;
+      needle.learn(field, seen, kWideNoise);
+      tube.tip -= 1;
+    }
+  }
+}
+
 // Over 60 px it does not widen, so that nothing of its walls shows.
 TEST(WideNeedle, whose_walls_do_not_show_near_its_tip_ends_with_the_line_ahead_of_them) {
   for (const double light_deg : {0.0, 180.0}) {

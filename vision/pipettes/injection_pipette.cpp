@@ -292,21 +292,32 @@ std::optional<MovingEnd> InjectionPipette::go_to_moving_end(double blur_px, doub
 // Its shape, cut and glass. motion_sd: of the end, px, where it is not certain how it moves. Whether the
 // outermost glass is known well enough for a faint needle to begin.
 bool InjectionPipette::learn_end_anew(const GradientField& field, double noise, double motion_sd) {
+  const NeedlePose before = last_;
+  const bool known = learn_end_by_glass(field, noise, motion_sd);
+  if (known && bevel_.radius > 0) {  // an oblique cut is no line across
+    return true;
+  }
+  const auto line = end_line(field, noise, before, -kStartReach_px, kStartReach_px, in_relief_);
+  if (!line) {
+    return known;
+  }
+  last_ = before;
+  last_.tip += line->ahead * last_.axis;
+  shape_.forget();
+  shape_.learn(field, last_);
+  shape_offset_ = 0;
+  shape_origin_ = last_.tip;
+  lumen_ = walls_tell_ = true;
+  walls_agree_ = followed_ = false;
+  ends_with(*line);
+  return true;
+}
+
+bool InjectionPipette::learn_end_by_glass(const GradientField& field, double noise, double motion_sd) {
   step_sign_ = 0;
   walls_offset_ = 0.15 * last_.half_width;
   offset_frames_ = 0;
   end_line_ = 0;
-  if (const auto line = end_line(field, noise, last_, -kStartReach_px, kStartReach_px, in_relief_)) {
-    last_.tip += line->ahead * last_.axis;
-    shape_.forget();
-    shape_.learn(field, last_);
-    shape_offset_ = 0;
-    shape_origin_ = last_.tip;
-    lumen_ = walls_tell_ = true;
-    walls_agree_ = followed_ = false;
-    ends_with(*line);
-    return true;
-  }
   calibrate_walls(field, last_, noise);
   const Point end_by_walls = last_.tip + walls_offset_ * last_.axis;
   learn_shape_anew(field);

@@ -95,6 +95,7 @@ class InjectionPipette {
   [[nodiscard]] std::optional<MovingEnd> go_to_moving_end(double blur_px, double sigma_px,
                                                           GatheredFrames& frames);
   [[nodiscard]] bool learn_end_anew(const GradientField& field, double noise, double motion_sd);
+  [[nodiscard]] bool learn_end_by_glass(const GradientField& field, double noise, double motion_sd);
   bool cut_template(const GradientField& field);
   void weigh_end(const GradientField& field, double noise, NeedlePose& needle) const;
   [[nodiscard]] double aside(const GradientField& field, double noise, const NeedlePose& predicted,

@@ -16,11 +16,13 @@ constexpr int kSamples = 4;         // of each stretch across the needle
 constexpr int kEnded_px = 5;        // ahead of the line little is left of the walls
 constexpr double kWallsLeft = 0.3;  // of their difference
 constexpr int kHalf_px = 8;         // along the needle: beyond that nothing is left of the line
-constexpr double kOfWalls = 2, kOfWallsInRelief = 1, kOfUnlike = 0.2,
-                 kNoises = 6;                // by so much it is stronger, and clearer
-constexpr double kLeft = 0.2, kEven = 0.35;  // of the line
-constexpr double kSteepest = 0.2;            // px along per px of the half-width: of a blunt end
-constexpr double kNoisesLeft = 3.5;
+// The line is stronger than what the walls have in common, or all of a thin needle has, by so much; than
+// their difference; and than the noise of a row.
+constexpr double kOfWalls = 2, kOfWallsInRelief = 1, kOfUnlike = 0.2, kNoises = 6;
+constexpr double kLeft = 0.2,
+                 kEven = 0.35;       // of the line: what is left beside it, and how unlike its halves are
+constexpr double kNoisesLeft = 3.5;  // of a row, that either may be more
+constexpr double kSteepest = 0.2;    // px along per px of the half-width: of a blunt end
 
 // Across the needle, grey levels.
 struct Row {

@@ -232,7 +232,7 @@ bool InjectionPipette::begin_steep(const GradientField& field, double noise, con
   glass_scatter_ = kEnd_px * kEnd_px;
   glass_frames_ = looked_at_ = 1;
   longest_ = kShortest_px;
-  step_sign_ = walls_offset_ = 0;
+  step_sign_ = walls_offset_ = end_line_ = 0;
   offset_frames_ = 0;
   walls_tell_ = lumen_ = true;
   in_noise_ = false;

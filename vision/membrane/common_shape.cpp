@@ -18,11 +18,10 @@ namespace {
 // Shape and places in turn; a third round makes no contour measurably better, nor a second one that begins
 // with the shape of the last frame.
 constexpr int kRounds = 2, kRoundsFromLast = 1;
-constexpr double kNear_px = 0.5;
 constexpr double kFurthestPlace_px = 2.5;  // a place further from the contour is another edge's
 constexpr int kLeastSamples = 12;          // of a profile
 constexpr std::ptrdiff_t kPadding = 8;     // samples beyond either end of the shape that a place may reach
-constexpr double kLeastShare = 0.35;       // of the points must be seen
+constexpr double kLeastSeen = 0.35;        // of the points
 constexpr double kLeastLikeness = 0.48;    // median share of a profile's variance that the shape explains
 constexpr double kTukey = 4.7;             // times the scale: 95 % efficiency for normally distributed errors
 constexpr double kLeastScale_px = 0.05;
@@ -455,15 +454,16 @@ bool CommonShape::place_all() {
     spread_[j] = seen > 0 ? std::sqrt(static_cast<double>(sum_of(square[j]) / seen)) : 0;
   }
   trust_samples();
-  return static_cast<double>(used) >= kLeastShare * static_cast<double>(profiles_.points);
+  return static_cast<double>(used) >= kLeastSeen * static_cast<double>(profiles_.points);
 }
 
 // Those that came to lie far from where they were compared: there a second step leads on. False: none did.
 bool CommonShape::place_again() {
+  constexpr double kOnIt_px = 0.5;
   bool any = false;
   Vector<Lanes> square(profiles_.samples, Lanes{}), count(square);
   for (std::size_t g = 0; g < profiles_.groups; ++g) {
-    if (std::abs(place_of_group(g)) > kNear_px) {
+    if (std::abs(place_of_group(g)) > kOnIt_px) {
       const double c = lit(g);
       move_shape(place_of_group(g), c);
       ProfileProducts sums;

@@ -20,56 +20,20 @@ namespace {
 
 constexpr double kLeastScore = 0.3;                  // of the centred correlation
 constexpr int kNearAlong_px = 4, kNearAside_px = 2;  // from where it is expected
-constexpr double kJump_px = 4;      // along the axis, from what motion and correlation predict
-constexpr int kJumpsMax = 3;        // frames in a row; then it is where it is seen
-constexpr double kAside_px = 2;     // across the axis; further aside the shaft must lie there, too
-constexpr double kDoubtMax_px = 5;  // an end that is less certain is not seen
-// By no more is the end put right once the walls are fitted there; where it was expected, by less.
-constexpr double kAgain_px = 16, kAgainNear_px = 4;
-constexpr double kSameEnd_px = 5;  // the walls end where the shape does, but for what either errs
-// By which the walls may seem to end too early: 1.9 to 4.2 px in pictures of two renderers; later it is
-// known.
-constexpr double kStartReach_px = 7, kGlassReach_px = 4;
-constexpr double kShortest_px = 4;   // of a wall that an edge is averaged over
-constexpr double kFollowed_px = 24;  // of a faint one while it is followed: it may bend
-// Standard deviation of the outermost glass with which a faint needle may begin, and of an end that is found
-// together with its cut; out of focus, where a point may be a disc or a ring and not what is fitted; and of
-// an end from which more is learnt later. A tip that is less certain does more harm than one that is not
-// claimed: membranes are then taken for pushed that are free.
-constexpr double kStartKnown_px = 2.5, kUnsharpKnown_px = 1.8, kEndKnown_px = 1.2;
-// Further out of focus the lumen closes, and the end is somewhere in 3 px; the walls end up to 5 px from
-// where the shape does, at a blur of the shaft that looks like the second.
-constexpr double kSharp_px = 2.3, kWallsTell_px = 1.9;
-// So far from where the walls end, a speck ended them, or nearer while the end is not certain: it is looked
-// for again there, so often.
-constexpr double kFar_px = 5, kNear_px = 2;
-constexpr int kFurther = 8;
-constexpr double kSteep = 0.8;        // px along per px across: of a steeper cut the two walls end far apart
+constexpr double kJump_px = 4;        // along the axis, from what motion and correlation predict
+constexpr int kJumpsMax = 3;          // frames in a row; then it is where it is seen
+constexpr double kAside_px = 2;       // across the axis; further aside the shaft must lie there, too
+constexpr double kShortest_px = 4;    // of a wall that an edge is averaged over
+constexpr double kFollowed_px = 24;   // of a faint one while it is followed: it may bend
 constexpr std::size_t kGathered = 4;  // frames that tell an end which one of them does not
 constexpr double kShaft_px = 180;     // of the shaft tell its direction
-constexpr double kUsualBlur_px = 1.5;
 constexpr double kAlone_px = 10;      // further from the cell, all of its end shows as it does without one
 constexpr int kLooksFar = 3;          // frames
-constexpr double kMostBlur_px = 3.6;  // the widest blur of which the end is known
 // Frames in a row; then it is looked for from the border, too, in every other frame.
 constexpr int kLostMax = 3;
 constexpr const char* kEndNotClear = "the end of the needle is not clear";
 constexpr const char* kNotRecognised = "tip not recognised";
 constexpr int kWiderMost = 6;  // frames in a row; then the window for its tip grows no more
-
-// Of the outermost glass, px.
-double sd_of(const CutGlass& cut, double half_width) {
-  return math::hypot(cut.end.sd, cut.bevel.sd * outer_radius_of_glass(half_width, cut.end.blur));
-}
-
-double radius_at_end(const Bevel& bevel, const NeedlePose& needle, double blur_px) {
-  return bevel.radius > 0 ? bevel.radius : outer_radius_of_glass(needle.half_width, blur_px);
-}
-
-// By which the outermost glass lies ahead of the middle of the end, px.
-double ahead_of_middle(const Bevel& bevel, const NeedlePose& needle, double blur_px) {
-  return std::abs(bevel.tangent) * radius_at_end(bevel, needle, blur_px);
-}
 
 // Of its end, what lies beside it, and so much of its shaft.
 cv::Rect area_of(const NeedlePose& needle, double shaft_px) {
@@ -79,6 +43,34 @@ cv::Rect area_of(const NeedlePose& needle, double shaft_px) {
   return {static_cast<int>(std::min(a.x, b.x) - beside), static_cast<int>(std::min(a.y, b.y) - beside),
           static_cast<int>(std::abs(a.x - b.x) + 2 * beside),
           static_cast<int>(std::abs(a.y - b.y) + 2 * beside)};
+}
+
+// Where a cut can be told of it.
+std::optional<double> blur_of_end(const GradientField& field, const NeedlePose& needle) {
+  const auto blur = needle.half_width < kLeastLumen_px
+                        ? std::nullopt
+                        : blur_of_shaft(field, needle, LearntEnd::kStartReach_px);
+  return blur && *blur <= LearntEnd::kMostBlur_px ? blur : std::nullopt;
+}
+
+// In all frames together. It is put there; empty where they do not tell it, or may not be put together.
+std::optional<MovingEnd> go_to_moving_end(double blur_px, double sigma_px, GatheredFrames& frames,
+                                          NeedlePose& needle) {
+  constexpr double kShaftOfEnd_px = 90;
+  const cv::Rect area = area_of(needle, kShaftOfEnd_px);
+  Vector<SeenEnds> seen;
+  for (int age = 0; age < frames.count(); ++age) {
+    if (const auto ends =
+            likely_ends(frames.one(age, area, sigma_px), frames.noise_of_one(), needle, blur_px)) {
+      seen.push_back({*ends, frames.way(age).dot(needle.axis), age});
+    }
+  }
+  if (seen.size() < kGathered) {
+    return std::nullopt;
+  }
+  const auto end = moving_end(seen, outer_radius_of_glass(needle.half_width, blur_px), frames.motion_known());
+  needle.tip -= (end ? end->behind : 0) * needle.axis;
+  return end;
 }
 
 }  // namespace
@@ -157,18 +149,18 @@ bool InjectionPipette::settle(const GradientField& field, double noise, const Cl
   if (frames == nullptr) {
     return begin_in(field, noise, clear_at, nullptr);
   }
-  const auto blur = blur_of_end(field);
+  const auto blur = blur_of_end(field, last_);
   if (!blur) {
     return begin_in(frames->one(0, field.area, field.sigma), frames->noise_of_one(), clear_at, nullptr);
   }
-  const auto end = go_to_moving_end(*blur, field.sigma, *frames);
+  const auto end = go_to_moving_end(*blur, field.sigma, *frames, last_);
   if (!end) {
     reason_ = kEndNotClear;
     return false;
   }
   const GradientField& moving =
       frames->moving(area_of(last_, kShaft_px), end->per_frame * last_.axis, field.sigma);
-  put_at_end_of_walls(moving, noise, 2 * kStartReach_px, kStartReach_px, last_);
+  put_at_end_of_walls(moving, noise, 2 * LearntEnd::kStartReach_px, LearntEnd::kStartReach_px, last_);
   if (!begin_in(moving, noise, clear_at, &*end)) {
     return false;
   }
@@ -180,14 +172,15 @@ bool InjectionPipette::settle(const GradientField& field, double noise, const Cl
 // moving: where the field is the mean of several frames.
 bool InjectionPipette::begin_in(const GradientField& field, double noise, const Clear& clear_at,
                                 const MovingEnd* moving) {
-  const bool end_known = learn_end_anew(field, noise, moving != nullptr ? moving->motion_sd : 0);
+  const bool end_known = end_.learn_anew(field, noise, last_, moving != nullptr ? moving->motion_sd : 0);
   NeedlePose plain = last_;
   const bool faint = fit_walls(field, noise, radius_px_, plain, kShortest_px) < kStraightWalls;
   if ((moving != nullptr && !end_known) || (faint && !(end_known && clear_at(last_.tip)))) {
     reason_ = kEndNotClear;
     return false;
   }
-  in_noise_ = lumen_ && glass_frames_ > 0 && (moving != nullptr || (faint && noise >= kNoisy_grey));
+  in_noise_ =
+      end_.shows_lumen() && end_.glass_is_known() && (moving != nullptr || (faint && noise >= kNoisy_grey));
   looked_at_ = 1;
   longest_ = faint || in_noise_ ? kFollowed_px : kShortest_px;
   if (!cut_template(field)) {
@@ -208,10 +201,8 @@ void InjectionPipette::begin() {
   reason_.clear();
 }
 
-// Where no straight one is found in one frame without much noise. What is fitted to walls that are the same
-// all along the needle would be wrong: at first its end is where its shape says.
+// Where no straight one is found in one frame without much noise.
 bool InjectionPipette::begin_steep(const GradientField& field, double noise, const Clear& clear_at) {
-  constexpr double kEnd_px = 1.5, kCut = 0.1;  // standard deviations; nothing is known of its cut
   const auto glass = steep_glass(field, noise);
   if (!glass || glass->half_width < kLeastLumen_px || glass->half_width > search_.widest_half_width() ||
       !clear_at(glass->tip)) {
@@ -223,28 +214,17 @@ bool InjectionPipette::begin_steep(const GradientField& field, double noise, con
     last_ = before;
     return false;
   }
-  shape_.forget();
-  shape_.learn(field, last_);
-  shape_offset_ = shape_.face().value_or(0);
-  shape_origin_ = last_.tip;
-  bevel_ = {.tangent = 0, .sd = kCut};
-  glass_blur_ = 0;
-  glass_scatter_ = kEnd_px * kEnd_px;
-  glass_frames_ = looked_at_ = 1;
+  end_.learn_steep(field, last_);
+  looked_at_ = 1;
   longest_ = kShortest_px;
-  step_sign_ = walls_offset_ = end_line_ = 0;
-  offset_frames_ = 0;
-  walls_tell_ = lumen_ = true;
   in_noise_ = false;
   begin();
   // The shape does not fit best just where it was learnt.
   const NeedlePose followed = follow(field, noise);
-  started_ =
-      followed.ok && std::abs((followed.tip - glass->tip).dot(glass->axis) - shape_offset_) < kSameEnd_px;
+  started_ = followed.ok && end_.learn_outermost(*glass, followed.tip);
   if (started_) {
-    glass_ahead_ = (glass->tip - followed.tip).dot(glass->axis);
     last_ = *glass;
-    last_.tip -= glass_ahead_ * glass->axis;
+    put(glass->tip);
     begin();
     found_side_ = side;
     side_known_ = true;
@@ -254,204 +234,27 @@ bool InjectionPipette::begin_steep(const GradientField& field, double noise, con
   return started_;
 }
 
-// Where a cut can be told of it.
-std::optional<double> InjectionPipette::blur_of_end(const GradientField& field) const {
-  const auto blur =
-      last_.half_width < kLeastLumen_px ? std::nullopt : blur_of_shaft(field, last_, kStartReach_px);
-  return blur && *blur <= kMostBlur_px ? blur : std::nullopt;
-}
-
 bool InjectionPipette::look_again(double sigma_px, const Clear& clear_at, GatheredFrames& frames) {
   const GradientField& field = frames.at_rest(sigma_px);
   (void)fit_walls(field, frames.noise(), radius_px_, last_, kLongestWall_px);
-  started_ = !blur_of_end(field) || settle(field, frames.noise(), clear_at, &frames);
+  started_ = !blur_of_end(field, last_) || settle(field, frames.noise(), clear_at, &frames);
   looked_at_ = frames.count();
   return started_;
 }
 
-// In all frames together. It is put there; empty where they do not tell it, or may not be put together.
-std::optional<MovingEnd> InjectionPipette::go_to_moving_end(double blur_px, double sigma_px,
-                                                            GatheredFrames& frames) {
-  constexpr double kShaftOfEnd_px = 90;
-  const cv::Rect area = area_of(last_, kShaftOfEnd_px);
-  Vector<SeenEnds> seen;
-  for (int age = 0; age < frames.count(); ++age) {
-    if (const auto ends =
-            likely_ends(frames.one(age, area, sigma_px), frames.noise_of_one(), last_, blur_px)) {
-      seen.push_back({*ends, frames.way(age).dot(last_.axis), age});
-    }
-  }
-  if (seen.size() < kGathered) {
-    return std::nullopt;
-  }
-  const auto end = moving_end(seen, outer_radius_of_glass(last_.half_width, blur_px), frames.motion_known());
-  last_.tip -= (end ? end->behind : 0) * last_.axis;
-  return end;
-}
-
-// Its shape, cut and glass. motion_sd: of the end, px, where it is not certain how it moves. Whether the
-// outermost glass is known well enough for a faint needle to begin.
-bool InjectionPipette::learn_end_anew(const GradientField& field, double noise, double motion_sd) {
-  const NeedlePose before = last_;
-  const bool known = learn_end_by_glass(field, noise, motion_sd);
-  if (known && bevel_.radius > 0) {  // an oblique cut is no line across
-    return true;
-  }
-  const auto line = end_line(field, noise, before, -kStartReach_px, kStartReach_px, in_relief_);
-  if (!line) {
-    return known;
-  }
-  last_ = before;
-  last_.tip += line->ahead * last_.axis;
-  shape_.forget();
-  shape_.learn(field, last_);
-  shape_offset_ = 0;
-  shape_origin_ = last_.tip;
-  lumen_ = walls_tell_ = true;
-  walls_agree_ = followed_ = false;
-  ends_with(*line);
-  return true;
-}
-
-bool InjectionPipette::learn_end_by_glass(const GradientField& field, double noise, double motion_sd) {
-  step_sign_ = 0;
-  walls_offset_ = 0.15 * last_.half_width;
-  offset_frames_ = 0;
-  end_line_ = 0;
-  calibrate_walls(field, last_, noise);
-  const Point end_by_walls = last_.tip + walls_offset_ * last_.axis;
-  learn_shape_anew(field);
-  const auto shaft_blur = blur_of_shaft(field, last_, kStartReach_px);
-  walls_tell_ = !shaft_blur || *shaft_blur <= kWallsTell_px;
-  walls_agree_ = walls_tell_ && std::abs((end_by_walls - last_.tip).dot(last_.axis)) <= kSameEnd_px;
-  if (walls_agree_) {
-    last_.tip = end_by_walls;
-  }
-  glass_ahead_ = glass_scatter_ = glass_blur_ = 0;
-  glass_frames_ = 0;
-  followed_ = false;
-  lumen_ = last_.half_width >= kLeastLumen_px;
-  thin_end_.forget();
-  const auto known = [&](const CutGlass& cut) {
-    return cut.end.blur <= kMostBlur_px && math::hypot(sd_of(cut, last_.half_width), motion_sd) <=
-                                               (cut.end.blur > kSharp_px ? kUnsharpKnown_px : kStartKnown_px);
-  };
-  if (const auto cut = lumen_ ? go_to_cut(field, noise) : std::nullopt) {
-    bevel_ = cut->bevel;
-    learn_glass(cut->end);
-    return known(*cut);
-  }
-  bevel_ = {};
-  const auto end = end_of_glass(field, noise, last_, 0, kStartReach_px, kStartReach_px, in_relief_);
-  if (!end || end->sd > kEndKnown_px) {
-    return false;
-  }
-  if (lumen_) {
-    learn_glass(*end);
-  }
-  return known({*end, bevel_});
-}
-
-// The glass and its cut about the middle of its end, with the blur of the shaft, or in relief with a usual
-// one.
-std::optional<CutGlass> InjectionPipette::cut_seen(const GradientField& field, double noise,
-                                                   const NeedlePose& middle) {
-  const double blur = blur_of_shaft(field, middle, kStartReach_px).value_or(kUsualBlur_px);
-  return blur < kMostBlur_px ? cut_of_glass(field, noise, middle, blur, kStartReach_px, kStartReach_px)
-                             : std::nullopt;
-}
-
-// How the needle is cut, and how far ahead the glass ends. It is put where they are when that is far from the
-// end of the walls.
-std::optional<CutGlass> InjectionPipette::go_to_cut(const GradientField& field, double noise) {
-  NeedlePose needle = last_;
-  auto cut = cut_seen(field, noise, needle);
-  const auto middle_ahead = [&] {
-    return cut->end.ahead - ahead_of_middle(cut->bevel, needle, cut->end.blur);
-  };
-  bool further = false;
-  for (int round = 0; round < kFurther && cut &&
-                      std::abs(middle_ahead()) > (cut->end.sd > kEndKnown_px ? kNear_px : kFar_px);
-       ++round) {
-    needle.tip += middle_ahead() * needle.axis;
-    cut = cut_seen(field, noise, needle);
-    further = true;
-  }
-  if (cut && further) {
-    last_.tip = needle.tip;
-    learn_shape_anew(field);
-    walls_agree_ = false;
-    cut->end.ahead += (needle.tip - last_.tip).dot(last_.axis);
-  }
-  return cut;
-}
-
-// The end that is followed is one that looks the same in every frame; the tip is the outermost glass.
 NeedlePose InjectionPipette::find(const GradientField& field, double noise,
                                   const std::optional<Point>& moved) {
   velocity_ = moved.value_or(velocity_);
-  NeedlePose needle = told(follow(field, noise), noise);
+  NeedlePose needle = end_.told(follow(field, noise), noise);
   if (needle.ok && in_noise_ && noise >= kNoisy_grey) {
-    weigh_end(field, noise, needle);
+    end_.weigh(field, noise, needle);
   }
   return needle;
 }
 
-// In noise the shape errs by several px, where the likelihood of the glass with its cut, which is known, does
-// not.
-void InjectionPipette::weigh_end(const GradientField& field, double noise, NeedlePose& needle) const {
-  constexpr double kReach_px = 6;
-  NeedlePose middle = needle;
-  middle.tip -= ahead_of_middle(bevel_, needle, glass_blur_) * needle.axis;
-  if (const auto end = end_of_known_cut(field, noise, middle, bevel_, glass_blur_, kReach_px)) {
-    needle.tip += end->ahead * needle.axis;
-    needle.sd = std::max(needle.sd, math::hypot(end->sd, needle.constant_sd));
-  }
-}
+NeedlePose InjectionPipette::as_found(double noise) const { return end_.told(last_, noise); }
 
-NeedlePose InjectionPipette::as_found(double noise) const { return told(last_, noise); }
-
-bool InjectionPipette::ends_apart() const noexcept {
-  return bevel_.radius > 0 || std::abs(bevel_.tangent) > kSteep;
-}
-
-NeedlePose InjectionPipette::told(NeedlePose needle, double noise) const {
-  needle.tip += glass_ahead_ * needle.axis;
-  needle.point_aside =
-      ends_apart() ? std::copysign(radius_at_end(bevel_, last_, glass_blur_), -bevel_.tangent) : 0;
-  // Of a needle whose lumen is not seen only the walls tell the end at first, and its cut is not seen.
-  constexpr double kWalls_px = 0.5, kBeyondWalls_px = 0.8, kUnseenCut_px = 0.4,
-                   kLine_px = 0.1;  // of the end, where the line that it is stands
-  const bool by_walls = !lumen_ && glass_frames_ == 0;
-  needle.constant_sd = by_walls ? kBeyondWalls_px
-                       : lumen_ ? bevel_.sd * radius_at_end(bevel_, last_, glass_blur_)
-                                : kUnseenCut_px;
-  // It is learnt in focus. Out of it the end seems to lie further back; beyond the blurs that are tried, as
-  // far as its contrast lasts.
-  constexpr double kBeyondBlurs_px = 6;
-  const double unsharp = NeedleShape::beyond_blurs(view_) ? kBeyondBlurs_px : NeedleShape::blur_px(view_);
-  needle.sd = math::hypot(math::hypot(by_walls                        ? kWalls_px
-                                      : end_line_ != 0 && cut_sd_ > 0 ? math::hypot(cut_sd_, kLine_px)
-                                                                      : std::max(tip_sd(noise), cut_sd_),
-                                      needle.constant_sd),
-                          unsharp);
-  return needle;
-}
-
-// With nothing near it. Out of focus the lumen closes, and which of the shapes it is, is not certain.
-double InjectionPipette::tip_sd(double noise) const {
-  constexpr double kUsualFrames = 3;
-  const double usual = 0.1 + 0.04 * noise;  // px, before it is known: of walls of usual contrast
-  constexpr double kPerBlur = 0.8;
-  const double of_frame =
-      (kUsualFrames * usual * usual + glass_frames_ * glass_scatter_) / (kUsualFrames + glass_frames_);
-  constexpr double kUnsettled_px = 2;  // the shape fits best so far ahead of where it was learnt
-  const bool settled = walls_tell_ || glass_frames_ > 0 || !followed_;
-  const double unsharp = settled ? kPerBlur * std::max(0.0, glass_blur_ - kSharp_px) : kUnsettled_px;
-  return std::sqrt(of_frame * (1 + 1.0 / std::max(glass_frames_, 1)) + unsharp * unsharp);
-}
-
-void InjectionPipette::put(const Point& tip) { last_.tip = tip - glass_ahead_ * last_.axis; }
+void InjectionPipette::put(const Point& tip) { last_.tip = tip - end_.glass_ahead() * last_.axis; }
 
 bool InjectionPipette::go_on_at(const GradientField& field, double noise, const Point& tip) {
   constexpr double kAstray_px = 2.5;  // across the axis
@@ -461,9 +264,8 @@ bool InjectionPipette::go_on_at(const GradientField& field, double noise, const 
   }
   velocity_ = {};
   jumps_ = 0;
-  search_next_ = walls_agree_ = false;
-  backdrop_ = {};
-  view_ = {};
+  search_next_ = false;
+  end_.forget_surroundings();
   return true;
 }
 
@@ -532,13 +334,14 @@ NeedlePose InjectionPipette::follow(const GradientField& field, double noise) {
   const Point across(-last_.axis.y, last_.axis.x);
   needle.tip = last_.tip + velocity_;
   needle.tip += aside(field, noise, needle, (correlated - needle.tip).dot(across)) * across;
-  bool near = false;
-  if (!find_end(field, noise, needle, near)) {
+  const LearntEnd::Seen end = end_.find(field, noise, longest_, needle);
+  if (end == LearntEnd::Seen::no) {
     needle.reason = "end of the needle not seen";
     velocity_ = {};
     ++lost_;
     return needle;
   }
+  const bool near = end == LearntEnd::Seen::near;
   if (!near && narrow) {
     if (const auto anywhere = search(wide_x, wide_y)) {
       correlated = anywhere->at + Point(window.x, window.y) + tip_in_template_;
@@ -552,14 +355,11 @@ NeedlePose InjectionPipette::follow(const GradientField& field, double noise) {
     return needle;
   }
   jumps_ = 0;
-  if (!std::exchange(followed_, true) && !walls_tell_) {
-    glass_frames_ = 0;  // at the start the shape lay where it was learnt, not where it fits best
-  }
   needle.ok = true;
   velocity_ = lost_ == 0 ? needle.tip - last_.tip : Point();
   lost_ = 0;
   last_ = needle;
-  backdrop_.learn(field, needle);
+  end_.was_seen(field, needle);
   return needle;
 }
 
@@ -590,238 +390,41 @@ NeedlePose InjectionPipette::search_from_border(const GradientField& field, doub
   return needle;
 }
 
-// Where its learnt shape fits best: walls end at many a granule, a shape does not. Where the walls end there,
-// too, they tell the place more finely.
-bool InjectionPipette::find_end(const GradientField& field, double noise, NeedlePose& needle, bool& near) {
-  // Its width is known: other lines beside the walls are not them.
-  constexpr double kWidth_px = 1;
-  const auto fit_to_walls = [&] {
-    const NeedlePose before = needle;
-    const double straight = fit_walls(field, noise, radius_px_, needle, longest_);
-    if (end_line_ != 0 && straight < kStraightWalls) {  // with light along them they hardly show
-      needle = before;
-    } else if (std::abs(needle.half_width - last_.half_width) > kWidth_px) {
-      if (bevel_.radius > 0) {  // in relief their middle is then not the needle's either
-        needle = before;
-      }
-      needle.half_width = last_.half_width;
-      needle.taper = last_.taper;
-    }
-  };
-  fit_to_walls();
-  cut_sd_ = 0;
-  if (end_line_ != 0 ? go_to_known_line(field, noise, needle)
-                     : bevel_.radius > 0 && go_to_known_cut(field, noise, needle)) {
-    near = true;
-    shape_origin_ = needle.tip - shape_offset_ * needle.axis;
-    walls_agree_ = false;
-    return true;
-  }
-  needle.tip -= shape_offset_ * needle.axis;
-  // First near where the motion predicts it: what lies further ahead cannot be mistaken for it then.
-  std::optional<NeedleShape::End> end;
-  for (const double reach : {8, 18}) {
-    end = end ? end : shape_.end(field, backdrop_, needle, reach, reach, view_);
-  }
-  near = end.has_value();
-  if (!near) {
-    end = shape_.end(field, backdrop_, needle, 36, 44, view_);
-  }
-  if (!end || end->doubt > kDoubtMax_px) {
-    return false;
-  }
-  view_ = end->view;
-  needle.tip += end->ahead * needle.axis;
-  fit_to_walls();
-  if (const auto again = shape_.end_near(view_, field, backdrop_, needle, near ? kAgainNear_px : kAgain_px)) {
-    needle.tip += *again * needle.axis;
-  }
-  shape_origin_ = needle.tip;
-  needle.tip += shape_offset_ * needle.axis;
-
-  NeedlePose walls = needle;
-  walls.tip -= walls_offset_ * walls.axis;
-  const auto ahead = end_of_profile(field, walls, 16, 16, noise);
-  walls_agree_ = walls_tell_ && std::abs(bevel_.tangent) < kSteep && view_.blur == 0 && ahead &&
-                 std::abs(*ahead) <= kSameEnd_px;
-  if (walls_agree_) {
-    needle.tip += *ahead * needle.axis;
-  }
-  return true;
-}
-
-// In relief an oblique end tells its place better than its shape does. False where it is not near.
-bool InjectionPipette::go_to_known_cut(const GradientField& field, double noise, NeedlePose& needle) {
-  constexpr double kReach_px = 10, kEdge_px = 2.5;
-  NeedlePose middle = needle;
-  middle.tip += (glass_ahead_ - ahead_of_middle(bevel_, needle, glass_blur_)) * needle.axis;
-  const auto end = end_of_known_cut(field, noise, middle, bevel_, glass_blur_, kReach_px);
-  if (!end || end->sd > kDoubtMax_px || std::abs(end->ahead) > kReach_px - kEdge_px) {
-    return false;
-  }
-  needle.tip += end->ahead * needle.axis;
-  cut_sd_ = end->sd;
-  return true;
-}
-
-// With light along it the line across its end does. False where that is not near.
-bool InjectionPipette::go_to_known_line(const GradientField& field, double noise, NeedlePose& needle) {
-  constexpr double kReach_px = 5;
-  const auto line = end_line_again(field, noise, needle, end_line_, kReach_px);
-  if (!line) {
-    return false;
-  }
-  needle.tip += line->ahead * needle.axis;
-  cut_sd_ = line->sd;
-  view_ = {};  // in focus
-  return true;
-}
-
 // Where the line is seen that light along the needle makes of its end, at most so far ahead, that is its end
 // from then on.
 bool InjectionPipette::go_to_end_line(const GradientField& field, double noise, double most_ahead) {
-  const auto line = end_line(field, noise, last_, -kStartReach_px, most_ahead, in_relief_);
+  const auto line = end_line(field, noise, last_, -LearntEnd::kStartReach_px, most_ahead, end_.in_relief());
   if (!line) {
     return false;
   }
   last_.tip += line->ahead * last_.axis;
-  if (line->ahead > kStartReach_px) {
-    return learn_end_anew(field, noise, 0) && cut_template(field);
+  if (line->ahead > LearntEnd::kStartReach_px) {
+    return end_.learn_anew(field, noise, last_, 0) && cut_template(field);
   }
-  shape_offset_ += line->ahead;
-  walls_offset_ += line->ahead;
-  ends_with(*line);
+  end_.begin_line(*line);
   return true;
-}
-
-void InjectionPipette::ends_with(const EndLine& line) {
-  end_line_ = line.strength;
-  cut_sd_ = line.sd;
-  bevel_ = {};
-  glass_ahead_ = glass_scatter_ = 0;
-  glass_blur_ = kUsualBlur_px;
-  glass_frames_ = 1;
-}
-
-// The profile of the walls ends a little before the end face. How far, the steepest change of grey along the
-// walls tells, averaged over 30 frames.
-void InjectionPipette::calibrate_walls(const GradientField& field, const NeedlePose& walls, double noise) {
-  if (glass_frames_ > 0) {  // it counts from where the walls end
-    return;
-  }
-  const auto step = steepest_wall_step(field, walls, 3.5, 3 * field.noise_of_gradient(noise), step_sign_);
-  if (!step) {
-    return;
-  }
-  if (step_sign_ == 0) {
-    const double e = field.gradient(walls.at(-*step, 0.8 * walls.half_width)).dot(walls.axis) +
-                     field.gradient(walls.at(-*step, -0.8 * walls.half_width)).dot(walls.axis);
-    step_sign_ = e > 0 ? 1 : -1;
-  }
-  walls_offset_ += (*step - walls_offset_) / std::min(++offset_frames_, 30);
-}
-
-// The profile tells only roughly where the needle ends: its walls are thin there.
-void InjectionPipette::learn_shape_anew(const GradientField& field) {
-  for (int round = 0; round < 3; ++round) {
-    shape_.forget();
-    shape_.learn(field, last_);
-    last_.tip += shape_.face().value_or(0) * last_.axis;
-  }
-  shape_offset_ = 0;
-  shape_origin_ = last_.tip;
-}
-
-// Nothing else may touch the tip: a membrane that it pushes looks like a line of glass.
-void InjectionPipette::learn_glass(const GradientField& field, double noise, const NeedlePose& followed) {
-  constexpr int kFrames = 30;  // by then the noise of one frame has fallen to a fifth
-  if (!lumen_) {
-    learn_thin_end(field, noise, followed);
-    return;
-  }
-  if (glass_frames_ >= kFrames) {
-    return;
-  }
-  const bool steep = walls_tell_ && ends_apart();
-  const double behind = ahead_of_middle(bevel_, followed, glass_blur_);
-  NeedlePose middle = followed;  // of its end, as far as it is known
-  middle.tip += (glass_ahead_ - behind) * followed.axis;
-  std::optional<GlassEnd> end;
-  if (steep) {
-    end = end_of_known_cut(field, noise, middle, bevel_, glass_blur_, kGlassReach_px);
-  } else if (walls_tell_) {
-    end = end_of_glass(field, noise, middle, bevel_.tangent, kGlassReach_px, kGlassReach_px, in_relief_);
-  } else if (const auto cut = cut_seen(field, noise, middle)) {
-    end = cut->end;
-  }
-  if (end && end->sd < kEndKnown_px) {
-    end->ahead -= steep ? 0 : behind;  // a known cut tells the middle, the others the outermost glass
-    learn_glass(*end);
-  }
-}
-
-void InjectionPipette::learn_thin_end(const GradientField& field, double noise, const NeedlePose& followed) {
-  constexpr int kFrames = 96, kTogether = 8;
-  if (thin_end_.frames() >= kFrames || !thin_end_.add(field, followed, in_relief_) ||
-      thin_end_.frames() % kTogether != 0) {
-    return;
-  }
-  if (const auto end = thin_end_.end(noise)) {
-    glass_ahead_ = end->ahead;
-    glass_scatter_ = end->sd * end->sd;
-    glass_blur_ = end->blur;
-    glass_frames_ = thin_end_.frames();
-  }
-}
-
-void InjectionPipette::learn_glass(const GlassEnd& end) {
-  const double part = 1.0 / ++glass_frames_;
-  glass_ahead_ += part * end.ahead;
-  // With the deviation that its likelihood has.
-  const double squares = glass_frames_ > 1 ? end.ahead * (1 - part) * end.ahead : end.sd * end.sd;
-  glass_scatter_ += part * (squares - glass_scatter_);
-  glass_blur_ += part * (end.blur - glass_blur_);
 }
 
 void InjectionPipette::learn(const GradientField& field, const NeedlePose& needle, double noise,
                              double free_px) {
   const bool alone = free_px > kAlone_px;
-  // The shape of few frames is rough, and fits a little better when it is blurred.
-  constexpr double kRough_px = 0.8;
-  if (!needle.ok || template_.empty() || NeedleShape::blur_px(view_) > (walls_tell_ ? 0 : kRough_px)) {
+  if (!needle.ok || template_.empty() || !end_.is_sharp()) {
     return;
   }
   NeedlePose followed = needle;
-  followed.tip -= glass_ahead_ * needle.axis;
-  if (alone && in_relief_ && end_line_ == 0 && bevel_.radius == 0) {
+  followed.tip -= end_.glass_ahead() * needle.axis;
+  if (alone && end_.lacks_line()) {
     constexpr double kFarthest_px = 150;
     const bool far = looks_far_ > 0;  // where its walls run parallel they do not show
     looks_far_ -= far ? 1 : 0;
-    if (go_to_end_line(field, noise, far ? std::min(free_px - kAlone_px, kFarthest_px) : kStartReach_px)) {
+    if (go_to_end_line(field, noise,
+                       far ? std::min(free_px - kAlone_px, kFarthest_px) : LearntEnd::kStartReach_px)) {
       return;
     }
   }
-  if ((alone || !walls_tell_) && cut_sd_ == 0 && end_line_ == 0) {
-    learn_glass(field, noise, followed);
-  }
+  end_.learn(field, noise, followed, alone);
   if (!alone) {
     return;
-  }
-  NeedlePose origin = followed;
-  if (walls_agree_) {
-    origin.tip = followed.tip - walls_offset_ * needle.axis;
-    calibrate_walls(field, origin, noise);
-  }
-  // A needle that stands still shows the same specks beside it again and again.
-  constexpr double kMoved_px = 1;
-  if (cv::norm(followed.tip - learnt_at_) > kMoved_px) {
-    learnt_at_ = followed.tip;
-    origin.tip = shape_origin_;
-    shape_.learn(field, origin);
-    constexpr double kFaceRate_px = 0.2;  // per frame: the face moves by no more as the shape is averaged
-    shape_offset_ += end_line_ != 0 ? 0
-                                    : std::clamp(shape_.face().value_or(shape_offset_) - shape_offset_,
-                                                 -kFaceRate_px, kFaceRate_px);
   }
   cv::Mat here = kept_picture(template_.size(), CV_32F);
   cv::getRectSubPix(field.smooth, template_.size(),

@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::uint8_t kPositionMode = 8;
 constexpr ObjectId kMode{0x6060, 0};
-constexpr ObjectId kModeShown{0x6061, 0};
+constexpr ObjectId kShownMode{0x6061, 0};
 
 // Standing: within one count of where it was, which a resting encoder can flicker by, for so long. A drive
 // slower than that, 100 counts per second, is judged by the core, which knows its micrometres.
@@ -83,7 +83,7 @@ void Axis::take_sdo_answer(const CanFrame& frame) NONBLOCKING {
   }
   if (step_ == Step::to_position_mode && answer->object == kMode) {
     next(answer->is == SdoAnswer::Is::downloaded ? Step::confirm_position_mode : Step::dropped);
-  } else if (step_ == Step::confirm_position_mode && answer->object == kModeShown) {
+  } else if (step_ == Step::confirm_position_mode && answer->object == kShownMode) {
     const bool shown = answer->is == SdoAnswer::Is::uploaded && (answer->value & 0xFFU) == kPositionMode;
     to_home_ = to_home_ && !shown;
     next(shown ? Step::walk : Step::confirm_position_mode);  // not yet: ask again, within the time-out
@@ -230,7 +230,7 @@ CanFrame Axis::command() const NONBLOCKING {
 
 CanFrame Axis::request() const NONBLOCKING {
   return step_ == Step::to_position_mode ? sdo_download(params_.node, kMode, kPositionMode, 1)
-                                         : sdo_upload(params_.node, kModeShown);
+                                         : sdo_upload(params_.node, kShownMode);
 }
 
 std::int32_t Axis::following_error() const NONBLOCKING {

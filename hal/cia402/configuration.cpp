@@ -13,7 +13,7 @@ namespace {
 using Object = SdoClient::Object;
 using Unexpected = tl::unexpected<std::string>;
 
-constexpr std::int64_t kAnswersWithin_ns = 200'000'000;
+constexpr std::int64_t kSdoWithin_ns = 200'000'000;
 constexpr std::int64_t kPoll_ns = 200'000;
 
 constexpr std::uint32_t kPdoOff = 0x8000'0000;
@@ -73,7 +73,7 @@ std::string text_of(int node, const Object& object) {
 tl::expected<SdoAnswer, std::string> SdoClient::ask(int node, const Object& object, const CanFrame& request) {
   const auto lost = [&](const char* what) { return Unexpected(text_of(node, object) + ": " + what); };
   std::int64_t now = clock_.now_ns();
-  const std::int64_t until = now + kAnswersWithin_ns;
+  const std::int64_t until = now + kSdoWithin_ns;
   bool sent = false;
   while (now < until) {
     if (!sent) {

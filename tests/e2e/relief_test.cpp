@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 
+#include "tests/support/by_hand.hpp"
 #include "tests/support/programs.hpp"
 
 namespace punctum::e2e {
@@ -21,6 +22,9 @@ struct Relief {
 class ReliefRuns : public Programs, public testing::WithParamInterface<Relief> {};
 
 TEST_P(ReliefRuns, are_done_and_tell_where_the_membrane_is) {
+  if (by_hand::is_left_out()) {
+    GTEST_SKIP() << by_hand::kLeftOut;
+  }
   const auto& [scene, light_deg, seed, contour_px, tip_px, aperture] = GetParam();
   ASSERT_EQ(punctum({"run", scene, "--clock", "virtual", "--seed", std::to_string(seed), "--no-figure",
                      "--no-frames", "--set", "sim.camera.relief=on", "--set",
@@ -57,20 +61,25 @@ TEST_P(ReliefRuns, are_done_and_tell_where_the_membrane_is) {
 // in 47 its shadow. In 71 the puncture was told 0.3 s, in 14 contact 1.1 s before it happened: the tip was
 // told 1 and 2 px ahead. In 43 the needle, out of focus within the cell, was told 20 px too far back, and
 // nothing was injected.
+std::string name_of(const testing::TestParamInfo<Relief>& of) {
+  std::string scene = of.param.scene;
+  std::replace(scene.begin(), scene.end(), '-', '_');
+  return scene + "_" + std::to_string(of.param.seed) + (of.param.aperture < 0.37 ? "_narrow" : "");
+}
+INSTANTIATE_TEST_SUITE_P(Scenes, ReliefRuns,
+                         testing::Values(Relief{"icsi", 180, 361, 0.6, 0.15},
+                                         Relief{"icsi", 94, 242, 0.6, 0.35},
+                                         Relief{"outer-only", -26, 2, 1.2, 0.15},
+                                         Relief{"zebrafish", 178, 14, 0.6, 0.2},
+                                         Relief{"zebrafish", -109, 43, 0.6, 0.3}),
+                         name_of);
 INSTANTIATE_TEST_SUITE_P(
-    Scenes, ReliefRuns,
-    testing::Values(Relief{"icsi", 51, 3, 0.8, 0.15}, Relief{"icsi", 180, 361, 0.6, 0.15},
-                    Relief{"icsi", 170, 369, 0.6, 0.15}, Relief{"icsi", 153, 9, 0.6, 0.15},
-                    Relief{"icsi", -83, 221, 0.6, 0.35}, Relief{"icsi", 94, 242, 0.6, 0.35},
-                    Relief{"outer-only", -26, 2, 1.2, 0.15}, Relief{"zebrafish", -26, 2, 0.8, 0.3, 0.1},
-                    Relief{"zebrafish", -113, 71, 0.6, 0.3}, Relief{"zebrafish", 128, 4, 0.6, 0.2},
-                    Relief{"zebrafish", 178, 14, 0.6, 0.2}, Relief{"zebrafish", -161, 47, 1.4, 0.4},
-                    Relief{"zebrafish", -109, 43, 0.6, 0.3}),
-    [](const auto& of) {
-      std::string scene = of.param.scene;
-      std::replace(scene.begin(), scene.end(), '-', '_');
-      return scene + "_" + std::to_string(of.param.seed) + (of.param.aperture < 0.37 ? "_narrow" : "");
-    });
+    Further, ReliefRuns,
+    testing::Values(Relief{"icsi", 51, 3, 0.8, 0.15}, Relief{"icsi", 170, 369, 0.6, 0.15},
+                    Relief{"icsi", 153, 9, 0.6, 0.15}, Relief{"icsi", -83, 221, 0.6, 0.35},
+                    Relief{"zebrafish", -26, 2, 0.8, 0.3, 0.1}, Relief{"zebrafish", -113, 71, 0.6, 0.3},
+                    Relief{"zebrafish", 128, 4, 0.6, 0.2}, Relief{"zebrafish", -161, 47, 1.4, 0.4}),
+    name_of);
 
 // With the light along it, its walls are seen last 0.4 mm behind its end in the first frame. Once the cell
 // has shown that light comes from one side, the line across the end is looked for ahead of them.

@@ -51,6 +51,12 @@ TEST_P(ReliefRuns, are_done_and_tell_where_the_membrane_is) {
   EXPECT_LT(r["puncture_delay_ms"].get<double>(), 250);  // the picture comes 40 ms late, every 40 ms
 }
 
+std::string name_of(const testing::TestParamInfo<Relief>& of) {
+  std::string scene = of.param.scene;
+  std::replace(scene.begin(), scene.end(), '-', '_');
+  return scene + "_" + std::to_string(of.param.seed) + (of.param.aperture < 0.37 ? "_narrow" : "");
+}
+
 // In icsi 3 the outer membrane was once drawn to the ooplasm's edge by 7 um in contact, and told in a dimple
 // for nine frames after it had gone back. outer-only was lost every other frame: its one membrane is fainter
 // than what lies within. In icsi 9 the tip was once told 0.8 px too far ahead, and in 361, with the light
@@ -61,11 +67,6 @@ TEST_P(ReliefRuns, are_done_and_tell_where_the_membrane_is) {
 // in 47 its shadow. In 71 the puncture was told 0.3 s, in 14 contact 1.1 s before it happened: the tip was
 // told 1 and 2 px ahead. In 43 the needle, out of focus within the cell, was told 20 px too far back, and
 // nothing was injected.
-std::string name_of(const testing::TestParamInfo<Relief>& of) {
-  std::string scene = of.param.scene;
-  std::replace(scene.begin(), scene.end(), '-', '_');
-  return scene + "_" + std::to_string(of.param.seed) + (of.param.aperture < 0.37 ? "_narrow" : "");
-}
 INSTANTIATE_TEST_SUITE_P(Scenes, ReliefRuns,
                          testing::Values(Relief{"icsi", 180, 361, 0.6, 0.15},
                                          Relief{"icsi", 94, 242, 0.6, 0.35},

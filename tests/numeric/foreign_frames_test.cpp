@@ -264,13 +264,14 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
   }
 }
 
-// In 7 and 107 the inner membrane was once held in its dimple; 106, 108 and 109 were never tuned on. In 1 the
-// needle begins further away, and its tip was once 2 px off from the third frame on. In 134 the membrane that
-// gave way was once taken for one on the tip, 12 px off.
 std::string name_of_sequence(const testing::TestParamInfo<Sequence>& of) {
   return "seed_" + std::to_string(of.param.seed) + "_noise_" + std::to_string(of.param.noise) +
          (of.param.halo > 0 ? "_halo" : "") + (of.param.blur_px > 2 ? "_out_of_focus" : "");
 }
+
+// In 7 and 107 the inner membrane was once held in its dimple; 106, 108 and 109 were never tuned on. In 1 the
+// needle begins further away, and its tip was once 2 px off from the third frame on. In 134 the membrane that
+// gave way was once taken for one on the tip, 12 px off.
 INSTANTIATE_TEST_SUITE_P(Seeds, ForeignFrames,
                          testing::Values(Sequence{107, 5, 0.055, 0.35, 0.09},
                                          Sequence{108, 10, 0.108, 0.4, 0.128},
@@ -385,6 +386,13 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
   }
 }
 
+std::string name_of_film(const testing::TestParamInfo<Relief>& of) {
+  return (of.param.light == Light::hoffman ? "hoffman_"
+          : of.param.light == Light::dic   ? "dic_"
+                                           : "sheets_") +
+         std::to_string(of.param.seed);
+}
+
 // In 106 the needle's tip was once told 6 px too far back, in 2 of DIC 7 px; in 104 it was once seen inside
 // the cell long before it was there, and contact told five frames early. Of 106 the light comes along the
 // needle. Into the mouth of the holding pipette the membrane bulges unseen. In 103 and in the
@@ -397,12 +405,6 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
 // px too deep in two frames. In 106 the dimple was once blunt and on the needle's axis, in the sheets 10 it
 // was drawn to a tip that is seen 4 px too far ahead. In 158 the membrane once drew the tip back by 4 px. In
 // 112 the needle's taper is not seen.
-std::string name_of_film(const testing::TestParamInfo<Relief>& of) {
-  return (of.param.light == Light::hoffman ? "hoffman_"
-          : of.param.light == Light::dic   ? "dic_"
-                                           : "sheets_") +
-         std::to_string(of.param.seed);
-}
 INSTANTIATE_TEST_SUITE_P(Seeds, ReliefFrames,
                          testing::Values(Relief{101, Light::hoffman, 0.6, 0.35, 0.5},
                                          Relief{129, Light::hoffman, 0.8, 0.4, 0.6},

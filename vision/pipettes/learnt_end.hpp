@@ -62,7 +62,7 @@ class LearntEnd {
   [[nodiscard]] bool glass_is_known() const noexcept { return glass_frames_ > 0; }
   // Walls and what lies between them were told apart at the start.
   [[nodiscard]] bool shows_lumen() const noexcept { return lumen_; }
-  // In the last frame, as far as its shape can be learnt.
+  // It was in focus in the last frame, so that its shape may be learnt.
   [[nodiscard]] bool is_sharp() const;
   // Whether the light comes from one side, as the membranes tell.
   void in_relief(bool relief) noexcept { in_relief_ = relief; }

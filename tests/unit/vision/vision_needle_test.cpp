@@ -18,6 +18,8 @@
 #include "vision/pipettes/backdrop.hpp"
 #include "vision/pipettes/faint_wall.hpp"
 #include "vision/pipettes/injection_pipette.hpp"
+#include "vision/pipettes/needle_end.hpp"
+#include "vision/pipettes/thin_end.hpp"
 
 namespace cone {
 namespace {
@@ -526,6 +528,52 @@ TEST(WideNeedle, that_is_blunt_ends_where_light_from_one_side_shows_a_line_acros
       EXPECT_LT(std::abs(seen.tip.x - tube.tip), kDeviations * seen.sd) << light_deg << ' ' << frame;
       tube.tip -= 4 / 3.0;  // whole pixels of the drawing
     }
+  }
+}
+
+// Where its glass begins is a line across it, where the light comes along it: not the middle of its wall.
+TEST(WideNeedle, that_is_blunt_ends_where_its_glass_begins_in_relief) {
+  constexpr double kEnd_px = 0.3, kBlur_px = 0.6, kReach_px = 6;
+  constexpr unsigned kFrames = 6;
+  for (const double light_deg : {20.0, 45.0, 170.0}) {
+    const Tube tube{.tangent = 0, .light_deg = light_deg, .tip = 150 + 1 / 6.0, .widens = 0.03, .gain = 30};
+    NeedlePose pose;
+    pose.tip = {tube.tip + 1, kAxis_y};
+    pose.half_width = tube.radius + kBlur_px;
+    pose.taper = tube.widens;
+    double ahead = 0;
+    for (unsigned frame = 0; frame < kFrames; ++frame) {
+      const auto end = end_of_glass(lit(tube, 2300 + frame), kWideNoise, pose, 0, kReach_px, kReach_px, true);
+      ASSERT_TRUE(end) << light_deg;
+      ahead += end->ahead / kFrames;
+    }
+    EXPECT_NEAR(ahead, 1, kEnd_px) << light_deg;
+  }
+}
+
+// With light along it a line across its end shows, with light across it what its sides show begins there.
+TEST(ThinNeedle, ends_where_its_glass_does_wherever_light_comes_from) {
+  constexpr double kEnd_px = 0.45, kDeviations = 2.5, kRadius = 2.8, kBlur_px = 0.5;
+  constexpr unsigned kFrames = 16;
+  for (const double light_deg : {0.0, 75.0, 170.0}) {
+    const Tube tube{.tangent = 0,
+                    .light_deg = light_deg,
+                    .tip = 150 + 1 / 6.0,
+                    .radius = kRadius,
+                    .widens = 0.03,
+                    .gain = 20};
+    NeedlePose pose;
+    pose.tip = {tube.tip - 1, kAxis_y};
+    pose.half_width = kRadius + kBlur_px;
+    pose.taper = tube.widens;
+    ThinEnd thin;
+    for (unsigned frame = 0; frame < kFrames; ++frame) {
+      ASSERT_TRUE(thin.add(lit(tube, 2300 + frame), pose, true));
+    }
+    const auto end = thin.end(kWideNoise);
+    ASSERT_TRUE(end) << light_deg;
+    EXPECT_NEAR(end->ahead, -1, kEnd_px) << light_deg;
+    EXPECT_LT(std::abs(end->ahead + 1), kDeviations * end->sd) << light_deg;
   }
 }
 

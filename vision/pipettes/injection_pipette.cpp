@@ -8,10 +8,11 @@
 
 #include "hal/math/elementary.hpp"
 #include "vision/image/correlation.hpp"
+#include "vision/pipettes/glass.hpp"
 #include "vision/pipettes/moving_end.hpp"
-#include "vision/pipettes/needle_bevel.hpp"
 #include "vision/pipettes/needle_end.hpp"
 #include "vision/pipettes/needle_walls.hpp"
+#include "vision/pipettes/shaft_blur.hpp"
 #include "vision/pipettes/steep_glass.hpp"
 
 namespace punctum::vision {
@@ -397,11 +398,23 @@ bool InjectionPipette::go_to_end_line(const GradientField& field, double noise, 
   if (!line) {
     return false;
   }
-  last_.tip += line->ahead * last_.axis;
-  if (line->ahead > LearntEnd::kStartReach_px) {
-    return end_.learn_anew(field, noise, last_, 0) && cut_template(field);
+  NeedlePose needle = last_;
+  needle.tip += line->ahead * needle.axis;
+  if (line->ahead <= LearntEnd::kStartReach_px) {
+    last_ = needle;
+    end_.begin_line(*line);
+    return true;
   }
-  end_.begin_line(*line);
+  LearntEnd end = end_;
+  if (!end.learn_anew(field, noise, needle, 0)) {
+    return false;
+  }
+  const NeedlePose before = std::exchange(last_, needle);
+  if (!cut_template(field)) {
+    last_ = before;
+    return false;
+  }
+  end_ = std::move(end);
   return true;
 }
 

@@ -6,7 +6,9 @@
 #include <utility>
 
 #include "hal/math/elementary.hpp"
+#include "vision/pipettes/glass.hpp"
 #include "vision/pipettes/needle_walls.hpp"
+#include "vision/pipettes/shaft_blur.hpp"
 
 namespace punctum::vision {
 

@@ -11,10 +11,6 @@
 
 namespace punctum::vision {
 
-// The outer radius of glass whose steepest change of grey, spread by the blur, lies at half_width from the
-// axis.
-[[nodiscard]] double outer_radius_of_glass(double half_width, double blur);
-
 // By how much further back the glass ends, per px across the axis; near 0 where an end at right angles
 // explains the picture as well.
 struct Bevel {
@@ -22,12 +18,6 @@ struct Bevel {
   double sd = 0;
   double radius = 0;  // outer, of the glass there, px, where light from one side shows it; else 0
 };
-
-// How far a point spreads, px, by the shaft from `back` px behind the tip: it spreads as far along the needle
-// as across, and the shaft tells it from many more pixels than the end does. Empty where the shaft does not
-// look like two equal walls and a lumen, as in relief.
-[[nodiscard]] std::optional<double> blur_of_shaft(const GradientField& field, const NeedlePose& needle,
-                                                  double back);
 
 // The outermost glass, as certain as it would be if the cut were known, and the cut.
 struct CutGlass {

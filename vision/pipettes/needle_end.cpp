@@ -13,7 +13,7 @@
 #include "vision/image/dispatched.hpp"
 #include "vision/image/median.hpp"
 #include "vision/image/parabola.hpp"
-#include "vision/pipettes/needle_bevel.hpp"
+#include "vision/pipettes/glass.hpp"
 
 namespace punctum::vision {
 
@@ -186,9 +186,6 @@ constexpr double kFine_px = 0.25;  // between the ends that are compared
 constexpr int kFinePerRow = static_cast<int>(kStep_px / kFine_px);
 constexpr double kEndTo_px = 24;   // behind the end; further back the strength of the walls tells nothing
 constexpr double kEndFrom_px = 4;  // nearer, the walls may be weaker
-// Half the thickness of the glass over the radius of its middle: pulled glass keeps the ratio of inner to
-// outer diameter of its capillary, usually 0.7.
-constexpr double kHalfWall = 0.17;
 
 // What an end of that blur shows at the rows about it: walls behind it, a line across the lumen. Ends lie
 // finer than rows, so there are several phases of rows.
@@ -197,8 +194,8 @@ class EndRows {
   EndRows(double half_width, double blur_px, bool in_relief) : blur(blur_px) {
     constexpr double kTails = 5;  // blurs ahead of the end, where nothing of it is left
     // The steepest outer face of a thin wall is its middle and the blur.
-    const double middle = std::max(half_width - blur, 0.6 * half_width);
-    const double wall = kHalfWall * middle, lumen = middle - wall, spread = std::numbers::sqrt2 * blur;
+    const double middle = middle_radius_of_glass(half_width, blur);
+    const double wall = kHalfOfWall * middle, lumen = middle - wall, spread = std::numbers::sqrt2 * blur;
     const double behind = in_relief ? 0 : wall;  // a line of glass; in relief one where the glass begins
     for (std::size_t i = 0; i < kLanes; ++i) {
       const double u = place(i, half_width);

@@ -8,7 +8,7 @@
 
 #include "hal/math/elementary.hpp"
 #include "vision/image/blurred_step.hpp"
-#include "vision/pipettes/needle_bevel.hpp"
+#include "vision/pipettes/glass.hpp"
 
 namespace punctum::vision {
 

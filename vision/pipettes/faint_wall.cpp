@@ -189,6 +189,8 @@ std::optional<NeedlePose> with_outer_line(const GradientField& field, double noi
   constexpr int kOfWall_px = 3, kMedium_px = 8;  // from the outer face, inward and outward
   constexpr int kNear_px = 1, kFar_px = 5;       // beyond the face, where the line is looked for
   constexpr double kNoises = 6, kOfWalls = 0.08, kOneSided = 2, kOuter = 1.5;
+  constexpr int kParts = 4;  // of the stations; the furthest is out of focus
+  constexpr double kOfLine = 0.3;
   constexpr double kHalfOfLine_px = 1.8;
   const double outside = kMedium_px + 1;
   int stations = 0;
@@ -202,16 +204,17 @@ std::optional<NeedlePose> with_outer_line(const GradientField& field, double noi
   if (stations < kFewest) {
     return std::nullopt;
   }
-  // The median along the needle, at half-widths and px from its axis.
-  Vector<double> along(static_cast<std::size_t>(stations));
-  const auto grey_at = [&](double half_widths, double px) {
-    for (int i = 0; i < stations; ++i) {
+  // The median along the needle, of all stations or some, at half-widths and px from its axis.
+  Vector<double> along;
+  const auto grey_of = [&](int first, int end, double half_widths, double px) {
+    along.clear();
+    for (int i = first; i < end; ++i) {
       const double s = station(i);
-      along[static_cast<std::size_t>(i)] =
-          field.grey(needle.at(s, half_widths * needle.half_width_at(s) + px));
+      along.push_back(field.grey(needle.at(s, half_widths * needle.half_width_at(s) + px)));
     }
     return median_of(along);
   };
+  const auto grey_at = [&](double half_widths, double px) { return grey_of(0, stations, half_widths, px); };
   const double medium = 0.5 * (grey_at(-1, -kMedium_px) + grey_at(1, kMedium_px));
   double across = 0;  // grey levels over the medium
   for (double at = -0.9; at < 1; at += 0.2) {
@@ -249,6 +252,15 @@ std::optional<NeedlePose> with_outer_line(const GradientField& field, double noi
                         std::abs(other.line) > least && found.line * other.line < 0;
   if (!is_one && !are_both) {
     return std::nullopt;
+  }
+  // It shows all along the needle near its tip; granules beside that, or a membrane, in one place.
+  for (int part = 0; part < kParts - 1; ++part) {
+    const int first = part * stations / kParts, end = (part + 1) * stations / kParts, side = is_low ? -1 : 1;
+    const double line =
+        grey_of(first, end, side, side * found.at) - grey_of(first, end, side, side * kMedium_px);
+    if (line * found.line < kOfLine * found.line * found.line) {
+      return std::nullopt;
+    }
   }
   const double by_found = found.at + kHalfOfLine_px, by_other = are_both ? other.at + kHalfOfLine_px : 0,
                by_low = is_low ? by_found : by_other, by_high = is_low ? by_other : by_found;

@@ -30,6 +30,7 @@ class CutModel {
   [[nodiscard]] bool stands_out() const noexcept { return clear_; }
   // As light that comes from one side makes them.
   [[nodiscard]] bool walls_differ() const noexcept { return walls_differ_; }
+  [[nodiscard]] bool in_relief() const noexcept { return in_relief_; }
   // Log likelihood over no needle, twice.
   [[nodiscard]] double gain(const CutEnd& end) const { return likelier(sums(end)); }
   // The most that a needle and a speck before it explain, in line with the wall at that side.

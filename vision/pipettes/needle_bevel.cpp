@@ -19,6 +19,9 @@ constexpr double kSteepestCut = 0.95;
 // A needle that is ground sharp may be cut so, where that explains the picture better by so much of what the
 // walls do.
 constexpr double kSharpestCut = 2.8, kClearlySharp = 0.02, kClearlyCut = 0.025;
+// And where light does not come from one side, better than granules beside it make a cut look: log
+// likelihood, twice.
+constexpr double kThanGranules = 20;
 constexpr double kSteepestFrom = 0.1;  // of the steepest: it may be steeper still
 constexpr double kLens_px = 1.2;       // blur of a lens in focus
 constexpr double kLit = 0.02;  // the picture is explained better by so much where light comes from one side
@@ -166,7 +169,9 @@ struct CoarseEnds {
         usual(likeliest_end(model, back, ahead, std::array{-0.6, -0.3, 0.0, 0.3, 0.6})),
         sharp(likeliest_end(model, back, ahead, std::array{-2.4, -2.0, -1.6, -1.2, 1.2, 1.6, 2.0, 2.4})),
         gain(std::max(model.gain(usual), model.gain(sharp))),
-        is_sharp(gain > (1 + kClearlySharp) * model.gain(usual)) {}
+        is_sharp(gain > (1 + kClearlySharp) * model.gain(usual) &&
+                 (model.in_relief() ||
+                  gain - model.gain(usual) > kThanGranules * with_granules(model.misfit(gain)))) {}
   double back, ahead;
   CutEnd usual, sharp;
   double gain;

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""first_frames.py RENDERER OUT CELL FIRST LAST: first frames of injections by the renderer RENDERER (render.py of other people),
+"""first_frames.py RENDERER OUT CELL SEED...: first frames of injections by the renderer RENDERER (render.py of other people),
 one per seed, of one cell of the table: OUT/CELL/SEED.png and SEED.json. What is there already stays. Needs numpy and OpenCV."""
 import importlib.util
 import json
@@ -22,12 +22,12 @@ CELLS = {
 
 
 def main():
-    path, out, cell, first, last = *sys.argv[1:4], int(sys.argv[4]), int(sys.argv[5])
+    path, out, cell, seeds = *sys.argv[1:4], map(int, sys.argv[4:])
     spec = importlib.util.spec_from_file_location("renderer", path)
     renderer = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(renderer)
     os.makedirs(f"{out}/{cell}", exist_ok=True)
-    for seed in range(first, last + 1):
+    for seed in seeds:
         to = f"{out}/{cell}/{seed}"
         if os.path.exists(to + ".json"):
             continue

@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <span>
@@ -191,12 +192,12 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(DrawnCell{"noise_2", {.noise = 2}, {4, 4, 4, 4, 4}},
                     DrawnCell{"noise_5", {.noise = 5}, {4, 4, 4, 4, 4}},
                     DrawnCell{"noise_10", {.noise = 10}, {4, 4, 4, 4, 4}, 4, false, 637},
-                    DrawnCell{"noise_20", {.noise = 20}, {3, 4, 3, 4, 4}, 4, true, 20},
+                    DrawnCell{"noise_20", {.noise = 20}, {4, 4, 4, 4, 4}, 4, true, 20},
                     DrawnCell{"tilted_30", {}, {4, 4, 4, 4, 4}, 30},
                     DrawnCell{"tilted_45", {}, {4, 4, 4, 4, 4}, 45, false, 7},
                     DrawnCell{"on_shaft", {.on_shaft = 6}, {4, 4, 4, 4, 4}},
-                    DrawnCell{"crossed", {.gap_px = -1}, {3, 4, 4, 4, 3, 1}},
-                    DrawnCell{"impurities_60", {.impurities = 60}, {3, 4, 3, 4, 4}, 4, false, 37},
+                    DrawnCell{"crossed", {.gap_px = -1}, {4, 4, 4, 4, 4}},
+                    DrawnCell{"impurities_60", {.impurities = 60}, {4, 4, 4, 4, 4}, 4, false, 37},
                     DrawnCell{"out_of_focus", {.focus_px = 4}, {4, 4, 4, 4, 4}, 4, true},
                     DrawnCell{"relief", {.relief = true}, {3, 4, 3, 4, 4, 1}, 4, true, 5}),
     [](const auto& one) { return std::string(one.param.name); });
@@ -323,10 +324,11 @@ std::vector<Point> contour_of(const nlohmann::json& points) {
   return contour;
 }
 
-// first_frames.py names them.
+// first_frames.py names them. Some seeds have shown mistakes.
 struct RenderedCell {
   const char* name;
-  Bounds bounds;  // of four frames
+  Bounds bounds;  // of these frames
+  std::vector<unsigned> seeds{1, 2, 3, 4};
 };
 
 class RenderedStart : public testing::TestWithParam<RenderedCell> {
@@ -341,16 +343,24 @@ class RenderedStart : public testing::TestWithParam<RenderedCell> {
 TEST_P(RenderedStart, shows_everything_in_the_first_frame) {
   const std::string cell = GetParam().name;
   const Bounds bounds = GetParam().bounds;
+  std::vector<unsigned> chosen = GetParam().seeds;
   const Seeds s = seeds();
+  if (s.measured) {
+    chosen.resize(s.last + 1 - s.first);
+    std::iota(chosen.begin(), chosen.end(), s.first);
+  }
   const char* kept = std::getenv("PUNCTUM_START_FRAMES");
   const fs::path folder =
       kept != nullptr ? fs::path(kept)
                       : fs::path(testing::TempDir()) / ("first_" + cell + "_" + std::to_string(getpid()));
-  ASSERT_EQ(python({std::string(PUNCTUM_SOURCE_DIR) + "/tests/numeric/first_frames.py", renderer().string(),
-                    folder.string(), cell, std::to_string(s.first), std::to_string(s.last)}),
-            0);
+  std::vector<std::string> drawing{std::string(PUNCTUM_SOURCE_DIR) + "/tests/numeric/first_frames.py",
+                                   renderer().string(), folder.string(), cell};
+  for (const unsigned seed : chosen) {
+    drawing.push_back(std::to_string(seed));
+  }
+  ASSERT_EQ(python(drawing), 0);
   Gate gate("rendered_" + cell, cell == "noise_20" || cell == "blur");
-  for (unsigned seed = s.first; seed <= s.last; ++seed) {
+  for (const unsigned seed : chosen) {
     const fs::path stem = folder / cell / std::to_string(seed);
     const cv::Mat picture = cv::imread(stem.string() + ".png", cv::IMREAD_GRAYSCALE);
     ASSERT_FALSE(picture.empty()) << stem;
@@ -371,10 +381,11 @@ TEST_P(RenderedStart, shows_everything_in_the_first_frame) {
 
 INSTANTIATE_TEST_SUITE_P(
     Cells, RenderedStart,
-    testing::Values(RenderedCell{"noise_2", {3, 4, 3, 4, 4, 1}}, RenderedCell{"noise_5", {4, 4, 4, 4, 4}},
-                    RenderedCell{"noise_10", {4, 4, 4, 4, 4}}, RenderedCell{"noise_20", {3, 4, 3, 4, 4}},
-                    RenderedCell{"crossed", {2, 4, 2, 4, 4, 2}}, RenderedCell{"halo", {4, 4, 4, 4, 4}},
-                    RenderedCell{"impurities_60", {3, 4, 3, 4, 4, 1}}, RenderedCell{"blur", {4, 4, 4, 4, 4}}),
+    testing::Values(RenderedCell{"noise_2", {4, 4, 4, 4, 4}}, RenderedCell{"noise_5", {4, 4, 4, 4, 4}},
+                    RenderedCell{"noise_10", {4, 4, 4, 4, 4}}, RenderedCell{"noise_20", {4, 4, 4, 4, 4}},
+                    RenderedCell{"crossed", {5, 5, 5, 5, 5}, {1, 4, 812, 912, 1238}},
+                    RenderedCell{"halo", {4, 4, 4, 4, 4}}, RenderedCell{"impurities_60", {4, 4, 4, 4, 4}},
+                    RenderedCell{"blur", {4, 4, 4, 4, 4}}),
     [](const auto& one) { return std::string(one.param.name); });
 
 }  // namespace

@@ -31,6 +31,7 @@ constexpr double kSharp_px = 2.3, kWallsTell_px = 1.9;
 // for again there, so often.
 constexpr double kFar_px = 5, kNear_px = 2;
 constexpr int kFurther = 8;
+constexpr double kFarBehind_px = 30;
 constexpr double kSteep = 0.8;  // px along per px across: of a steeper cut the two walls end far apart
 constexpr double kUsualBlur_px = 1.5;
 
@@ -136,7 +137,8 @@ bool LearntEnd::learn_by_glass(const GradientField& field, double noise, NeedleP
     return known(*cut);
   }
   bevel_ = {};
-  const auto end = end_of_glass(field, noise, needle, 0, kStartReach_px, kStartReach_px, in_relief_);
+  // Granules ahead of it may go on in line with its walls: then it ends further back.
+  const auto end = end_of_glass(field, noise, needle, 0, kFarBehind_px, kStartReach_px, in_relief_);
   if (!end || end->sd > kEndKnown_px) {
     return false;
   }

@@ -481,11 +481,11 @@ const kFrame_ms = 33;
 let drawnAt = 0, nextAt = 0;
 const frame = () => {
   const now = performance.now();
-  if (drawnAt > 0) {
+  if (drawnAt > 0 && view?.isDrawn) {
     nextAt = drawnAt + Math.max(kFrame_ms, 4 * (now - drawnAt));
     drawnAt = 0;
   }
-  if (now >= nextAt && by('live').hidden && view?.render()) drawnAt = now;
+  if (drawnAt === 0 && now >= nextAt && by('live').hidden && view?.render()) drawnAt = now;
   requestAnimationFrame(frame);
 };
 requestAnimationFrame(frame);

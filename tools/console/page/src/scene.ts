@@ -53,6 +53,7 @@ export class SceneView {
   private seen?: Observation;
   private reconstructed?: CellSurface;
   private headsetOn?: Headset;
+  private fence: WebGLSync | null = null;  // behind what render() told last
 
   constructor(private canvas: HTMLCanvasElement, private labels: HTMLElement, private colours: Colours) {
     this.renderer = new THREE.WebGLRenderer({canvas, antialias: true, powerPreference: 'low-power'});
@@ -285,8 +286,24 @@ export class SceneView {
     return this.headsetOn;
   }
 
+  // Whether the graphics processor, or what stands in for it, is through with what render() told it: it may lie seconds behind.
+  get isDrawn(): boolean {
+    const gl = this.renderer.getContext() as WebGL2RenderingContext;
+    if (this.fence !== null && gl.getSyncParameter(this.fence, gl.SYNC_STATUS) === gl.UNSIGNALED) return false;
+    gl.deleteSync(this.fence);
+    this.fence = null;
+    return true;
+  }
   // False: nothing is new, or nothing of it is seen.
   render(): boolean {
+    if (!this.tell()) return false;
+    const gl = this.renderer.getContext() as WebGL2RenderingContext;
+    this.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+    return true;
+  }
+
+  private tell(): boolean {
     if (this.headsetOn?.isOn) return false;  // which draws by itself
     const width = this.canvas.clientWidth, height = this.canvas.clientHeight;
     const ratio = Math.min(devicePixelRatio, 2);

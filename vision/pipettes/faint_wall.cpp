@@ -189,8 +189,8 @@ std::optional<NeedlePose> with_outer_line(const GradientField& field, double noi
   constexpr int kOfWall_px = 3, kMedium_px = 8;  // from the outer face, inward and outward
   constexpr int kNear_px = 1, kFar_px = 5;       // beyond the face, where the line is looked for
   constexpr double kNoises = 6, kOfWalls = 0.08, kOneSided = 2, kOuter = 1.5;
-  constexpr int kParts = 4;  // of the stations; the furthest is out of focus
-  constexpr double kOfLine = 0.3;
+  constexpr int kParts = 4;        // of the stations; the furthest is out of focus
+  constexpr double kOfLine = 0.3;  // of its strength, in each part
   constexpr double kHalfOfLine_px = 1.8;
   const double outside = kMedium_px + 1;
   int stations = 0;

@@ -381,6 +381,8 @@ CutModel::Sums<4> CutModel::with_speck(const Sums<3>& of_needle, const Ends& end
   return of;
 }
 
+double CutModel::gain(const CutEnd& end) const { return likelier(sums(end)); }
+
 double CutModel::gain_with_speck(const CutEnd& end, double side) const {
   constexpr double kReach_px = 14, kOffLine_px = 1;
   const Ends ends = ends_at(end);

@@ -32,7 +32,7 @@ class CutModel {
   [[nodiscard]] bool walls_differ() const noexcept { return walls_differ_; }
   [[nodiscard]] bool in_relief() const noexcept { return in_relief_; }
   // Log likelihood over no needle, twice.
-  [[nodiscard]] double gain(const CutEnd& end) const { return likelier(sums(end)); }
+  [[nodiscard]] double gain(const CutEnd& end) const;
   // The most that a needle and a speck before it explain, in line with the wall at that side.
   [[nodiscard]] double gain_with_speck(const CutEnd& end, double side) const;
   // What specks and granules leave of the picture, over what the noise alone would, at least 1.

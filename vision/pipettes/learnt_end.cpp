@@ -64,6 +64,7 @@ std::optional<CutGlass> cut_seen(const GradientField& field, double noise, const
 bool LearntEnd::learn_anew(const GradientField& field, double noise, NeedlePose& needle, double motion_sd) {
   const NeedlePose before = needle;
   const bool known = learn_by_glass(field, noise, needle, motion_sd);
+  half_width_at_start_ = needle.half_width;
   if (known && bevel_.radius > 0) {
     return true;
   }
@@ -225,18 +226,20 @@ double LearntEnd::tip_sd(double noise) const {
 // too, they tell the place more finely.
 LearntEnd::Seen LearntEnd::find(const GradientField& field, double noise, double longest,
                                 NeedlePose& needle) {
-  // Its width is known: other lines beside the walls are not them.
-  constexpr double kWidth_px = 1;
+  // Its width is known: other lines beside the walls are not them. In relief each wall is two lines, and a fit
+  // to the inner one at some stations makes a needle narrower by less than that, frame by frame.
+  constexpr double kWidth_px = 1, kInRelief_px = 0.5;
   const double half_width = needle.half_width, taper = needle.taper;
   const auto fit_to_walls = [&] {
     const NeedlePose before = needle;
     const double straight = fit_walls(field, noise, radius_px_, needle, longest);
     if (end_line_ != 0 && straight < kStraightWalls) {  // with light along them they hardly show
       needle = before;
-    } else if (std::abs(needle.half_width - half_width) > kWidth_px) {
-      if (bevel_.radius > 0) {  // in relief their middle is then not the needle's either
+    } else if (bevel_.radius > 0) {
+      if (std::abs(needle.half_width - half_width_at_start_) > kInRelief_px) {  // nor is their middle its own
         needle = before;
       }
+    } else if (std::abs(needle.half_width - half_width) > kWidth_px) {
       needle.half_width = half_width;
       needle.taper = taper;
     }

@@ -108,6 +108,7 @@ class LearntEnd {
   bool walls_agree_ = false;  // with the shape, in the last frame
 
   Bevel bevel_;               // as it was found
+  double half_width_at_start_ = 0;
   double glass_ahead_ = 0;    // of the end that is followed: the outermost glass, px
   int glass_frames_ = 0;      // that it was learnt from
   double glass_scatter_ = 0;  // variance of where the end that is followed seems to be from it, px^2

@@ -197,6 +197,12 @@ NeedlePose LearntEnd::told(NeedlePose needle, double noise) const {
   needle.constant_sd = by_walls ? kBeyondWalls_px
                        : lumen_ ? bevel_.sd * radius_at_end(bevel_, needle, glass_blur_)
                                 : kUnseenCut_px;
+  // Light from one side shows slopes of glass: where the end lies beside what is seen of them differs from
+  // needle to needle by so much.
+  constexpr double kOfRelief_px = 0.6;
+  if (in_relief_) {
+    needle.constant_sd = math::hypot(needle.constant_sd, kOfRelief_px);
+  }
   // It is learnt in focus. Out of it the end seems to lie further back; beyond the blurs that are tried, as
   // far as its contrast lasts.
   constexpr double kBeyondBlurs_px = 6;
@@ -226,8 +232,8 @@ double LearntEnd::tip_sd(double noise) const {
 // too, they tell the place more finely.
 LearntEnd::Seen LearntEnd::find(const GradientField& field, double noise, double longest,
                                 NeedlePose& needle) {
-  // Its width is known: other lines beside the walls are not them. In relief each wall is two lines, and a fit
-  // to the inner one at some stations makes a needle narrower by less than that, frame by frame.
+  // Its width is known: other lines beside the walls are not them. In relief each wall is two lines, and a
+  // fit to the inner one at some stations makes a needle narrower by less than that, frame by frame.
   constexpr double kWidth_px = 1, kInRelief_px = 0.5;
   const double half_width = needle.half_width, taper = needle.taper;
   const auto fit_to_walls = [&] {

@@ -325,6 +325,7 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
   std::optional<Tracker> tracker;
   std::map<std::string, Score> outer, inner;
   std::map<std::string, std::vector<double>> tip_px;
+  int covered = 0, needles = 0;
   Events begun, told;
   for (int k = 0; k < static_cast<int>(truth.size()); ++k) {
     const cv::Mat picture = drawn(folder, k);
@@ -340,6 +341,8 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
     const Point tip(t["tip"][0].get<double>(), t["tip"][1].get<double>());
     if (seen.needle.ok) {
       tip_px[phase].push_back((seen.needle.tip - tip).dot(seen.needle.axis));
+      covered += std::abs(tip_px[phase].back()) < 1.96 * seen.needle.sd ? 1 : 0;
+      ++needles;
     }
     for (const char* event : {"contact", "puncture"}) {
       mark(begun, event, phase == event, k);
@@ -365,6 +368,8 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
   }
   expect_near_truth("tip", tip_px["approach"], GetParam().tip_px);
   expect_near_truth("tip in contact", tip_px["contact"], 1.25 * GetParam().tip_px);
+  std::printf("tip within 1.96 of its deviation in %d of %d\n", covered, needles);
+  EXPECT_GE(covered, 0.9 * needles);
   const int contact = late(begun["contact"], told["contact"]),
             puncture = late(begun["puncture"], told["puncture"]);
   std::printf("contact %+d frames late, puncture %+d\n", contact, puncture);
@@ -401,12 +406,14 @@ std::string name_of_film(const testing::TestParamInfo<Relief>& of) {
 // far ahead; in the sheets 4 it was once told ten frames late. In 112 the ooplasm was once taken for the
 // outer membrane, 16 px off, since its zona lies eccentrically; in 101 and 129 the tip was once told 2 and 8
 // px too far back, and so was contact, eleven frames late in 129: of four lines three were taken for the
-// needle, and its cut, hardly steeper than usual, for a right angle. In 103 the dimple's flank is somewhere 4
+// needle, and its cut, hardly steeper than usual, for a right angle. In 207 it was found right, and made
+// narrower frame by frame, until its tip was 3 px too far back. In 103 the dimple's flank is somewhere 4
 // px too deep in two frames. In 106 the dimple was once blunt and on the needle's axis, in the sheets 10 it
 // was drawn to a tip that is seen 4 px too far ahead. In 158 the membrane once drew the tip back by 4 px. In
 // 112 the needle's taper is not seen.
 INSTANTIATE_TEST_SUITE_P(Seeds, ReliefFrames,
                          testing::Values(Relief{101, Light::hoffman, 0.6, 0.35, 0.5},
+                                         Relief{207, Light::hoffman, 0.6, 0.4, 0.5},
                                          Relief{129, Light::hoffman, 0.8, 0.4, 0.6},
                                          Relief{2, Light::dic, 0.7, 0.45, 0.35},
                                          Relief{104, Light::sheets, 0.35, 0.4, 1.3}),

@@ -369,7 +369,7 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
   expect_near_truth("tip", tip_px["approach"], GetParam().tip_px);
   expect_near_truth("tip in contact", tip_px["contact"], 1.25 * GetParam().tip_px);
   std::printf("tip within 1.96 of its deviation in %d of %d\n", covered, needles);
-  EXPECT_GE(covered, 0.9 * needles);
+  EXPECT_GE(covered, 0.8 * needles);
   const int contact = late(begun["contact"], told["contact"]),
             puncture = late(begun["puncture"], told["puncture"]);
   std::printf("contact %+d frames late, puncture %+d\n", contact, puncture);

@@ -7,6 +7,7 @@
 
 #include "vision/pipettes/border_section.hpp"
 #include "vision/pipettes/end_line.hpp"
+#include "vision/pipettes/face_lines.hpp"
 #include "vision/pipettes/faint_wall.hpp"
 #include "vision/pipettes/needle_walls.hpp"
 #include "vision/pipettes/wide_tube.hpp"
@@ -244,6 +245,10 @@ double NeedleSearch::lie_between_walls(const GradientField& field, double noise,
       straight = std::max(straight, s);
       put_at_end_of_walls(field, noise, back, 10, needle);
     }
+  }
+  if (const auto along = along_face_lines(field, noise, needle)) {
+    needle = *along;
+    put_at_end_of_walls(field, noise, back, 10, needle);
   }
   go_to_end_of_fading_walls(field, noise, needle);
   return straight;

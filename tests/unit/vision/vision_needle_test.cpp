@@ -16,6 +16,7 @@
 #include "vision/image/gradient.hpp"
 #include "vision/membrane/membrane_on_needle.hpp"
 #include "vision/pipettes/backdrop.hpp"
+#include "vision/pipettes/face_lines.hpp"
 #include "vision/pipettes/faint_wall.hpp"
 #include "vision/pipettes/injection_pipette.hpp"
 #include "vision/pipettes/needle_end.hpp"
@@ -529,6 +530,39 @@ TEST(WideNeedle, that_is_blunt_ends_where_light_from_one_side_shows_a_line_acros
       tube.tip -= 4 / 3.0;  // whole pixels of the drawing
     }
   }
+}
+
+// Edges that are looked for one by one may be those of the outer line of a wall near the tip and of the inner
+// one further back.
+TEST(WideNeedle, that_is_told_turned_lies_along_the_lines_of_its_faces) {
+  constexpr double kFace_px = 1.8, kTurned = 0.003, kAcross_px = 0.4, kWidens = 0.004;
+  for (const double light_deg : {50.0, 90.0, 250.0}) {
+    const Tube tube{.tangent = 1.4, .light_deg = light_deg, .widens = 0.016};
+    const GradientField field = lit(tube);
+    NeedlePose right;
+    right.tip = {tube.tip, kAxis_y};
+    right.half_width = tube.radius + kFace_px;
+    right.taper = tube.widens;
+    EXPECT_FALSE(along_face_lines(field, kWideNoise, right)) << light_deg;
+    for (const double side : {-1.0, 1.0}) {
+      NeedlePose turned = right;
+      turned.axis = Point(-1, side * tube.widens) / std::hypot(1, tube.widens);
+      turned.half_width += 0.5;
+      turned.taper = 0;
+      const auto found = along_face_lines(field, kWideNoise, turned);
+      ASSERT_TRUE(found) << light_deg << ' ' << side;
+      EXPECT_NEAR(found->axis.y, 0, kTurned) << light_deg << ' ' << side;
+      EXPECT_NEAR(found->tip.y, kAxis_y, kAcross_px) << light_deg << ' ' << side;
+      EXPECT_NEAR(found->half_width, right.half_width, kAcross_px) << light_deg << ' ' << side;
+      EXPECT_NEAR(found->taper, tube.widens, kWidens) << light_deg << ' ' << side;
+    }
+  }
+  // In bright field both faces are dark.
+  NeedlePose turned;
+  turned.tip = {150.3, kAxis_y};
+  turned.axis = Point(-1, 0.02) / std::hypot(1, 0.02);
+  turned.half_width = kWideRadius + kFace_px;
+  EXPECT_FALSE(along_face_lines(draw(Wide{}), kWideNoise, turned));
 }
 
 // Where its glass begins is a line across it, where the light comes along it: not the middle of its wall.

@@ -422,8 +422,9 @@ INSTANTIATE_TEST_SUITE_P(
     Further, ReliefFrames,
     testing::Values(Relief{106, Light::hoffman, 0.55, 0.45, 2, 0, 3, 5},
                     Relief{103, Light::hoffman, 0.6, 0.4, 0.6, 2}, Relief{112, Light::hoffman, 0.6, 0.4, 0.9},
-                    Relief{158, Light::hoffman, 0.6, 0.4, 0.6}, Relief{104, Light::hoffman, 0.6, 0.4, 1.9},
-                    Relief{4, Light::sheets, 0.35, 0.4, 2}, Relief{10, Light::sheets, 0.4, 0.5, 2.1, 3}),
+                    Relief{158, Light::hoffman, 0.6, 0.4, 0.6}, Relief{131, Light::hoffman, 0.6, 0.4, 1.1},
+                    Relief{104, Light::hoffman, 0.6, 0.4, 1.9}, Relief{4, Light::sheets, 0.35, 0.4, 2},
+                    Relief{10, Light::sheets, 0.4, 0.5, 2.1, 3}),
     name_of_film);
 
 }  // namespace

@@ -65,7 +65,6 @@ bool LearntEnd::learn_anew(const GradientField& field, double noise, NeedlePose&
   const NeedlePose before = needle;
   const bool known = learn_by_glass(field, noise, needle, motion_sd);
   half_width_at_start_ = needle.half_width;
-  taper_at_start_ = needle.taper;
   if (known && bevel_.radius > 0) {
     return true;
   }
@@ -235,7 +234,7 @@ LearntEnd::Seen LearntEnd::find(const GradientField& field, double noise, double
                                 NeedlePose& needle) {
   // Its width is known: other lines beside the walls are not them. In relief each wall is two lines, and a
   // fit to the inner one at some stations makes a needle narrower by less than that, frame by frame.
-  constexpr double kWidth_px = 1, kInRelief_px = 0.5, kTaper = 0.008;
+  constexpr double kWidth_px = 1, kInRelief_px = 0.5;
   const double half_width = needle.half_width, taper = needle.taper;
   const auto fit_to_walls = [&] {
     const NeedlePose before = needle;
@@ -243,8 +242,7 @@ LearntEnd::Seen LearntEnd::find(const GradientField& field, double noise, double
     if (end_line_ != 0 && straight < kStraightWalls) {  // with light along them they hardly show
       needle = before;
     } else if (bevel_.radius > 0) {
-      if (std::abs(needle.half_width - half_width_at_start_) > kInRelief_px ||
-          std::abs(needle.taper - taper_at_start_) > kTaper) {  // nor is their middle its own
+      if (std::abs(needle.half_width - half_width_at_start_) > kInRelief_px) {  // nor is their middle its own
         needle = before;
       }
     } else if (std::abs(needle.half_width - half_width) > kWidth_px) {

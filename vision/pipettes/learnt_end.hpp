@@ -107,15 +107,15 @@ class LearntEnd {
   bool walls_tell_ = true;    // where it ends, more finely than the shape does: in focus
   bool walls_agree_ = false;  // with the shape, in the last frame
 
-  Bevel bevel_;                                          // as it was found
-  double half_width_at_start_ = 0, taper_at_start_ = 0;  // of the needle, px and px per px
-  double glass_ahead_ = 0;    // of the end that is followed: the outermost glass, px
-  int glass_frames_ = 0;      // that it was learnt from
-  double glass_scatter_ = 0;  // variance of where the end that is followed seems to be from it, px^2
-  double glass_blur_ = 0;     // px
-  ThinEnd thin_end_;          // tells the same of a needle whose lumen is not seen
-  double end_line_ = 0;       // that tells the end with light along the needle, grey levels; 0: none does
-  double cut_sd_ = 0;         // of the end in the last frame, where its cut or a line told it, px
+  Bevel bevel_;                     // as it was found
+  double half_width_at_start_ = 0;  // px
+  double glass_ahead_ = 0;          // of the end that is followed: the outermost glass, px
+  int glass_frames_ = 0;            // that it was learnt from
+  double glass_scatter_ = 0;        // variance of where the end that is followed seems to be from it, px^2
+  double glass_blur_ = 0;           // px
+  ThinEnd thin_end_;                // tells the same of a needle whose lumen is not seen
+  double end_line_ = 0;  // that tells the end with light along the needle, grey levels; 0: none does
+  double cut_sd_ = 0;    // of the end in the last frame, where its cut or a line told it, px
 };
 
 }  // namespace punctum::vision

@@ -98,11 +98,12 @@ bool parallel_in_relief(const SecondEdge& edge, const Vector<double>& r, double 
 }
 
 // Inside the wall of an outer membrane in relief, the edge at which what the light crosses grows again. Of a
-// thin sheet the wall's inner face has an edge of that sign, too: a clear one further in counts.
+// thin sheet the wall's inner face has an edge of that sign, too: a clear one further in counts. One
+// that stands out less of what else is in there is as clear as the wall, and equally far from it all round.
 std::optional<FollowedMembrane> ooplasm_in_relief(const FollowedMembrane& outer,
                                                   const ClearedPicture& picture, const VisionConfig& config) {
   constexpr double kWalls = 1.3, kDeepest = 0.3;  // wall thicknesses; of the radius
-  constexpr double kSheet_px = 4, kAsClear = 0.7;
+  constexpr double kSheet_px = 4, kAsClear = 0.7, kEven = 1.4;
   const double from = -kDeepest * median_of(outer.r), to = -kWalls * config.px(config.h_m);
   SecondEdge inside = find_in_relief(outer.r, outer.centre, outer.relief, from, to, picture);
   if (SecondEdge deep = find_in_relief(outer.r, outer.centre, outer.relief, from, to - kSheet_px, picture);
@@ -110,7 +111,9 @@ std::optional<FollowedMembrane> ooplasm_in_relief(const FollowedMembrane& outer,
       deep.path.level > kAsClear * inside.path.level) {
     inside = std::move(deep);
   }
-  return clear_in_relief(inside, outer, picture)
+  const bool even = inside.quality >= kEven &&
+                    parallel_in_relief(inside, outer.r, kFaceApart_px, kAsClear * outer.level, picture);
+  return even || clear_in_relief(inside, outer, picture)
              ? std::optional(
                    started(outer.centre, inside.path.r, Polarity::relief, inside.path.level, inside.relief))
              : std::nullopt;

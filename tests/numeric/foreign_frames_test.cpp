@@ -408,10 +408,11 @@ std::string name_of_film(const testing::TestParamInfo<Relief>& of) {
 // frames late. In 112 the ooplasm was once taken for the outer membrane, 16 px off, since its zona lies
 // eccentrically; in 101 and 129 the tip was once told 2 and 8 px too far back, and so was contact, eleven
 // frames late in 129: of four lines three were taken for the needle, and its cut, hardly steeper than usual,
-// for a right angle. In 207 it was found turned by a degree, and made narrower frame by frame, until its tip
-// was 3 px too far back. In 103 the dimple's flank is somewhere 4 px too deep in two frames. In 106 the
-// dimple was once blunt and on the needle's axis, in the sheets 10 it was drawn to a tip that is seen 4 px
-// too far ahead. In 158 the membrane once drew the tip back by 4 px. In 112 the needle's taper is not seen.
+// for a right angle. In 207 it was found turned by a degree, in 131 it is by half of one; both were made
+// narrower frame by frame, in 207 until the tip was 3 px too far back. In 103 the dimple's flank is somewhere
+// 4 px too deep in two frames. In 106 the dimple was once blunt and on the needle's axis, in the sheets 10 it
+// was drawn to a tip that is seen 4 px too far ahead. In 158 the membrane once drew the tip back by 4 px. In
+// 112 the needle's taper is not seen.
 INSTANTIATE_TEST_SUITE_P(Seeds, ReliefFrames,
                          testing::Values(Relief{101, Light::hoffman, 0.6, 0.35, 0.5},
                                          Relief{207, Light::hoffman, 0.6, 0.4, 0.25},

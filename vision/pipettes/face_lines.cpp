@@ -105,7 +105,7 @@ std::optional<NeedlePose> along_face_lines(const GradientField& field, double no
                                            const NeedlePose& needle) {
   constexpr std::size_t kFewest = 20;  // stations
   constexpr double kNoises = 4;
-  constexpr double kWidens = 0.005, kNarrower_px = 1;
+  constexpr double kWidens = 0.005, kAsWide_px = 1;
   const Slopes low_slopes = slopes_beside(field, needle, -1), high_slopes = slopes_beside(field, needle, 1);
   if (std::min(low_slopes.size(), high_slopes.size()) < kFewest) {
     return std::nullopt;
@@ -129,7 +129,7 @@ std::optional<NeedlePose> along_face_lines(const GradientField& field, double no
   found.half_width += 0.5 * (at_tip(*high) + at_tip(*low));
   found.taper += 0.5 * (turn(*high) + turn(*low));
   const bool was_turned =
-      found.taper > needle.taper + kWidens && std::abs(found.half_width - needle.half_width) < kNarrower_px;
+      found.taper > needle.taper + kWidens && std::abs(found.half_width - needle.half_width) < kAsWide_px;
   return was_turned ? std::optional(found) : std::nullopt;
 }
 

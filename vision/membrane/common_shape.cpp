@@ -134,6 +134,24 @@ PUNCTUM_WIDE_LOOP void add_moved(const MovedLanes& of, const Lanes* row, int sam
   }
 }
 
+// The same in relief: of what goes beyond `turning` times how far each lane is turned to the light.
+PUNCTUM_WIDE_LOOP void add_moved_in_relief(const MovedLanes& of, const Lanes& lit, const double* turning,
+                                           const Lanes* row, int samples, const Lanes* low, const Lanes* high,
+                                           Lanes* sum, Lanes* by_lit) {
+  const MovedLanes m = of;
+  const Lanes turned = lit;
+  const double last = samples - 1.001;
+  for (int j = 0; j < samples; ++j) {
+    const int at = std::clamp(j + m.whole, 0, samples - 2);
+    const float part = j + m.by <= 0 ? 0 : j + m.by >= last ? 1 : m.u;
+    const Lanes x = m.scale * (row[at] + part * (row[at + 1] - row[at]));
+    const Lanes more = turned * static_cast<float>(turning[j]), rest = x - more;
+    const Lanes kept = m.use * (more + (rest < low[j] ? low[j] : rest > high[j] ? high[j] : rest));
+    sum[j] += kept;
+    by_lit[j] += turned * kept;
+  }
+}
+
 }  // namespace
 
 Vector<double> stiffness_of(double modes, const Vector<double>& soft) {
@@ -246,51 +264,60 @@ bool CommonShape::find_from(int rounds) {
   return median_in_place(values_) > kLeastLikeness;
 }
 
-// Of every second profile as it is.
+bool CommonShape::tells_shape(std::size_t i) const {
+  return profiles_.whole(i) && soft_[i] < 0.5 && (!beside_glass_ || beside_.empty() || beside_[i] == 0);
+}
+
+Vector<std::size_t> CommonShape::every_second() const {
+  Vector<std::size_t> points;
+  for (std::size_t i = 0; i < profiles_.points; i += 2) {
+    if (tells_shape(i)) {
+      points.push_back(i);
+    }
+  }
+  return points;
+}
+
+// Of the profiles as they are.
 void CommonShape::average_first() {
+  const Vector<std::size_t> points = every_second();
   shape_.resize(profiles_.samples);
   for (std::size_t j = 0; j < profiles_.samples; ++j) {
     values_.clear();
-    for (std::size_t i = 0; i < profiles_.points; i += 2) {
-      if (tells_shape(i)) {
-        const Lanes& grey = profiles_.grey_of(i / kSideBySide)[j];
-        values_.push_back(static_cast<double>(grey[static_cast<int>(i % kSideBySide)]));
-      }
+    for (const std::size_t i : points) {
+      values_.push_back(profiles_.grey_at(i, j));
     }
     shape_[j] = middle_mean(values_);
   }
 }
 
-bool CommonShape::tells_shape(std::size_t i) const {
-  return profiles_.whole(i) && soft_[i] < 0.5 && (!beside_glass_ || beside_.empty() || beside_[i] == 0);
-}
-
 // Least squares per sample, twice: what is far off the first line counts as if it lay nearer.
 void CommonShape::average_first_in_relief() {
+  constexpr int kAgain = 2;
+  const Vector<std::size_t> points = every_second();
   shape_.assign(profiles_.samples, 0.0);
-  Vector<double> off(profiles_.points);
+  Vector<double> lit, grey(points.size()), off(points.size());
+  for (const std::size_t i : points) {
+    lit.push_back(lit_[i]);
+  }
   for (std::size_t j = 0; j < profiles_.samples; ++j) {
-    double scale = 0;
-    for (int round = 0; round < 3; ++round) {
-      FittedLine line;
-      values_.clear();
-      for (std::size_t i = 0; i < profiles_.points; ++i) {
-        if (tells_shape(i)) {
-          const auto grey =
-              static_cast<double>(profiles_.grey_of(i / kSideBySide)[j][static_cast<int>(i % kSideBySide)]);
-          const double w = round > 0 && off[i] > kClip * scale ? kClip * scale / off[i] : 1;
-          line.add(w, lit_[i], grey);
-        }
+    FittedLine line;
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      grey[k] = profiles_.grey_at(points[k], j);
+      line.add(1, lit[k], grey[k]);
+    }
+    line.solve(shape_[j], turning_[j]);
+    for (int again = 0; again < kAgain; ++again) {
+      for (std::size_t k = 0; k < points.size(); ++k) {
+        off[k] = std::abs(grey[k] - shape_[j] - lit[k] * turning_[j]);
+      }
+      values_ = off;
+      const double most = kClip * std::max(kSdOfMedian * median_in_place(values_), 1e-3);
+      line = {};
+      for (std::size_t k = 0; k < points.size(); ++k) {
+        line.add(off[k] > most ? most / off[k] : 1, lit[k], grey[k]);
       }
       line.solve(shape_[j], turning_[j]);
-      for (std::size_t i = 0; i < profiles_.points; ++i) {
-        if (tells_shape(i)) {
-          const auto grey =
-              static_cast<double>(profiles_.grey_of(i / kSideBySide)[j][static_cast<int>(i % kSideBySide)]);
-          values_.push_back(off[i] = std::abs(grey - shape_[j] - lit_[i] * turning_[j]));
-        }
-      }
-      scale = std::max(kSdOfMedian * median_in_place(values_), 1e-3);
     }
   }
 }
@@ -323,23 +350,14 @@ void CommonShape::average() {
       turned[lane] = static_cast<float>(lit_[i]);
       line.add(static_cast<double>(use[lane]), lit_[i], 0);
     }
-    const double by = place_of_group(g) / EdgeProfiles::kStep_px, last = m - 1.001;
+    const double by = place_of_group(g) / EdgeProfiles::kStep_px;
     const int whole = static_cast<int>(std::floor(by));
-    const float u = static_cast<float>(by - whole);
-    const Lanes* row = profiles_.grey_of(g);
+    const MovedLanes moved{whole, static_cast<float>(by - whole), by, scale, use};
     if (by_lit.empty()) {
-      add_moved({whole, u, by, scale, use}, row, m, low.data(), high.data(), sum.data());
-      continue;
-    }
-    for (int j = 0; j < m; ++j) {
-      const int low_sample = std::clamp(j + whole, 0, m - 2);
-      const float part = j + by <= 0 ? 0 : j + by >= last ? 1 : u;
-      const Lanes x = scale * (row[low_sample] + part * (row[low_sample + 1] - row[low_sample]));
-      const auto k = static_cast<std::size_t>(j);
-      const Lanes more = turned * static_cast<float>(turning_[k]), rest = x - more;
-      const Lanes kept = use * (more + (rest < low[k] ? low[k] : rest > high[k] ? high[k] : rest));
-      sum[k] += kept;
-      by_lit[k] += turned * kept;
+      add_moved(moved, profiles_.grey_of(g), m, low.data(), high.data(), sum.data());
+    } else {
+      add_moved_in_relief(moved, turned, turning_.data(), profiles_.grey_of(g), m, low.data(), high.data(),
+                          sum.data(), by_lit.data());
     }
   }
   for (std::size_t j = 0; j < profiles_.samples; ++j) {

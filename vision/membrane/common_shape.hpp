@@ -43,9 +43,10 @@ class CommonShape {
  private:
   [[nodiscard]] bool find_from(int rounds);
   void learn(EdgeLearnt& learnt);
+  [[nodiscard]] bool tells_shape(std::size_t i) const;
+  [[nodiscard]] Vector<std::size_t> every_second() const;  // of the points that tell the shape
   void average_first();
   void average_first_in_relief();
-  [[nodiscard]] bool tells_shape(std::size_t i) const;
   void average();
   void pad(const Vector<double>& shape, Vector<float>& padded, Vector<float>& slope) const;
   void trust_samples();

@@ -30,6 +30,9 @@ struct EdgeProfiles {
 
   [[nodiscard]] bool whole(std::size_t i) const { return seen_of[i] == static_cast<int>(samples); }
   [[nodiscard]] const Lanes* grey_of(std::size_t group) const { return grey.data() + group * samples; }
+  [[nodiscard]] double grey_at(std::size_t point, std::size_t sample) const {
+    return static_cast<double>(grey_of(point / kSideBySide)[sample][static_cast<int>(point % kSideBySide)]);
+  }
   [[nodiscard]] const Lanes* seen_in(std::size_t group) const { return seen.data() + group * samples; }
   [[nodiscard]] double place_of(std::size_t sample) const {  // px from the contour
     return static_cast<double>(sample) * kStep_px - inside;

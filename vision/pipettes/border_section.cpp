@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "hal/math/elementary.hpp"
+#include "vision/image/dispatched.hpp"
 
 namespace punctum::vision {
 
@@ -68,7 +69,12 @@ Vector<Vector<float>> lines_of(const GradientField& field, const BorderAxes& axe
   return out;
 }
 
-// Short loops, which the compiler vectorises.
+PUNCTUM_WIDE_LOOP void add_between(const float* line, int n, float here, float after, float* sum) {
+  for (int y = 0; y < n; ++y) {
+    sum[y] += here * line[y] + after * line[y + 1];
+  }
+}
+
 TiltedProfile profile_at(const Vector<Vector<float>>& lines, int begin, int end, double slope) {
   const int h = static_cast<int>(lines.front().size());
   Vector<float> sum(static_cast<std::size_t>(h));
@@ -83,9 +89,7 @@ TiltedProfile profile_at(const Vector<Vector<float>>& lines, int begin, int end,
     for (int y = 0; y < from; ++y) {
       sum[static_cast<std::size_t>(y)] += line[0];
     }
-    for (int y = from; y < to; ++y) {
-      sum[static_cast<std::size_t>(y)] += here * line[y + down] + after * line[y + down + 1];
-    }
+    add_between(line + from + down, to - from, here, after, sum.data() + from);
     for (int y = to; y < h; ++y) {
       sum[static_cast<std::size_t>(y)] += line[h - 1];
     }

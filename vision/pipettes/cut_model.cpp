@@ -4,7 +4,9 @@
 #include <numbers>
 
 #include "hal/math/elementary.hpp"
+#include "vision/image/dispatched.hpp"
 #include "vision/image/median.hpp"
+#include "vision/image/quad.hpp"
 #include "vision/pipettes/glass.hpp"
 #include "vision/pipettes/of_blurs.hpp"
 #include "vision/pipettes/shaft_blur.hpp"
@@ -24,18 +26,38 @@ constexpr double kOuterFace = 0.88, kInnerFace = 0.51;
 constexpr double kUnequalWalls = 2;  // the strength of one over the other, from where on it is relief
 constexpr double kCutOverWalls = 2;  // a cut that faces the light is up to so much brighter or darker
 
+// The lanes of a row, so many; what is seen there is weighted.
+struct RowLanes {
+  std::size_t lanes;
+  const double *weight, *tilt, *seen;
+};
+
 // Of what N things show in the lanes of a row, and of what is seen there: the sums of products, those of the
 // things without their mean and slope across.
 template <std::size_t N>
 class RowProducts {
  public:
-  void add(double weight, double tilt, double grey, const std::array<double, N>& shown) {
+  [[gnu::always_inline]] void multiply(const RowLanes& row, const std::array<const double*, N>& shown) {
+    std::array<Quad, N> mean{}, slope{}, seen{};
+    std::array<std::array<Quad, N>, N> of_both{};
+    for (std::size_t i = 0; i < row.lanes; i += kQuad) {
+      const Quad weight = quad_at(row.weight + i), tilt = quad_at(row.tilt + i), grey = quad_at(row.seen + i);
+      for (std::size_t a = 0; a < N; ++a) {
+        const Quad here = quad_at(shown[a] + i), weighted = weight * here;
+        mean[a] += weighted;
+        slope[a] += tilt * weighted;
+        seen[a] += here * grey;
+        for (std::size_t b = a; b < N; ++b) {
+          of_both[a][b] += weighted * quad_at(shown[b] + i);
+        }
+      }
+    }
     for (std::size_t a = 0; a < N; ++a) {
-      mean_[a] += weight * shown[a];
-      slope_[a] += weight * tilt * shown[a];
-      seen_[a] += shown[a] * grey;
+      mean_[a] = sum_of(mean[a]);
+      slope_[a] = sum_of(slope[a]);
+      seen_[a] = sum_of(seen[a]);
       for (std::size_t b = a; b < N; ++b) {
-        of_both_[a][b] += weight * shown[a] * shown[b];
+        of_both_[a][b] = sum_of(of_both[a][b]);
       }
     }
   }
@@ -49,6 +71,27 @@ class RowProducts {
   std::array<double, N> mean_{}, slope_{}, seen_{};
   std::array<std::array<double, N>, N> of_both_{};
 };
+
+PUNCTUM_WIDE_LOOP void multiply_two(const RowLanes& row, const std::array<const double*, 2>& shown,
+                                    RowProducts<2>& out) {
+  out.multiply(row, shown);
+}
+PUNCTUM_WIDE_LOOP void multiply_three(const RowLanes& row, const std::array<const double*, 3>& shown,
+                                      RowProducts<3>& out) {
+  out.multiply(row, shown);
+}
+
+// What the table says at (along - tangent at) / blur, for each of so many.
+PUNCTUM_WIDE_LOOP void from_table(const OfBlurs& table, const double* at, std::size_t many, double along,
+                                  double tangent, double blur, double* out) {
+  for (std::size_t i = 0; i < many; i += kQuad) {
+    const Quad blurs = (along - tangent * quad_at(at + i)) / blur;
+    const auto places = OfBlurs::places(blurs);
+    for (std::size_t k = 0; k < kQuad; ++k) {
+      out[i + k] = table.at_place(places[k]);
+    }
+  }
+}
 
 }  // namespace
 
@@ -83,9 +126,11 @@ CutModel::CutModel(const GradientField& field, const NeedlePose& needle, double 
   for (double s = -ahead - kMargin_px; s <= back + kShaftFrom_px + told_by_px; s += kRow_px) {
     GlassRow grey{};
     const double w = needle.half_width + needle.taper * s;
+    GlassRow at{};
     bool whole = true;
     for (std::size_t i = 0; i < kAllLanes && whole; ++i) {
-      const Point p = needle.at(s, lane_at(i, w));
+      at[i] = lane_at(i, w);
+      const Point p = needle.at(s, at[i]);
       whole = p.x > field.area.x + 1 && p.y > field.area.y + 1 && p.x < field.area.x + field.area.width - 2 &&
               p.y < field.area.y + field.area.height - 2;
       grey[i] = field.grey(p);
@@ -97,13 +142,13 @@ CutModel::CutModel(const GradientField& field, const NeedlePose& needle, double 
       // Against what is clear on either side.
       const double low = 0.5 * (grey[kOneSide - 1] + grey[kOneSide - 2]),
                    high = 0.5 * (grey[kAllLanes - 1] + grey[kAllLanes - 2]);
-      const double far = 0.5 * (lane_at(kAllLanes - 1, w) + lane_at(kAllLanes - 2, w));
+      const double far = 0.5 * (at[kAllLanes - 1] + at[kAllLanes - 2]);
       for (std::size_t i = 0; i < kAllLanes; ++i) {
-        shaft[i].push_back(grey[i] - 0.5 * (low + high) - 0.5 * (high - low) / far * lane_at(i, w));
+        shaft[i].push_back(grey[i] - 0.5 * (low + high) - 0.5 * (high - low) / far * at[i]);
       }
     }
     if (s <= back + kBehind_px) {
-      rows_.push_back({.s = s, .half_width = w, .grey = grey});
+      rows_.push_back({.s = s, .half_width = w, .grey = grey, .at = at});
     }
   }
   constexpr std::size_t kFewest = 12;
@@ -169,7 +214,7 @@ void CutModel::expect_walls(Seen& row) const {
   for (std::size_t i = 0; i < kAllLanes; ++i) {
     const double x = walls_[i], weighted = row.weight[i] * x;
     x0 += weighted;
-    x1 += weighted * (lane_at(i, row.half_width) - row.middle);
+    x1 += weighted * row.tilt[i];
     row.walls_squared += weighted * x;
     row.walls_seen += row.grey[i] * x;
   }
@@ -203,7 +248,7 @@ void CutModel::take_off_plane() {
   for (const Seen& row : rows_) {
     for (std::size_t i = 0; i < kAllLanes; ++i) {
       if (is_beside(i)) {
-        const cv::Vec3d plane(1, row.s, lane_at(i, row.half_width));
+        const cv::Vec3d plane(1, row.s, row.at[i]);
         a += row.weight[i] * plane * plane.t();
         g += row.weight[i] * row.grey[i] * plane;
       }
@@ -212,7 +257,7 @@ void CutModel::take_off_plane() {
   const cv::Vec3d plane = a.inv() * g;
   for (Seen& row : rows_) {
     for (std::size_t i = 0; i < kAllLanes; ++i) {
-      row.grey[i] -= plane[0] + plane[1] * row.s + plane[2] * lane_at(i, row.half_width);
+      row.grey[i] -= plane[0] + plane[1] * row.s + plane[2] * row.at[i];
     }
   }
 }
@@ -228,7 +273,7 @@ void CutModel::tell_how_even_it_is() {
     double m0 = 0, m2 = 0, r0 = 0, r1 = 0;
     for (std::size_t i = 0; i < kAllLanes; ++i) {
       if (is_beside(i)) {
-        const double u = lane_at(i, row.half_width), w = row.weight[i];
+        const double u = row.at[i], w = row.weight[i];
         m0 += w;
         m2 += w * u * u;
         r0 += w * row.grey[i];
@@ -253,22 +298,23 @@ void CutModel::tell_how_even_it_is() {
 }
 
 void CutModel::take_off_mean_and_slope(Seen& row) const {
+  double middle = 0;
   for (std::size_t i = 0; i < kAllLanes; ++i) {
     row.weights += row.weight[i];
-    row.middle += row.weight[i] * lane_at(i, row.half_width);
+    middle += row.weight[i] * row.at[i];
   }
-  row.middle /= row.weights;
+  middle /= row.weights;
   double mean = 0, slope = 0;
   for (std::size_t i = 0; i < kAllLanes; ++i) {
-    const double tilt = lane_at(i, row.half_width) - row.middle;
-    row.tilts += row.weight[i] * tilt * tilt;
+    row.tilt[i] = row.at[i] - middle;
+    row.tilts += row.weight[i] * row.tilt[i] * row.tilt[i];
     mean += row.weight[i] * row.grey[i];
-    slope += row.weight[i] * tilt * row.grey[i];
+    slope += row.weight[i] * row.tilt[i] * row.grey[i];
   }
   row.weights += row.even;
   row.tilts += row.level;
   for (std::size_t i = 0; i < kAllLanes; ++i) {
-    row.grey[i] -= mean / row.weights + slope / row.tilts * (lane_at(i, row.half_width) - row.middle);
+    row.grey[i] -= mean / row.weights + slope / row.tilts * row.tilt[i];
   }
 }
 
@@ -278,19 +324,26 @@ CutModel::Ends CutModel::ends_at(const CutEnd& end) const {
   return {end, cut_px, of_line_px, std::abs(cut_px) + OfBlurs::kFar * of_line_px};
 }
 
-template <class Each>
-void CutModel::for_lanes(const Seen& row, const Ends& ends, Each each) const {
-  const double along = row.s - ends.end.at, low = kStepOfBlurs((along + ends.cut_px) / blur_),
-               high = kStepOfBlurs((along - ends.cut_px) / blur_);
-  for (std::size_t i = 0; i < kAllLanes; ++i) {
-    const double u = lane_at(i, row.half_width);
-    const double near = i < kOneSide ? low : high, far = i < kOneSide ? high : low;
-    const double begun = in_relief_ ? kStepOfBlurs((along - ends.end.tangent * face_[i]) / blur_)
-                                    : far + near_[i] * (near - far);
-    each(i, u,
-         Shown{walls_[i] * begun,
-               line_[i] * kBumpOfBlurs((along - ends.end.tangent * u - line_behind_) / ends.of_line_px)});
+CutModel::Shown CutModel::shown_in(const Seen& row, const Ends& ends) const {
+  const double along = row.s - ends.end.at;
+  Shown out;
+  from_table(kBumpOfBlurs, row.at.data(), kAllLanes, along - line_behind_, ends.end.tangent, ends.of_line_px,
+             out.line.data());
+  if (in_relief_) {
+    from_table(kStepOfBlurs, face_.data(), kAllLanes, along, ends.end.tangent, blur_, out.walls.data());
+  } else {
+    const double low = kStepOfBlurs((along + ends.cut_px) / blur_),
+                 high = kStepOfBlurs((along - ends.cut_px) / blur_);
+    for (std::size_t i = 0; i < kAllLanes; ++i) {
+      const double near = i < kOneSide ? low : high, far = i < kOneSide ? high : low;
+      out.walls[i] = far + near_[i] * (near - far);
+    }
   }
+  for (std::size_t i = 0; i < kAllLanes; ++i) {
+    out.walls[i] *= walls_[i];
+    out.line[i] *= line_[i];
+  }
+  return out;
 }
 
 CutModel::Sums<3> CutModel::sums(const CutEnd& end) const {
@@ -309,10 +362,10 @@ CutModel::Sums<3> CutModel::sums(const CutEnd& end) const {
       of.g[1] += from_end * row.walls_seen;
       continue;
     }
+    const Shown shown = shown_in(row, ends);
     RowProducts<2> row_of;
-    for_lanes(row, ends, [&](std::size_t i, double u, const Shown& shown) {
-      row_of.add(row.weight[i], u - row.middle, row.grey[i], {shown.walls, shown.line});
-    });
+    multiply_two({kAllLanes, row.weight.data(), row.tilt.data(), row.grey.data()},
+                 {shown.walls.data(), shown.line.data()}, row_of);
     const auto product = [&](std::size_t k, std::size_t l) {
       return row_of.of(k, l, row.weights, row.tilts);
     };
@@ -350,7 +403,8 @@ double CutModel::likelier(Sums<N> of) const {
 }
 
 // As dark or bright as it fits best.
-CutModel::Sums<4> CutModel::with_speck(const Sums<3>& of_needle, const Ends& ends, const Speck& speck) const {
+CutModel::Sums<4> CutModel::with_speck(const Sums<3>& of_needle, const CutEnd& end,
+                                       const Vector<Shown>& shown, const Speck& speck) const {
   Sums<4> of{cv::Matx44d::eye(), {}};
   for (int i = 0; i < 3; ++i) {
     of.g[i] = of_needle.g[i];
@@ -358,19 +412,23 @@ CutModel::Sums<4> CutModel::with_speck(const Sums<3>& of_needle, const Ends& end
       of.a(i, j) = of_needle.a(i, j);
     }
   }
-  for (const Seen& row : rows_) {
+  GlassRow dark;
+  for (std::size_t k = 0; k < rows_.size(); ++k) {
+    const Seen& row = rows_[k];
     if (std::abs(row.s - speck.at) > 3 * speck.radius_px) {
       continue;
     }
-    RowProducts<3> row_of;
     const double along = kBumpOfBlurs((row.s - speck.at) / speck.radius_px);
-    for_lanes(row, ends, [&](std::size_t i, double u, const Shown& shown) {
-      row_of.add(row.weight[i], u - row.middle, row.grey[i],
-                 {shown.walls, shown.line, along * kBumpOfBlurs((u - speck.aside) / speck.radius_px)});
-    });
-    const auto with_speck = [&](std::size_t k) { return row_of.of(k, 2, row.weights, row.tilts); };
+    from_table(kBumpOfBlurs, row.at.data(), kAllLanes, speck.aside, 1, speck.radius_px, dark.data());
+    for (double& of_lane : dark) {
+      of_lane *= along;
+    }
+    RowProducts<3> row_of;
+    multiply_three({kAllLanes, row.weight.data(), row.tilt.data(), row.grey.data()},
+                   {shown[k].walls.data(), shown[k].line.data(), dark.data()}, row_of);
+    const auto with_speck = [&](std::size_t a) { return row_of.of(a, 2, row.weights, row.tilts); };
     of.a(0, 3) += with_speck(0);
-    of.a(1, 3) += std::max(0.0, row.s - ends.end.at) * with_speck(0);
+    of.a(1, 3) += std::max(0.0, row.s - end.at) * with_speck(0);
     of.a(2, 3) += with_speck(1);
     of.a(3, 3) += with_speck(2);
     of.g[3] += row_of.with_seen(2);
@@ -387,12 +445,16 @@ double CutModel::gain_with_speck(const CutEnd& end, double side) const {
   constexpr double kReach_px = 14, kOffLine_px = 1;
   const Ends ends = ends_at(end);
   const Sums<3> of_needle = sums(end);
+  Vector<Shown> shown;
+  for (const Seen& row : rows_) {
+    shown.push_back(shown_in(row, ends));
+  }
   double most = likelier(of_needle);
   for (const double radius_px : {blur_, 1.5 * blur_}) {
     for (double off = -kOffLine_px; off <= kOffLine_px; off += 1) {
       for (double ahead = 0; ahead <= kReach_px; ahead += 1) {
         const Speck speck{end.at - ahead, std::copysign(middle_ + off, side), radius_px};
-        most = std::max(most, likelier(with_speck(of_needle, ends, speck)));
+        most = std::max(most, likelier(with_speck(of_needle, end, shown, speck)));
       }
     }
   }

@@ -48,10 +48,11 @@ class CutModel {
   using GlassRow = std::array<double, kAllLanes>;
   struct Seen {
     double s, half_width;
-    GlassRow grey;      // later times the weight, without what the medium may add
-    GlassRow weight{};  // width of the lane, px; nearly none where there is a speck
-    // Of the weights: mean place, sum, sum over the squares of the distance from that place.
-    double middle = 0, weights = 0, tilts = 0;
+    GlassRow grey;                  // later times the weight, without what the medium may add
+    GlassRow at;                    // where the lanes lie, px from the axis
+    GlassRow tilt{};                // the same from their mean place
+    GlassRow weight{};              // width of the lane, px; nearly none where there is a speck
+    double weights = 0, tilts = 0;  // of the weights the sum, and that over the squares of the tilts
     // px, px cubed: what tells that the medium is even here, in the mean and across.
     double even = 0, level = 0;
     // Of both walls where the needle goes on: squared, and times the grey levels.
@@ -64,23 +65,23 @@ class CutModel {
     cv::Matx<double, N, N> a;
     cv::Vec<double, N> g;
   };
-  // Of a lane of a row, where the needle ends so.
+  // In the lanes of a row, where the needle ends so.
   struct Shown {
-    double walls, line;
+    GlassRow walls, line;
   };
   struct Ends {
     CutEnd end;
     double cut_px, of_line_px, reach_px;  // reach: where the needle goes on to, and from where it shows
   };
   [[nodiscard]] Ends ends_at(const CutEnd& end) const;
-  // Calls for each lane with what is shown in it.
-  template <class Each>
-  void for_lanes(const Seen& row, const Ends& ends, Each each) const;
+  [[nodiscard]] Shown shown_in(const Seen& row, const Ends& ends) const;
   [[nodiscard]] Sums<3> sums(const CutEnd& end) const;
   struct Speck {
     double at, aside, radius_px;  // behind the tip of the pose and beside its axis, px
   };
-  [[nodiscard]] Sums<4> with_speck(const Sums<3>& of_needle, const Ends& ends, const Speck& speck) const;
+  // shown: per row.
+  [[nodiscard]] Sums<4> with_speck(const Sums<3>& of_needle, const CutEnd& end, const Vector<Shown>& shown,
+                                   const Speck& speck) const;
   template <int N>
   [[nodiscard]] double likelier(Sums<N> sums) const;
   [[nodiscard]] double lane_at(std::size_t lane, double half_width) const;

@@ -8,6 +8,7 @@
 
 #include "hal/math/elementary.hpp"
 #include "vision/image/blurred_step.hpp"
+#include "vision/image/quad.hpp"
 
 namespace punctum::vision {
 
@@ -24,6 +25,14 @@ class OfBlurs {
     const int k = static_cast<int>(blurs * kPerBlur + kZero + 0.5);
     return values_[static_cast<std::size_t>(std::clamp(k, 0, kCount - 1))];
   }
+  // The same, of four: the places in the table, and what is there.
+  using Places = int __attribute__((vector_size(kQuad * sizeof(int))));
+  [[gnu::always_inline]] static Places places(const Quad& blurs) {
+    const Places k = __builtin_convertvector(blurs * kPerBlur + kZero + 0.5, Places);
+    const Places low = k < 0 ? 0 : k;
+    return low > kCount - 1 ? kCount - 1 : low;
+  }
+  [[nodiscard]] double at_place(int place) const { return values_[static_cast<std::size_t>(place)]; }
   static constexpr double kFar = 5;  // beyond so many blurs it does not change
 
  private:

@@ -1,0 +1,21 @@
+// Four numbers side by side in a processor's wide registers: what they add up to is added in the same order,
+// and so has the same bits, where there are none.
+#pragma once
+
+#include <cstddef>
+
+namespace punctum::vision {
+
+inline constexpr std::size_t kQuad = 4;
+using Quad = double __attribute__((vector_size(kQuad * sizeof(double))));
+using QuadInRow =
+    double __attribute__((vector_size(kQuad * sizeof(double)), aligned(sizeof(double)), may_alias));
+
+// The four that begin there.
+[[gnu::always_inline]] inline const QuadInRow& quad_at(const double* from) {
+  return *reinterpret_cast<const QuadInRow*>(from);
+}
+
+[[gnu::always_inline]] inline double sum_of(const Quad& v) { return (v[0] + v[1]) + (v[2] + v[3]); }
+
+}  // namespace punctum::vision

@@ -69,6 +69,8 @@ struct FittedLine {
   }
 };
 
+bool is_set(const Vector<std::uint8_t>& mask, std::size_t i) { return !mask.empty() && mask[i] != 0; }
+
 float sum_of(const Lanes& v) {
   static_assert(kSideBySide == 8);
   return ((v[0] + v[1]) + (v[2] + v[3])) + ((v[4] + v[5]) + (v[6] + v[7]));
@@ -168,8 +170,8 @@ CommonShape::CommonShape(const EdgeProfiles& profiles, const Vector<double>& sof
     : profiles_(profiles),
       soft_(soft),
       stiffness_(stiffness),
-      beside_(edge.beside),
-      beside_glass_(edge.beside_glass),
+      beside_line_(edge.beside_line),
+      in_shadow_(edge.in_shadow),
       modes_(edge.modes),
       least_lasting_(edge.lasting),
       trust_(profiles.samples, 1.0F),
@@ -265,7 +267,7 @@ bool CommonShape::find_from(int rounds) {
 }
 
 bool CommonShape::tells_shape(std::size_t i) const {
-  return profiles_.whole(i) && soft_[i] < 0.5 && (!beside_glass_ || beside_.empty() || beside_[i] == 0);
+  return profiles_.whole(i) && soft_[i] < 0.5 && !is_set(in_shadow_, i);
 }
 
 Vector<std::size_t> CommonShape::every_second() const {
@@ -588,7 +590,7 @@ void CommonShape::smooth_places() {
     // An impurity on the edge makes the profile fit badly, and pulls.
     const double bad = 2 * std::max(0.0, misfit_[i] / usual - 1);
     weight_[i] *= std::min(1.0, gain_[i] * gain_[i]) / (1 + bad * bad);
-    if (!beside_.empty() && beside_[i] != 0) {
+    if (is_set(beside_line_, i) || is_set(in_shadow_, i)) {
       weight_[i] *= kBesideLine;
     }
   }

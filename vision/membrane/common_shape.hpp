@@ -63,8 +63,7 @@ class CommonShape {
 
   const EdgeProfiles& profiles_;
   const Vector<double>&soft_, &stiffness_;
-  const Vector<std::uint8_t>& beside_;
-  bool beside_glass_;
+  const Vector<std::uint8_t>&beside_line_, &in_shadow_;
   double modes_, least_lasting_;
   Vector<double> lit_;  // per point; empty: not in relief
   Vector<double> shape_, turning_;

@@ -28,8 +28,9 @@ struct EdgeShape {
   Contour nearby_face;  // where it lies, per point, if it is not equally far everywhere; or empty
   Point relief;         // unit, from where the light seems to come: see CommonShape; or zero
   std::optional<double> other_flatness;  // of the other membrane, a body of the same form: see ReliefSteps
-  Vector<std::uint8_t> beside;           // per point, 1: beside a line that is not its own; or empty
-  bool beside_glass = false;             // that line is ten times as clear, and hides the edge
+  // Per point, 1: beside a line that is not its own; in relief so near to the holding pipette that its line,
+  // ten times as clear, hides the edge. Or empty.
+  Vector<std::uint8_t> beside_line, in_shadow;
 };
 
 // What is learnt of an edge over the frames.

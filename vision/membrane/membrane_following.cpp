@@ -99,7 +99,6 @@ std::optional<SeenOutline> refined(const MembraneSearch& search, const EdgePath&
     }
     const double wall = config.px(config.h_m);
     EdgeShape edge;
-    edge.beside = search.band.hidden;
     if (search.m.polarity == Polarity::relief) {
       const Point along = search.m.relief.along;
       edge.relief = along / cv::norm(along);
@@ -110,12 +109,14 @@ std::optional<SeenOutline> refined(const MembraneSearch& search, const EdgePath&
     }
     if (surroundings.outermost) {
       if (search.m.polarity == Polarity::relief) {
-        edge.beside = search.picture.in_shadow_of_holder(contour);
-        edge.beside_glass = true;
+        edge.in_shadow = search.picture.in_shadow_of_holder(contour);
+      } else {
+        edge.beside_line = search.band.hidden;
       }
       edge.modes = kOuterModes;
       edge.nearby = {-wall, kWallTolerance * wall};
     } else {
+      edge.beside_line = search.band.hidden;
       edge.inside = 6;
       edge.outside = 5;
       edge.modes = kInnerModes;

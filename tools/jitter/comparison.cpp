@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "tools/jitter/difference.hpp"
 #include "tools/shared/child.hpp"
 #include "tools/shared/say.hpp"
 #include "tools/shared/stop_signal.hpp"
@@ -131,7 +132,11 @@ tl::expected<Comparison, std::string> compare_with_cyclictest(const Wanted& want
   if (tools::find_program("cyclictest").empty()) {
     return tl::unexpected(std::string("--compare: there is no cyclictest: apt-get install rt-tests"));
   }
-  const int slices = std::clamp(static_cast<int>(wanted.seconds / 2 / kSlice_s), 1, kMostSlices);
+  const int slices = std::min(static_cast<int>(wanted.seconds / 2 / kSlice_s), kMostSlices);
+  if (slices < static_cast<int>(kLeastParts)) {
+    return tl::unexpected(fmt::format("--compare: --seconds {}: allowed: {} or more, a second for each turn",
+                                      wanted.seconds, 2 * kLeastParts * kSlice_s));
+  }
   const double slice_s = wanted.seconds / 2 / slices;
   const Folder folder;
   const std::string json = folder.file("loop.json"), histogram = folder.file("cyclictest.hist"),

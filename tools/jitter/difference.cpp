@@ -13,7 +13,7 @@ namespace punctum::jitter {
 namespace {
 
 constexpr std::array kQuantileParts = {0.5, 0.99, 0.999};
-constexpr std::size_t kLeastParts = 8, kLeastBlocks = 6;
+constexpr std::size_t kLeastBlocks = 6;
 constexpr int kDraws = 2000;
 constexpr double kResolution_us = 0.1;                   // of a quantile between the edges of its bin of 1 us
 constexpr double kAlpha = 0.05 / kQuantileParts.size();  // three questions, one answer
@@ -256,6 +256,13 @@ std::string difference_text(const std::vector<QuantileDifference>& found, const 
   std::string out;
   if (a.machine != b.machine) {
     out += "the machines differ:\n  A: " + a.machine + "\n  B: " + b.machine + "\n";
+  }
+  if (a.cpu != b.cpu || a.priority != b.priority) {
+    const auto place = [](const Result& r) {
+      return fmt::format("{}, {}", r.cpu < 0 ? "no CPU of its own" : fmt::format("CPU {}", r.cpu),
+                         r.priority == 0 ? "ordinary priority" : fmt::format("FIFO {}", r.priority));
+    };
+    out += fmt::format("the places differ: A {}; B {}\n", place(a), place(b));
   }
   if (a.work.substr(0, a.work.find(',')) != b.work.substr(0, b.work.find(','))) {
     out += "the ticks do not do the same\n";

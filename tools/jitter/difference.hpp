@@ -16,6 +16,8 @@ struct QuantileDifference {
   bool differs = false;
 };
 
+inline constexpr std::size_t kLeastParts = 8;  // of either measurement
+
 // By blocks of as many neighbouring parts as hang together, which are taken for independent of each other.
 // Six blocks of each are the fewest: what drifts more slowly is taken for a difference. The error: too few
 // parts.

@@ -100,7 +100,7 @@ int compare(const jitter::Wanted& wanted, const std::vector<std::string>& tick) 
   }
   const auto found = jitter::difference(both->cyclictest, both->loop);
   if (!found) {
-    return bad("--compare: " + found.error() + "; take more --seconds");
+    return bad("--compare: " + found.error());
   }
   say("A: cyclictest, B: the loop of the core, in turns\n" +
       jitter::difference_text(*found, both->cyclictest, both->loop));
@@ -129,7 +129,7 @@ int measure(const jitter::Wanted& wanted, const std::string& load, const Files& 
   for (const auto& [path, text] :
        {std::pair(files.histogram, jitter::histogram_text(result->wake)),
         std::pair(files.json, jitter::json_of(*result)), std::pair(files.trace, result->trace)}) {
-    if (path.empty()) {
+    if (path.empty() || text.empty()) {
       continue;
     }
     if (const auto written = tools::write_whole(path, text); !written) {
@@ -140,6 +140,17 @@ int measure(const jitter::Wanted& wanted, const std::string& load, const Files& 
     if (const auto drawn = tools::draw(jitter::picture_of(*result), files.picture); !drawn) {
       return bad("--picture: " + drawn.error());
     }
+  }
+  if (!files.trace.empty() && result->trace.empty()) {
+    complain(fmt::format("--trace: {} is not written: {}", files.trace,
+                         result->untraced.empty() ? "no tick was late" : result->untraced));
+    if (!result->untraced.empty()) {
+      return kNotReady;
+    }
+  }
+  if (!gpio.empty() && result->answer.entries() == 0) {
+    complain("--gpio: no change was answered: is ASK wired to IN, and OUT to SEEN?");
+    return kNotReady;
   }
   return tools::all_was_said() ? kDone : kNotReady;
 }
@@ -162,7 +173,9 @@ int main_or_throw(int argc, char** argv) {
        {"punctum-jitter --audit icsi --cpu 3 --plan plan",
         "what of this machine is not ready, and what mends it"}},
       {{kDone, "it was measured; the machine is ready; no difference is shown"},
-       {kNotReady, "the audit found something missing that is required; the results differ"},
+       {kNotReady,
+        "the audit found something missing that is required; the results differ; no GPIO line answered; what "
+        "was asked for could not be traced or said"},
        {kBadInput, "bad input"}}));
   jitter::Wanted wanted;
   Files files;
@@ -260,6 +273,12 @@ int main_or_throw(int argc, char** argv) {
   }
   if (beside && !(files.histogram.empty() && files.json.empty() && files.picture.empty())) {
     return bad("--compare: writes no files, allowed without --histogram, --json and --picture");
+  }
+  if (beside && (wanted.explain_us > 0 || wanted.break_us > 0)) {
+    return bad("--compare: tells no causes, allowed without --explain and --break");
+  }
+  if (!files.trace.empty() && !(wanted.explain_us > 0 || wanted.break_us > 0)) {
+    return bad("--trace: allowed with --explain or --break");
   }
   if (edges->count() > 0 && (gpio.empty() || beside || !station.empty() || !tick.empty())) {
     return bad(

@@ -13,7 +13,10 @@
 #include <cstdint>
 #include <fstream>
 #include <memory>
+#include <optional>
+#include <sstream>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -26,6 +29,7 @@
 #include "rt/platform/real_time_rights.hpp"
 #include "rt/station/station.hpp"
 #include "tools/jitter/ordinary_thread.hpp"
+#include "tools/shared/cause.hpp"
 #include "tools/shared/machine.hpp"
 #include "tools/shared/station_segments.hpp"
 #include "tools/shared/stop_signal.hpp"
@@ -52,14 +56,14 @@ class EmptyTick {
     ticks_ = ticks;
   }
   rt::After run(const rt::Tick& tick) NONBLOCKING {
-    const std::int64_t now_ns = clock_->now_ns();
+    const std::int64_t now_ns = clock_->now_ns(), slept_for_ns = tick.wake_ns - tick.late_ns;
     if (first_) {
-      first_release_ns_ = tick.release_ns;
+      first_release_ns_ = slept_for_ns;
     } else {
       interval_.add(now_ns - last_ns_);
     }
     if ((first_ || tick.late_ns > latest_ns_) && spikes_ < spike_.size()) {
-      spike_[spikes_++] = {1e-9 * static_cast<double>(tick.release_ns - first_release_ns_),
+      spike_[spikes_++] = {1e-9 * static_cast<double>(slept_for_ns - first_release_ns_),
                            1e-3 * static_cast<double>(tick.late_ns)};
     }
     latest_ns_ = first_ ? tick.late_ns : std::max(latest_ns_, tick.late_ns);
@@ -91,7 +95,7 @@ struct Written {
   EmptyTick empty_tick;
 };
 
-Distribution distribution_of(const rt::TimeHistogram& histogram) {
+Distribution bins_of(const rt::TimeHistogram& histogram) {
   Distribution out;
   out.count.resize(rt::TimeHistogram::kBins);
   for (std::size_t k = 0; k < out.count.size(); ++k) {
@@ -99,33 +103,16 @@ Distribution distribution_of(const rt::TimeHistogram& histogram) {
   }
   out.longer = histogram.overflow();
   out.max_us = histogram.max_us();
-  while (!out.count.empty() && out.count.back() == 0) {
-    out.count.pop_back();
-  }
   return out;
 }
 
-// What `after` holds more than `before`.
-Distribution since(const Distribution& before, const Distribution& after) {
-  Distribution out = after;
-  for (std::size_t k = 0; k < before.count.size(); ++k) {
-    out.count[k] -= before.count[k];
-  }
-  out.longer -= before.longer;
-  while (!out.count.empty() && out.count.back() == 0) {
-    out.count.pop_back();
-  }
-  if (out.longer == 0) {  // the largest of all may have come before
-    out.max_us = std::min(out.max_us, static_cast<double>(out.count.size()));
-  }
-  return out;
-}
+Distribution distribution_of(const rt::TimeHistogram& histogram) { return since({}, bins_of(histogram)); }
 
 // Copies the histogram of wake-ups at equal intervals, from an ordinary thread: it may be read live.
 class Parts {
  public:
   Parts(const rt::CoreStatus& status, double seconds)
-      : status_(status), every_(seconds / kParts), before_(distribution_of(status.wake)) {
+      : status_(status), every_(seconds / kParts), before_(bins_of(status.wake)) {
     thread_ = ordinary_thread([this] { watch(); });
   }
   // The parts; of the last one nothing is told unless it was whole.
@@ -149,7 +136,7 @@ class Parts {
         due = now + std::chrono::duration_cast<Clock::duration>(every_);
       } else if (now >= due) {
         due += std::chrono::duration_cast<Clock::duration>(every_);
-        Distribution all = distribution_of(status_.wake);
+        Distribution all = bins_of(status_.wake);
         parts_.push_back(since(before_, all));
         before_ = std::move(all);
       }
@@ -164,6 +151,30 @@ class Parts {
   std::jthread thread_;
 };
 
+// The wake-ups of a running loop that are later than all since this began, from its histogram, to the last
+// look.
+class LatestSeen {
+ public:
+  explicit LatestSeen(const rt::CoreStatus& status) : status_(status), before_(bins_of(status.wake)) {}
+  void look() {
+    Distribution all = bins_of(status_.wake);
+    const double latest_us = since(before_, all).max_us;
+    if (latest_us > (spikes_.empty() ? 0 : spikes_.back().wake_us)) {
+      const auto now_ns = std::chrono::steady_clock::now().time_since_epoch().count();
+      spikes_.push_back(
+          {1e-9 * static_cast<double>(now_ns - static_cast<std::int64_t>(status_.start_ns.load())),
+           latest_us});
+    }
+    before_ = std::move(all);
+  }
+  [[nodiscard]] const std::vector<Spike>& spikes() const { return spikes_; }
+
+ private:
+  const rt::CoreStatus& status_;
+  Distribution before_;
+  std::vector<Spike> spikes_;
+};
+
 std::string first_line(const char* path) {
   std::ifstream in(path);
   std::string line;
@@ -171,22 +182,73 @@ std::string first_line(const char* path) {
   return line;
 }
 
-// Moves between processors so far, of the calling thread.
-std::uint64_t migrations() {
-  std::ifstream in("/proc/thread-self/sched");
+// What stands behind "NAME   :" in a file of lines like that; empty: nothing does.
+std::optional<std::uint64_t> number_in(const std::string& file, std::string_view name) {
+  std::ifstream in(file);
   for (std::string line; std::getline(in, line);) {
-    if (line.starts_with("se.nr_migrations")) {
-      return std::stoull(line.substr(line.find(':') + 1));
+    if (const std::size_t colon = line.find(':'); colon != std::string::npos && line.starts_with(name)) {
+      std::istringstream number(line.substr(colon + 1));
+      std::uint64_t value = 0;
+      return number >> value ? std::optional(value) : std::nullopt;
     }
   }
-  return 0;
+  return std::nullopt;
 }
 
-std::string machine() {
+// Moves between processors so far, of the calling thread.
+std::optional<std::uint64_t> migrations(const std::string& thread = "/proc/thread-self") {
+  return number_in(thread + "/sched", "se.nr_migrations");
+}
+
+// What the kernel counts of the first thread of another process.
+struct ThreadCounts {
+  std::optional<std::uint64_t> minor_faults, major_faults, voluntary_switches, involuntary_switches;
+  std::optional<std::uint64_t> migrations, smis;
+};
+ThreadCounts thread_counts(int pid) {
+  const std::string thread = fmt::format("/proc/{}/task/{}", pid, pid);
+  const tools::late::Counters counters = tools::late::read_counters(pid, pid);
+  ThreadCounts out;
+  if (counters.cpu >= 0) {  // it could be read
+    out.minor_faults = counters.minor_faults;
+    out.major_faults = counters.major_faults;
+  }
+  out.voluntary_switches = number_in(thread + "/status", "voluntary_ctxt_switches");
+  out.involuntary_switches = number_in(thread + "/status", "nonvoluntary_ctxt_switches");
+  out.migrations = jitter::migrations(thread);
+  out.smis = counters.smis;
+  return out;
+}
+
+// Where the scheduler may put it and how urgent it is, of a thread: -1 where there are several; 0.
+void tell_place(int tid, Result& out) {
+  cpu_set_t allowed;
+  CPU_ZERO(&allowed);
+  if (sched_getaffinity(tid, sizeof allowed, &allowed) == 0 && CPU_COUNT(&allowed) == 1) {
+    for (out.cpu = 0; !CPU_ISSET(out.cpu, &allowed);) {
+      ++out.cpu;
+    }
+  }
+  sched_param urgent{};
+  if (sched_getscheduler(tid) != SCHED_OTHER && sched_getparam(tid, &urgent) == 0) {
+    out.priority = urgent.sched_priority;
+  }
+}
+
+// What does not tell itself is left out.
+std::string machine(int cpu) {
   const tools::MachineDescription m = tools::this_machine();
-  return fmt::format("{}; {} x {}; clock {}; boot line: {}", m.kernel, m.cores, m.processor,
-                     first_line("/sys/devices/system/clocksource/clocksource0/current_clocksource"),
-                     first_line("/proc/cmdline"));
+  const std::string of_cpu = fmt::format("/sys/devices/system/cpu/cpu{}/", std::max(cpu, 0));
+  std::string out = fmt::format("{}; {} x {}", m.kernel, m.cores, m.processor);
+  for (const auto& [name, value] :
+       {std::pair("microcode", first_line((of_cpu + "microcode/version").c_str())),
+        std::pair("governor", first_line((of_cpu + "cpufreq/scaling_governor").c_str())),
+        std::pair("SMT", first_line("/sys/devices/system/cpu/smt/control")),
+        std::pair("clock", first_line("/sys/devices/system/clocksource/clocksource0/current_clocksource")),
+        std::pair("boot line:", first_line("/proc/cmdline"))}) {
+    out += value.empty() ? "" : fmt::format("; {} {}", name, value);
+  }
+  return out;
 }
 
 }  // namespace
@@ -195,7 +257,7 @@ tl::expected<Result, std::string> measure(const Wanted& wanted, const Work& work
   Result result;
   result.rate_Hz = wanted.rate_Hz;
   result.cpu = wanted.cpu;
-  result.machine = machine();
+  result.machine = machine(wanted.cpu);
   const auto period_ns = static_cast<std::int64_t>(std::llround(1e9 / wanted.rate_Hz));
   rt::MonotonicClock monotonic;
   const auto written = std::make_unique<Written>();
@@ -209,6 +271,7 @@ tl::expected<Result, std::string> measure(const Wanted& wanted, const Work& work
   rights_wanted.cpu = wanted.cpu;
   const auto rights = rt::RealTimeRights::acquire(rights_wanted);
   result.degraded = rights.degraded();
+  tell_place(0, result);
   for (const rt::RightFound& right : rights.table()) {
     if (right.required && !right.got) {
       result.missing.push_back(fmt::format("{}: {}", right.name, right.remedy));
@@ -240,7 +303,7 @@ tl::expected<Result, std::string> measure(const Wanted& wanted, const Work& work
       witness.look();
     }
   });
-  const std::uint64_t moved_before = migrations();
+  const std::optional<std::uint64_t> moved_before = migrations(), smis_before = tools::late::smi_count();
   const rt::ThreadCounters before = rt::read_thread_counters();
   rt::allocation_trap::arm(rt::allocation_trap::On::allocation_count);
   result.allocations_watched = rt::allocation_trap::armed();
@@ -256,7 +319,8 @@ tl::expected<Result, std::string> measure(const Wanted& wanted, const Work& work
   result.trace = std::move(explained.trace);
   result.untraced = witness.untraced();
   result.broke = empty_tick.broke();
-  result.migrations = migrations() - moved_before;
+  result.migrations = tools::late::rise(moved_before, migrations());
+  result.smis = tools::late::rise(smis_before, tools::late::smi_count());
   result.parts = parts.end();
   if (ended == rt::Executive::Ended::invalid) {
     return tl::unexpected(fmt::format("--rate: {} Hz: no period of a whole nanosecond", wanted.rate_Hz));
@@ -300,17 +364,20 @@ tl::expected<Result, std::string> attach(const std::string& station, const Wante
   tools::stop_signal::watch({SIGINT, SIGTERM}, on_stop_signal);
   Result result;
   result.rate_Hz = 1e9 / period_ns;
-  result.machine = machine();
+  tell_place(pid, result);
+  result.machine = machine(result.cpu);
   result.degraded = status.degraded.load() != 0;
   result.first_release_ns = static_cast<std::int64_t>(status.start_ns.load());
   const std::uint64_t ticks = status.ticks.load(), missed = status.missed.load();
-  const Distribution wake = distribution_of(status.wake), tick = distribution_of(status.tick);
+  const Distribution wake = bins_of(status.wake), tick = bins_of(status.tick);
   std::vector<Distribution> slots;
   const std::size_t count = std::min<std::size_t>(status.slot_count.load(), rt::kMaxSlots);
   for (std::size_t i = 0; i < count; ++i) {
-    slots.push_back(distribution_of(status.slots[i].execution));
+    slots.push_back(bins_of(status.slots[i].execution));
   }
   Parts parts(status, wanted.seconds);
+  const ThreadCounts before = thread_counts(pid);
+  LatestSeen latest(status);
   tools::late::Witness witness(status, pid, pid, wanted.explain_us > 0);
   const auto begun = std::chrono::steady_clock::now();
   const std::chrono::duration<double> whole(wanted.seconds);
@@ -319,6 +386,7 @@ tl::expected<Result, std::string> attach(const std::string& station, const Wante
   bool stands = false;
   while (!stands && !end_loop.load() && std::chrono::steady_clock::now() - begun < whole) {
     std::this_thread::sleep_for(kLookAgain);
+    latest.look();
     witness.look();
     const auto now = std::chrono::steady_clock::now();
     if (status.ticks.load() != last) {
@@ -330,17 +398,24 @@ tl::expected<Result, std::string> attach(const std::string& station, const Wante
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   tools::late::Explanations explained = witness.end();
   result.parts = parts.end();
+  result.spikes = latest.spikes();
   result.explained = std::move(explained.ticks);
   result.unexplained = explained.more;
   result.trace = std::move(explained.trace);
   result.untraced = witness.untraced();
   result.ticks = status.ticks.load() - ticks;
   result.missed = status.missed.load() - missed;
-  result.wake = since(wake, distribution_of(status.wake));
-  result.tick = since(tick, distribution_of(status.tick));
+  result.wake = since(wake, bins_of(status.wake));
+  result.tick = since(tick, bins_of(status.tick));
+  const ThreadCounts after = thread_counts(pid);
+  result.minor_faults = tools::late::rise(before.minor_faults, after.minor_faults);
+  result.major_faults = tools::late::rise(before.major_faults, after.major_faults);
+  result.voluntary_switches = tools::late::rise(before.voluntary_switches, after.voluntary_switches);
+  result.involuntary_switches = tools::late::rise(before.involuntary_switches, after.involuntary_switches);
+  result.migrations = tools::late::rise(before.migrations, after.migrations);
+  result.smis = tools::late::rise(before.smis, after.smis);
   for (std::size_t i = 0; i < count; ++i) {
-    result.slots.emplace_back(status.slots[i].name.text,
-                              since(slots[i], distribution_of(status.slots[i].execution)));
+    result.slots.emplace_back(status.slots[i].name.text, since(slots[i], bins_of(status.slots[i].execution)));
   }
   return result;
 }

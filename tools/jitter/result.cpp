@@ -34,9 +34,15 @@ Json json_of(const Distribution& d) {
 Json with_quantiles(const Distribution& d) {
   Json out = json_of(d);
   for (const auto& [name, part] : kQuantiles) {
-    out[name] = d.quantile_us(part);
+    out[name] = d.entries() > 0 ? Json(d.quantile_us(part)) : Json(nullptr);
   }
   return out;
+}
+
+Json json_of(const std::optional<std::uint64_t>& count) { return count ? Json(*count) : Json(nullptr); }
+
+std::string text_of(const std::optional<std::uint64_t>& count) {
+  return count ? std::to_string(*count) : "not told";
 }
 
 Json json_of(const Explained& e, std::int64_t first_release_ns) {
@@ -111,11 +117,27 @@ double Distribution::quantile_us(double part) const {
   return max_us;
 }
 
+Distribution since(const Distribution& before, const Distribution& after) {
+  Distribution out = after;
+  for (std::size_t k = 0; k < before.count.size(); ++k) {
+    out.count[k] -= before.count[k];
+  }
+  out.longer -= before.longer;
+  while (!out.count.empty() && out.count.back() == 0) {
+    out.count.pop_back();
+  }
+  if (!(after.max_us > before.max_us)) {  // the largest of all came before
+    out.max_us = static_cast<double>(out.longer > 0 ? after.count.size() : out.count.size());
+  }
+  return out;
+}
+
 std::string json_of(const Result& r) {
   Json out{{"kind", "punctum-jitter"},
            {"rate_Hz", r.rate_Hz},
            {"seconds", r.seconds},
            {"cpu", r.cpu},
+           {"priority", r.priority},
            {"degraded", r.degraded},
            {"missing", r.missing},
            {"ticks", r.ticks},
@@ -123,9 +145,12 @@ std::string json_of(const Result& r) {
            {"wake_us", with_quantiles(r.wake)},
            {"tick_us", with_quantiles(r.tick)},
            {"interval_us", with_quantiles(r.interval)},
-           {"page_faults", {{"minor", r.minor_faults}, {"major", r.major_faults}}},
-           {"switches", {{"voluntary", r.voluntary_switches}, {"involuntary", r.involuntary_switches}}},
-           {"migrations", r.migrations},
+           {"first_release_ns", r.first_release_ns},
+           {"page_faults", {{"minor", json_of(r.minor_faults)}, {"major", json_of(r.major_faults)}}},
+           {"switches",
+            {{"voluntary", json_of(r.voluntary_switches)}, {"involuntary", json_of(r.involuntary_switches)}}},
+           {"migrations", json_of(r.migrations)},
+           {"smis", json_of(r.smis)},
            {"work", r.work},
            {"load", r.load},
            {"machine", r.machine}};
@@ -167,6 +192,7 @@ tl::expected<Result, std::string> result_of_json(std::string_view text) {
     r.rate_Hz = number<double>(in, "rate_Hz");
     r.seconds = number<double>(in, "seconds");
     r.cpu = number<int>(in, "cpu");
+    r.priority = in.contains("priority") ? number<int>(in, "priority") : 0;
     r.degraded = in.at("degraded").get<bool>();
     r.ticks = number<std::uint64_t>(in, "ticks");
     r.missed = number<std::uint64_t>(in, "missed");
@@ -219,7 +245,7 @@ std::string quantile_line(const char* name, const Distribution& d) {
     const bool told = static_cast<double>(d.entries()) * (1 - part) >= 1;
     out += told ? fmt::format("{:>9.1f}", d.quantile_us(part)) : fmt::format("{:>9}", "-");
   }
-  return out + fmt::format("{:>9.1f}\n", d.max_us);
+  return out + (d.entries() > 0 ? fmt::format("{:>9.1f}\n", d.max_us) : fmt::format("{:>9}\n", "-"));
 }
 
 // One line per class of latency, classes a quarter of an octave wide; the bars are as long as the logarithm
@@ -328,12 +354,14 @@ std::string summary(const Result& r, int columns) {
            fmt::format("answer: {}; {} of them, least {:.1f} us, {} without one\n", r.answered,
                        r.answer.entries(), r.answer_min_us, r.unanswered);
   }
-  out +=
-      fmt::format("page faults {} minor, {} major; switches {} voluntary, {} involuntary; migrations {}\n",
-                  r.minor_faults, r.major_faults, r.voluntary_switches, r.involuntary_switches, r.migrations);
+  out += fmt::format(
+      "page faults {} minor, {} major; switches {} voluntary, {} involuntary; migrations {}; SMIs {}\n",
+      text_of(r.minor_faults), text_of(r.major_faults), text_of(r.voluntary_switches),
+      text_of(r.involuntary_switches), text_of(r.migrations), text_of(r.smis));
   if (!r.spikes.empty()) {
-    out += fmt::format("worst wake-up {:.1f} us, {:.3f} s after the first tick\n", r.spikes.back().wake_us,
-                       r.spikes.back().t_s);
+    const Spike& worst = r.spikes.back();
+    out += fmt::format("worst wake-up {:.1f} us late at {:.4f} s, {:.4f} s on the kernel's clock\n",
+                       worst.wake_us, worst.t_s, 1e-9 * static_cast<double>(r.first_release_ns) + worst.t_s);
   }
   out += late_text(r);
   out += "wake-up, us        count (bars: logarithm)\n" + bars(r.wake, columns);

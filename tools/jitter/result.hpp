@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <tl/expected.hpp>
@@ -26,15 +27,21 @@ struct Distribution {
   [[nodiscard]] double quantile_us(double part) const;
 };
 
+// What a growing distribution holds more than it held before; after: with all its bins, be they empty. Of
+// what is longer than the bins but not than all before it is not told how long: max_us is the end of the
+// bins then.
+[[nodiscard]] Distribution since(const Distribution& before, const Distribution& after);
+
 // A wake-up that was later than all before it.
 struct Spike {
-  double t_s = 0;  // since the first tick
+  double t_s = 0;  // of the release that it slept for, since the first one
   double wake_us = 0;
 };
 
 struct Result {
   double rate_Hz = 0, seconds = 0;
   int cpu = -1;
+  int priority = 0;                  // of SCHED_FIFO; 0: none
   bool degraded = false;             // a right that real time needs is missing
   std::vector<std::string> missing;  // which
   std::uint64_t ticks = 0, missed = 0;
@@ -47,8 +54,11 @@ struct Result {
   double answer_min_us = 0;
   std::uint64_t unanswered = 0;
   std::vector<Spike> spikes;
-  std::uint64_t minor_faults = 0, major_faults = 0, voluntary_switches = 0, involuntary_switches = 0;
-  std::uint64_t migrations = 0, allocations = 0;
+  // Of the loop's thread while it was measured, system management interrupts of the machine; empty where the
+  // kernel or the processor does not tell.
+  std::optional<std::uint64_t> minor_faults, major_faults, voluntary_switches, involuntary_switches;
+  std::optional<std::uint64_t> migrations, smis;
+  std::uint64_t allocations = 0;
   bool allocations_watched = false;
   // Wake-ups of equal parts of the measurement: what differs between them is not the machine's.
   std::vector<Distribution> parts;
@@ -56,13 +66,13 @@ struct Result {
   // Ticks that ended too late, each with its cause; of so many more there was no room or no time to tell.
   std::vector<tools::late::Explained> explained;
   std::uint64_t unexplained = 0;
-  std::int64_t first_release_ns = 0;
-  std::string untraced;  // why the kernel's trace could not be asked
-  std::string trace;     // of the last explained tick
-  bool broke = false;    // a wake-up was too late and ended it
-  std::string work;      // that each tick did; empty: nothing
-  std::string load;      // that ran beside it; empty: none of ours
-  std::string machine;   // kernel, processor, boot line: two results with the same text are comparable
+  std::int64_t first_release_ns = 0;  // CLOCK_MONOTONIC, as the kernel's log and trace tell it
+  std::string untraced;               // why the kernel's trace could not be asked
+  std::string trace;                  // of the last explained tick
+  bool broke = false;                 // a wake-up was too late and ended it
+  std::string work;                   // that each tick did; empty: nothing
+  std::string load;                   // that ran beside it; empty: none of ours
+  std::string machine;  // kernel, processor, boot line: two results with the same text are comparable
 };
 
 [[nodiscard]] std::string json_of(const Result& result);

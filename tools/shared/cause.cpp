@@ -14,6 +14,15 @@
 #include <utility>
 
 namespace punctum::tools::late {
+
+std::optional<std::uint64_t> rise(const std::optional<std::uint64_t>& before,
+                                  const std::optional<std::uint64_t>& after) {
+  if (!before || !after || *after < *before) {
+    return std::nullopt;
+  }
+  return *after - *before;
+}
+
 namespace {
 
 constexpr std::int64_t kNs = 1000;           // the trace tells whole microseconds
@@ -372,14 +381,6 @@ std::string the_largest(const std::map<Key, std::int64_t>& ns, std::int64_t all)
   return fmt::format("of {} us: {}", all / kNs, out);
 }
 
-std::optional<std::uint64_t> rise(const std::optional<std::uint64_t>& before,
-                                  const std::optional<std::uint64_t>& after) {
-  if (!before || !after || *after < *before) {
-    return std::nullopt;
-  }
-  return *after - *before;
-}
-
 constexpr std::int64_t kMs_ns = 1'000'000, kShort_ns = 100 * kMs_ns;
 
 // Taken from the processor on which the loop was before and after.
@@ -596,18 +597,6 @@ std::string whole_text(const std::string& path) {
   return text.str();
 }
 
-// The count of system management interrupts of processor 0, where an Intel processor shows it.
-std::optional<std::uint64_t> smi_count() {
-  constexpr off_t kMsrSmiCount = 0x34;
-  const int fd = open("/dev/cpu/0/msr", O_RDONLY | O_CLOEXEC);
-  std::uint64_t count = 0;
-  const bool read = fd >= 0 && pread(fd, &count, sizeof count, kMsrSmiCount) == sizeof count;
-  if (fd >= 0) {
-    (void)close(fd);
-  }
-  return read ? std::optional(count & 0xffffffffU) : std::nullopt;
-}
-
 // What stands after "NAME   : " in ms with six decimals, from `at` on.
 std::optional<std::uint64_t> clock_ns(std::string_view text, std::size_t at, std::string_view name) {
   at = text.find(name, at);
@@ -639,6 +628,17 @@ std::optional<std::uint64_t> between_clocks_ns(std::string_view text, int cpu) {
 }
 
 }  // namespace
+
+std::optional<std::uint64_t> smi_count() {
+  constexpr off_t kMsrSmiCount = 0x34;
+  const int fd = open("/dev/cpu/0/msr", O_RDONLY | O_CLOEXEC);
+  std::uint64_t count = 0;
+  const bool read = fd >= 0 && pread(fd, &count, sizeof count, kMsrSmiCount) == sizeof count;
+  if (fd >= 0) {
+    (void)close(fd);
+  }
+  return read ? std::optional(count & 0xffffffffU) : std::nullopt;
+}
 
 Counters read_counters(int pid, int tid, const std::string& proc, const std::string& scheduler) {
   Counters c;

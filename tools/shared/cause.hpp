@@ -74,6 +74,12 @@ struct Counters {
 [[nodiscard]] Counters read_counters(int pid, int tid, const std::string& proc = "/proc",
                                      const std::string& scheduler = "");
 
+// By how much a count rose; empty where either is not told, or it fell.
+[[nodiscard]] std::optional<std::uint64_t> rise(const std::optional<std::uint64_t>& before,
+                                                const std::optional<std::uint64_t>& after);
+// System management interrupts of processor 0 so far, where an Intel processor shows them to root.
+[[nodiscard]] std::optional<std::uint64_t> smi_count();
+
 // What does not change while one looks.
 struct Surroundings {
   bool virtual_machine = false;

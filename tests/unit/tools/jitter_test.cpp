@@ -70,6 +70,17 @@ TEST(Distribution, tells_quantiles_within_a_bin_of_the_sorted_values) {
   EXPECT_EQ(Distribution{}.quantile_us(0.5), 0);
 }
 
+TEST(Distribution, of_a_part_knows_no_maximum_of_another) {
+  const Distribution first = of({3, 5, 250}, 100), both = of({3, 5, 250, 7, 130}, 100);
+  Distribution part = since(first, both);
+  EXPECT_EQ(part.entries(), 2U);
+  EXPECT_EQ(part.longer, 1U);
+  EXPECT_EQ(part.max_us, 100) << "it was longer than the bins, and nobody knows by how much";
+  part = since(first, of({3, 5, 250, 7}, 100));
+  EXPECT_EQ(part.max_us, 8);
+  EXPECT_EQ(since(first, of({3, 5, 250, 310}, 100)).max_us, 310);
+}
+
 // Sixty parts whose latencies hang together: each has a level of its own, of which the next one keeps a
 // share. tail_us is added to the latest 3 %.
 Result measured(unsigned seed, double tail_us = 0, double all_us = 0, double kept = 0) {
@@ -675,6 +686,7 @@ class Paused {
   }
   punctum::rt::After tick(const punctum::rt::Tick& tick) noexcept {
     slept_ns = ticks++ == 0 ? 0 : tick.wake_ns - last_ns;
+    slept_from_ns = last_ns;
     // A pause within a tick is not a late wake-up: then another one.
     if (ends_loop && tick.late_ns >= kPause_ms * 500'000LL) {
       return punctum::rt::After::end;
@@ -685,7 +697,7 @@ class Paused {
     last_ns = std::chrono::steady_clock::now().time_since_epoch().count();
     return punctum::rt::After::go_on;
   }
-  std::int64_t slept_ns = 0, last_ns = 0;
+  std::int64_t slept_ns = 0, slept_from_ns = 0, last_ns = 0;
   std::uint64_t ticks = 0;
   bool ends_loop = true;  // the loop, with the first late wake-up
 
@@ -710,7 +722,11 @@ TEST(Measurement, tells_a_wake_up_later_than_many_periods_from_the_release_it_sl
   EXPECT_GE(result->wake.longer, 1U);
   ASSERT_FALSE(result->spikes.empty());
   if (result->spikes.size() < 64) {
-    EXPECT_NEAR(result->spikes.back().wake_us, result->wake.max_us, 1e-6);
+    const Spike& worst = result->spikes.back();
+    EXPECT_NEAR(worst.wake_us, result->wake.max_us, 1e-6);
+    // The release that it slept for came soon after it had gone to sleep.
+    EXPECT_NEAR(static_cast<double>(result->first_release_ns) + 1e9 * worst.t_s,
+                static_cast<double>(paused.slept_from_ns), 1e3 * kPeriod_us);
   }
 }
 

@@ -253,6 +253,11 @@ int main_or_throw(int argc, char** argv) {
   if (audit_option->count() == 0 && !plan_folder.empty()) {
     return bad("--plan: allowed with --audit");
   }
+  if (audit_option->count() > 0 &&
+      (loaded || beside || !station.empty() || !gpio.empty() || !tick.empty() || wanted.explain_us > 0 ||
+       wanted.break_us > 0 || !files.histogram.empty() || !files.json.empty() || !files.picture.empty())) {
+    return bad("--audit: measures nothing, allowed with --cpu, --priority and --plan");
+  }
   if (audit_option->count() > 0) {
     std::optional<tools::Scene> scene;
     if (!audited.empty()) {

@@ -247,6 +247,7 @@ struct Account {
   std::map<Key, std::int64_t> ns;
   int faults = 0;
   bool whole = true;  // the trace reaches back to the beginning
+  int cpu = -1;       // where the loop ran at the end of the tick
 };
 
 // Adds what `cpu` did from `from` to `to`. timer_due: the loop's timer is due and has not come.
@@ -365,6 +366,7 @@ Account account_of(const Episode& tick, const std::vector<TraceEvent>& events) {
     }
   }
   until(cpu, tick.end_ns, false);
+  account.cpu = cpu;
   return account;
 }
 
@@ -393,24 +395,27 @@ std::int64_t stolen_ns(const Counters& before, const Counters& after) {
       rise(before.stolen_ns, after.stolen_ns).value_or(static_cast<std::uint64_t>(steps_ms * kMs_ns)));
 }
 
-std::string told_as_stolen(std::int64_t ns) { return fmt::format("{} us counted as steal", ns / kNs); }
+std::string told_as_stolen(std::int64_t ns, const Counters& after) {
+  return fmt::format("{} us counted as steal{}", ns / kNs, after.stolen_ns ? "" : ", in steps of 10 ms");
+}
 
 // Time in which the processor did nothing that its kernel knows of.
 Verdict explain_silence(std::int64_t silent_ns, const Counters& before, const Counters& after,
                         const Surroundings& surroundings) {
   Verdict v;
   v.us = 1e-3 * static_cast<double>(silent_ns);
-  if (rise(before.smis, after.smis).value_or(0) > 0) {
+  // In a long interval they may have been another tick's.
+  const bool short_interval = after.t_ns - before.t_ns <= kShort_ns;
+  if (const std::uint64_t smis = rise(before.smis, after.smis).value_or(0); smis > 0 && short_interval) {
     v.cause = Cause::smi;
-    v.what = fmt::format("{} counted", *after.smis - *before.smis);
+    v.what = fmt::format("{} counted within {} ms around it", smis, (after.t_ns - before.t_ns) / kMs_ns);
     v.proof = Proof::counted;
     return v;
   }
-  // In a long interval it may have been another tick's.
   const std::int64_t stolen = stolen_ns(before, after);
-  if (2 * stolen >= silent_ns && after.t_ns - before.t_ns <= kShort_ns) {
+  if (2 * stolen >= silent_ns && short_interval) {
     v.cause = Cause::stolen_time;
-    v.what = told_as_stolen(stolen);
+    v.what = told_as_stolen(stolen, after);
     v.proof = Proof::counted;
     return v;
   }
@@ -419,7 +424,7 @@ Verdict explain_silence(std::int64_t silent_ns, const Counters& before, const Co
     v.what += "interrupts switched off, the firmware or the way out of a sleep";
   } else if (after.stolen_ns) {
     v.what += fmt::format("work of the hypervisor, or interrupts switched off; {} within {} ms around it",
-                          told_as_stolen(stolen), (after.t_ns - before.t_ns) / kMs_ns);
+                          told_as_stolen(stolen, after), (after.t_ns - before.t_ns) / kMs_ns);
   } else {
     v.what += "the hypervisor, whose stolen time is counted in steps of 10 ms, or interrupts switched off";
   }
@@ -492,7 +497,8 @@ Verdict explain(const Episode& tick, const std::vector<TraceEvent>& events, cons
     const std::int64_t ns = own->second;
     Key inside{Cause::own_computing, "slot " + tick.slot};
     const bool changed = std::any_of(events.begin(), events.end(), [&](const TraceEvent& e) {
-      return e.name == "cpu_frequency" && e.t_ns >= tick.release_ns && e.t_ns <= tick.end_ns;
+      return e.name == "cpu_frequency" && number(e.args, "cpu_id") == account.cpu &&
+             e.t_ns >= tick.release_ns && e.t_ns <= tick.end_ns;
     });
     if (account.faults > 0 && ns / account.faults <= kFault_ns) {
       inside = {Cause::page_fault, fmt::format("{} in slot {}", account.faults, tick.slot)};
@@ -527,9 +533,18 @@ Verdict explain(const Episode& tick, const std::vector<TraceEvent>& events, cons
   v.what = largest->what;
   v.us = 1e-3 * static_cast<double>(most->second);
   v.proof = Proof::traced;
-  // A trace cannot tell a tick that computes from one whose processor was taken away.
-  if (v.cause == Cause::own_computing && 2 * stolen_ns(before, after) >= most->second) {
-    return explain_silence(most->second, before, after, surroundings);
+  // A trace cannot tell what runs from what would run if its processor had not been taken away. Steps of 10
+  // ms are too coarse to say that of an interrupt or another thread.
+  const bool to_the_ns = before.stolen_ns && after.stolen_ns;
+  if ((v.cause == Cause::own_computing || to_the_ns) && 2 * stolen_ns(before, after) >= most->second) {
+    Verdict taken = explain_silence(most->second, before, after, surroundings);
+    if (v.cause == Cause::own_computing) {
+      return taken;
+    }
+    if (taken.cause == Cause::stolen_time) {
+      taken.what += fmt::format(", during {} {}", name_of(v.cause), v.what);
+      return taken;
+    }
   }
   return v;
 }
@@ -553,11 +568,10 @@ Verdict explain(const Episode& tick, const Counters& before, const Counters& aft
     v.what = fmt::format("nobody looked for {} ms around it", (after.t_ns - before.t_ns) / kMs_ns);
     return v;
   }
-  if (rise(before.smis, after.smis).value_or(0) > 0) {
-    v.cause = Cause::smi;
-  } else if (at_least_half(stolen)) {
+  const std::uint64_t smis = rise(before.smis, after.smis).value_or(0);
+  if (at_least_half(stolen)) {
     v.cause = Cause::stolen_time;
-    v.what = told_as_stolen(stolen);
+    v.what = told_as_stolen(stolen, after);
   } else if (waited > 0 && at_least_half(waited)) {
     v.cause = Cause::preemption;
     v.what =
@@ -565,6 +579,9 @@ Verdict explain(const Episode& tick, const Counters& before, const Counters& aft
   } else if (at_least_half(computed) && did_run && faults > 0) {
     v.cause = Cause::page_fault;
     v.what = fmt::format("{} major among {}", after.major_faults - before.major_faults, faults);
+  } else if (smis > 0) {  // it makes a wake-up late, or a slot long
+    v.cause = Cause::smi;
+    v.what = fmt::format("{} counted within {} ms around it", smis, (after.t_ns - before.t_ns) / kMs_ns);
   } else if (at_least_half(computed) && at_least_half(tick.slot_ns) && did_run) {
     v.cause = Cause::own_computing;
     v.what = "slot " + tick.slot;

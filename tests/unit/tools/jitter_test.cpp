@@ -870,6 +870,41 @@ TEST(CauseOfALateTick, is_silence_that_only_a_counter_names) {
       << "a step of earlier ticks";
   after.smis = 1;
   EXPECT_EQ(cause_of(late(490, 495), trace, at(99.99), after).cause, Cause::smi);
+  EXPECT_EQ(cause_of(late(490, 495), trace, at(99.8), after).cause, Cause::unknown)
+      << "another tick's, perhaps";
+}
+
+TEST(CauseOfALateTick, is_the_hypervisor_that_took_the_processor_during_an_interrupt) {
+  const std::string trace =
+      kAsleep +
+      "          <idle>-0       [001] d.h1.    99.999990: local_timer_entry: vector=236\n"
+      "          <idle>-0       [001] d.h1.   100.000380: local_timer_exit: vector=236\n"
+      "          <idle>-0       [001] d.h3.   100.000385: sched_waking: comm=punctum-core pid=70 prio=19 "
+      "target_cpu=001\n" +
+      runs_from("000390");
+  Counters before = at(99.99), after = at(100.01);
+  EXPECT_EQ(cause_of(late(400, 405), trace, before, after).cause, Cause::interrupt);
+  before.stolen_ns = 5'000;
+  after.stolen_ns = 5'000 + 350'000;
+  const Verdict taken = cause_of(late(400, 405), trace, before, after);
+  EXPECT_EQ(taken.cause, Cause::stolen_time);
+  EXPECT_NE(taken.what.find("during interrupt"), std::string::npos) << taken.what;
+  after.stolen_ns = 5'000 + 30'000;
+  EXPECT_EQ(cause_of(late(400, 405), trace, before, after).cause, Cause::interrupt);
+  before.stolen_ns = after.stolen_ns = std::nullopt;
+  after.stolen_ms = 10;
+  EXPECT_EQ(cause_of(late(400, 405), trace, before, after).cause, Cause::interrupt)
+      << "a step of 10 ms may be another tick's";
+}
+
+TEST(CauseOfALateTick, is_a_change_of_frequency_only_of_its_own_processor) {
+  for (const int cpu : {0, 1}) {
+    const Verdict v = cause_of(late(10, 900), kAsleep + kWoken + runs_from("000008") +
+                                                  "          kworker-5      [000] .....   100.000100: "
+                                                  "cpu_frequency: state=1200000 cpu_id=" +
+                                                  std::to_string(cpu) + "\n");
+    EXPECT_EQ(v.cause, cpu == 1 ? Cause::frequency : Cause::own_computing);
+  }
 }
 
 TEST(CauseOfALateTick, is_unknown_where_the_trace_begins_after_it_or_nothing_took_half) {
@@ -906,6 +941,14 @@ TEST(CauseOfALateTick, by_counters_alone_is_told_only_where_they_suffice) {
                  c.major_faults = 1;
                }),
             Cause::page_fault);
+  EXPECT_EQ(by(late(900, 905), [](Counters& c) { c.smis = 1; }), Cause::smi);
+  EXPECT_EQ(by(late(900, 905),
+               [](Counters& c) {
+                 c.waited_ns = 800'000;
+                 c.smis = 1;
+               }),
+            Cause::preemption)
+      << "an SMI elsewhere in these 20 ms";
 }
 
 TEST(CountersOfAThread, are_read_where_the_kernel_keeps_them) {

@@ -1,7 +1,7 @@
 // Nothing on the heap, no page fault and a shallow stack in every tick of whole simulated injections: with
 // every force effect, and with each failure that a simulated device can have (hal/sim/failures.hpp) during
-// the indentation and in the cell. The linker puts this file's function in the place of Servo::tick; it
-// watches, and calls it.
+// the indentation and in the cell; and of a servo that latches what no single device of them causes. The
+// linker puts this file's function in the place of Servo::tick; it watches, and calls it.
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <pthread.h>
@@ -23,6 +23,7 @@
 #include "hal/sim/failures.hpp"
 #include "rt/platform/allocation_trap.hpp"
 #include "rt/platform/real_time_rights.hpp"
+#include "tests/support/servo_bench.hpp"
 #include "tools/report/tick_tape.hpp"
 
 namespace punctum::rt {
@@ -177,10 +178,62 @@ TEST(WatchedTicks, nor_does_one_with_any_failure_of_a_device) {
       }
     }
   }
+  faults.erase(Fault::none);
   std::printf("%zu runs, %llu ticks, %zu different faults, stack %zu bytes\n", runs,
               static_cast<unsigned long long>(ticks), faults.size(), deepest);
   EXPECT_GT(runs, 150U);
-  EXPECT_GE(faults.size(), 10U);
+  for (const Fault fault : {Fault::estop, Fault::estop_lost, Fault::hand_lost, Fault::hand_invalid,
+                            Fault::stage_lost, Fault::stage_fault, Fault::stage_following, Fault::tip_force,
+                            Fault::vacuum_lost, Fault::injector_open}) {
+    EXPECT_TRUE(faults.count(fault)) << name(fault);
+  }
+}
+
+// The other faults, but for not_finite: no input makes a force that is no number.
+TEST(WatchedTicks, nor_does_a_stop_for_what_takes_more_than_one_device) {
+  using test::Bench;
+  struct Case {
+    Fault latched;
+    std::function<void(Bench&)> happens;
+  };
+  const auto contacts = [](Bench& b, bool closed_a, bool closed_b) {
+    b.estop.state.contact_a_closed = closed_a;
+    b.estop.state.contact_b_closed = closed_b;
+  };
+  const std::vector<Case> cases{
+      {Fault::estop_discrepancy, [&](Bench& b) { contacts(b, false, true); }},
+      {Fault::overrun, [](Bench& b) { b.missed = 21; }},
+      {Fault::command_stop, [](Bench& b) { b.servo->request_stop(); }},
+      {Fault::stage_not_stopping,
+       [&](Bench& b) {
+         contacts(b, false, false);
+         b.stage.ignores_stop = true;
+       }},
+      {Fault::stage_not_enabled, [](Bench&) {}},
+      {Fault::enabling_released, [](Bench& b) { b.enabling.hold(false); }},
+      {Fault::enabling_fault, [](Bench& b) { b.enabling.state = {.contact_a_closed = true}; }},
+  };
+  for (const Case& c : cases) {
+    std::uint64_t latched = 0;
+    const Watched w = watch([&] {
+      ServoConfig config = test::icsi();
+      config.real_actuators = true;
+      config.enabling.emplace();
+      Bench b(config, true, true);
+      b.stage.readings.reserve(10'000);  // the fake's own book-keeping
+      b.stage.commanded.reserve(10'000);
+      b.stage.never_enables = c.latched == Fault::stage_not_enabled;
+      b.run(0.1);
+      b.enabling.hold(true);
+      b.run(1);
+      EXPECT_EQ(b.servo->fault(), Fault::none) << name(c.latched);
+      c.happens(b);
+      b.run(b.stage.never_enables ? 5 : 1);
+      latched = b.station->core.status.faults_latched.load();
+    });
+    expect_nothing(w);
+    EXPECT_NE(latched >> static_cast<int>(c.latched) & 1U, 0U) << name(c.latched);
+  }
 }
 
 TEST(WatchedTicks, what_is_planted_is_seen) {

@@ -201,7 +201,7 @@ int main_or_throw(int argc, char** argv) {
   app.add_option("--tick", tick,
                  "empty, or servo and a scene: everything that the core does in a tick, on simulated devices "
                  "(default: empty; of servo: icsi)")
-      ->type_name("KIND [SCENE]")
+      ->type_name("empty|servo [SCENE]")
       ->expected(1, 2);
   app.add_option("--explain", wanted.explain_us,
                  "name the cause of every tick that ends later than this, by the kernel's trace")

@@ -36,9 +36,9 @@ class PlainHelp : public CLI::Formatter {
          app->get_options([](const CLI::Option* one) { return one->get_positional(); })) {
       usage += " " + o->get_name(true) + (o->get_expected_max() > 1 ? "..." : "");
     }
-    usage +=
-        app->get_subcommands([](const CLI::App*) { return true; }).empty() ? " [options]" : " COMMAND ...";
-    return usage + "\n";
+    const bool commands = !app->get_subcommands([](const CLI::App*) { return true; }).empty();
+    const bool alone = app->get_require_subcommand_min() == 0;  // it does something without a command
+    return usage + (!commands ? " [options]" : alone ? " [options] [COMMAND ...]" : " COMMAND ...") + "\n";
   }
 };
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <deque>
@@ -111,7 +112,9 @@ std::vector<TickTold> record_ticks(const tools::Scene& scene, double seconds) {
   return tape;
 }
 
-rt::Fault replay_ticks(const tools::Scene& scene, const std::vector<TickTold>& tape) {
+// tick: runs the servo for one.
+template <class Tick>
+rt::Fault play(const tools::Scene& scene, const std::vector<TickTold>& tape, Tick tick) {
   TapedDevices devices;
   const auto station = std::make_unique<rt::LocalStation>();
   const auto servo = std::make_unique<rt::Servo>(scene.servo, devices_of(scene, devices), station->station);
@@ -120,9 +123,24 @@ rt::Fault replay_ticks(const tools::Scene& scene, const std::vector<TickTold>& t
     if (told.observed) {
       station->observation.slot.push(told.observation);
     }
-    replay_tick(*servo, tick_info(told.input, 1 / scene.servo.rate_Hz));
+    tick(*servo, tick_info(told.input, 1 / scene.servo.rate_Hz));
   }
   return servo->fault();
+}
+
+rt::Fault replay_ticks(const tools::Scene& scene, const std::vector<TickTold>& tape) {
+  return play(scene, tape, replay_tick);
+}
+
+std::vector<std::int64_t> time_ticks(const tools::Scene& scene, const std::vector<TickTold>& tape) {
+  std::vector<std::int64_t> took_ns;
+  took_ns.reserve(tape.size());
+  (void)play(scene, tape, [&](rt::Servo& servo, const rt::TickInfo& now) {
+    const auto from = std::chrono::steady_clock::now();
+    replay_tick(servo, now);
+    took_ns.push_back(std::chrono::nanoseconds(std::chrono::steady_clock::now() - from).count());
+  });
+  return took_ns;
 }
 
 tl::expected<void, std::string> write_tape(const std::string& path, const std::vector<TickTold>& tape) {

@@ -30,6 +30,11 @@ static_assert(std::is_trivially_copyable_v<TickTold>);
 // recording.
 [[nodiscard]] rt::Fault replay_ticks(const tools::Scene& scene, const std::vector<TickTold>& tape);
 
+// The same, back to back, with how long each tick took by the machine's clock, ns; what reading the clock
+// takes is in it.
+[[nodiscard]] std::vector<std::int64_t> time_ticks(const tools::Scene& scene,
+                                                   const std::vector<TickTold>& tape);
+
 [[nodiscard]] tl::expected<void, std::string> write_tape(const std::string& path,
                                                          const std::vector<TickTold>& tape);
 [[nodiscard]] tl::expected<std::vector<TickTold>, std::string> read_tape(const std::string& path);

@@ -1,6 +1,10 @@
 // From an input of the machine to its output through the loop of the core, behind real kernel drivers: a GPIO
 // line to a GPIO line, the Falcon's encoders to its motors. And what the audit says of those drivers.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <pthread.h>
+#include <sched.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdio>
@@ -8,6 +12,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -83,6 +88,43 @@ TEST(AnswerLoopback, goes_from_edge_to_edge_within_a_period_and_a_tick) {
 
 TEST(AnswerLoopback, comes_sooner_where_the_loop_is_faster) {
   expect_answer_by_the_next_tick(gpio_answers(4000));
+}
+
+// As on the command line: four lines, two of which are wires' ends; the wires are a thread that carries
+// levels from line to line.
+constexpr int kAsk = 2, kSeen = 3;
+
+TEST(AnswerLoopback, goes_over_four_lines_of_a_chip) {
+  const GpioSim board;
+  std::jthread wires([&board](const std::stop_token& over) {
+    const sched_param above_who_asks{.sched_priority = 2};
+    EXPECT_EQ(pthread_setschedparam(pthread_self(), SCHED_FIFO, &above_who_asks), 0);
+    emulator::WatchedLevel ask(board.value_file(kAsk)), out(board.value_file(kOut));
+    bool at_in = false, at_seen = false;
+    while (!over.stop_requested()) {
+      if (ask.level() != at_in) {
+        board.drive(kIn, at_in = !at_in);
+      }
+      if (out.level() != at_seen) {
+        board.drive(kSeen, at_seen = !at_seen);
+      }
+      usleep(20);
+    }
+  });
+  const auto result = jitter::measure_gpio_answers(
+      at_rate(1000), fmt::format("{}:{},{},{},{}", board.path(), kIn, kOut, kAsk, kSeen));
+  ASSERT_TRUE(result) << result.error();
+  std::printf("%s\n", jitter::summary(*result, 100).c_str());
+  expect_answer_by_the_next_tick(*result);
+}
+
+TEST(AnswerLoopback, comes_never_where_no_wire_is) {
+  const GpioSim board;
+  const auto result = jitter::measure_gpio_answers(
+      at_rate(1000), fmt::format("{}:{},{},{},{}", board.path(), kIn, kOut, kAsk, kSeen));
+  ASSERT_TRUE(result) << result.error();
+  EXPECT_EQ(result->answer.entries(), 0U);
+  EXPECT_GT(result->unanswered, 5U);
 }
 
 // The grip jumps from one side to the other; a spring of the loop pushes it back.

@@ -74,6 +74,34 @@ Finding swap_areas(const std::string& root) {
   return f;
 }
 
+// Those that a CPU serves now: "24 (eth0-rx)".
+std::vector<std::string> interrupts_on(int cpu, const std::string& root) {
+  std::vector<std::pair<int, std::string>> found;
+  std::error_code none;
+  for (const auto& irq : std::filesystem::directory_iterator(root + "/proc/irq", none)) {
+    const std::string number = irq.path().filename().string();
+    if (number.find_first_not_of("0123456789") != std::string::npos) {
+      continue;
+    }
+    const std::vector<int> served = rt::parse_cpu_list(line_of(irq.path() / "effective_affinity_list"));
+    if (std::find(served.begin(), served.end(), cpu) == served.end()) {
+      continue;
+    }
+    for (const auto& handler : std::filesystem::directory_iterator(irq.path(), none)) {
+      if (handler.is_directory(none)) {
+        found.emplace_back(std::stoi(number),
+                           fmt::format("{} ({})", number, handler.path().filename().string()));
+      }
+    }
+  }
+  std::sort(found.begin(), found.end());
+  std::vector<std::string> out;
+  for (auto& [number, text] : found) {
+    out.push_back(std::move(text));
+  }
+  return out;
+}
+
 // Interrupts that may be served on the loop's CPU.
 Finding interrupts(int cpu, const std::string& others, const std::string& root) {
   const std::string allowed = line_of(root + "/proc/irq/default_smp_affinity");
@@ -99,6 +127,12 @@ Finding interrupts(int cpu, const std::string& others, const std::string& root) 
   } else if (served) {
     f.remedy = fmt::format("boot with irqaffinity={}", others);
     f.mend.boot = "irqaffinity=" + others;
+  } else if (const std::vector<std::string> here = interrupts_on(cpu, root); !here.empty()) {
+    f.found += fmt::format("; yet CPU {} serves {}", cpu, fmt::join(here, ", "));
+    f.remedy = fmt::format(
+        "echo {} > /proc/irq/NUMBER/smp_affinity_list; one that the kernel refuses to move is "
+        "kept away by isolcpus=managed_irq,{}",
+        others, cpu);
   }
   return f;
 }

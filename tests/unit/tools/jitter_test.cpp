@@ -312,6 +312,16 @@ TEST_F(FileMachine, is_told_what_is_not_ready_and_what_mends_it) {
   EXPECT_NE(finding("interrupts elsewhere", 32).remedy, "");
   EXPECT_EQ(finding("interrupts elsewhere", 4).remedy, "");
   EXPECT_EQ(finding("interrupts elsewhere", 64).remedy, "");
+  // Some are there already, or cannot be moved.
+  file("proc/irq/24/effective_affinity_list", "4\n");
+  file("proc/irq/24/eth0-rx/x", "");
+  file("proc/irq/25/effective_affinity_list", "4\n");  // nobody handles it
+  file("proc/irq/26/effective_affinity_list", "3\n");
+  file("proc/irq/26/eth0-tx/x", "");
+  const Finding served = finding("interrupts elsewhere", 4);
+  EXPECT_NE(served.found.find("CPU 4 serves 24 (eth0-rx)"), std::string::npos) << served.found;
+  EXPECT_NE(served.remedy.find("echo 0-3,5-63 > /proc/irq/NUMBER/smp_affinity_list"), std::string::npos)
+      << served.remedy;
   EXPECT_NE(finding("interrupts elsewhere", -1).remedy, "");
 }
 

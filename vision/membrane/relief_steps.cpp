@@ -184,14 +184,14 @@ void ReliefSteps::go_downhill(Trial& here, Body body, double& step, int rounds) 
 // From a few places to begin at; from where the one leads that comes to lie lowest, on.
 ReliefSteps::Trial ReliefSteps::best_of(Body body) {
   constexpr std::array kOwn{-2.5, -1.0, 0.5};
-  constexpr double kBlur_px = 1.4, kStep_px = 0.5;
+  constexpr double kBlur_px = 1.4, kFirst_px = 0.5;
   constexpr int kRoundsOfEach = 3, kRoundsOfBest = 6;
   Trial best{{0, 0, 0}, 1e300};
   double step = 0;
   for (const double own : kOwn) {
     const cv::Vec3d from(own, kBlur_px, edge_.nearby ? edge_.nearby->at : 0);
     Trial here{from, cost_of(from, body)};
-    step = kStep_px;
+    step = kFirst_px;
     go_downhill(here, body, step, kRoundsOfEach);
     best = here.cost < best.cost ? here : best;
   }

@@ -3,18 +3,15 @@
 #pragma once
 
 #include <cstddef>
+#include <cstring>
 
 namespace punctum::vision {
 
 inline constexpr std::size_t kQuad = 4;
 using Quad = double __attribute__((vector_size(kQuad * sizeof(double))));
-using QuadInRow =
-    double __attribute__((vector_size(kQuad * sizeof(double)), aligned(sizeof(double)), may_alias));
 
-// The four that begin there.
-[[gnu::always_inline]] inline const QuadInRow& quad_at(const double* from) {
-  return *reinterpret_cast<const QuadInRow*>(from);
-}
+// Takes the four that begin there.
+[[gnu::always_inline]] inline void load(const double* from, Quad& to) { std::memcpy(&to, from, sizeof to); }
 
 [[gnu::always_inline]] inline double sum_of(const Quad& v) { return (v[0] + v[1]) + (v[2] + v[3]); }
 

@@ -79,7 +79,10 @@ const BlurredFace& blurred_face() {
 PUNCTUM_WIDE_LOOP double product_of(const double* a, const double* b, std::size_t many) {
   Quad sum{};
   for (std::size_t j = 0; j < many; j += kQuad) {
-    sum += quad_at(a + j) * quad_at(b + j);
+    Quad one, other;
+    load(a + j, one);
+    load(b + j, other);
+    sum += one * other;
   }
   return sum_of(sum);
 }

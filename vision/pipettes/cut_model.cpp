@@ -41,14 +41,21 @@ class RowProducts {
     std::array<Quad, N> mean{}, slope{}, seen{};
     std::array<std::array<Quad, N>, N> of_both{};
     for (std::size_t i = 0; i < row.lanes; i += kQuad) {
-      const Quad weight = quad_at(row.weight + i), tilt = quad_at(row.tilt + i), grey = quad_at(row.seen + i);
+      Quad weight, tilt, grey;
+      load(row.weight + i, weight);
+      load(row.tilt + i, tilt);
+      load(row.seen + i, grey);
+      std::array<Quad, N> each;
       for (std::size_t a = 0; a < N; ++a) {
-        const Quad here = quad_at(shown[a] + i), weighted = weight * here;
+        load(shown[a] + i, each[a]);
+      }
+      for (std::size_t a = 0; a < N; ++a) {
+        const Quad weighted = weight * each[a];
         mean[a] += weighted;
         slope[a] += tilt * weighted;
-        seen[a] += here * grey;
+        seen[a] += each[a] * grey;
         for (std::size_t b = a; b < N; ++b) {
-          of_both[a][b] += weighted * quad_at(shown[b] + i);
+          of_both[a][b] += weighted * each[b];
         }
       }
     }
@@ -85,7 +92,9 @@ PUNCTUM_WIDE_LOOP void multiply_three(const RowLanes& row, const std::array<cons
 PUNCTUM_WIDE_LOOP void from_table(const OfBlurs& table, const double* at, std::size_t many, double along,
                                   double tangent, double blur, double* out) {
   for (std::size_t i = 0; i < many; i += kQuad) {
-    const Quad blurs = (along - tangent * quad_at(at + i)) / blur;
+    Quad here;
+    load(at + i, here);
+    const Quad blurs = (along - tangent * here) / blur;
     const auto places = OfBlurs::places(blurs);
     for (std::size_t k = 0; k < kQuad; ++k) {
       out[i + k] = table.at_place(places[k]);

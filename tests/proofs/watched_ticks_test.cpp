@@ -189,7 +189,7 @@ TEST(WatchedTicks, nor_does_one_with_any_failure_of_a_device) {
   }
 }
 
-// The other faults, but for not_finite: no input makes a force that is no number.
+// The other faults, but for not_finite: no input of a device is known to make a force that is no number.
 TEST(WatchedTicks, nor_does_a_stop_for_what_takes_more_than_one_device) {
   using test::Bench;
   struct Case {

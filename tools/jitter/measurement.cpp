@@ -175,7 +175,7 @@ class LatestSeen {
   std::vector<Spike> spikes_;
 };
 
-std::string first_line(const char* path) {
+std::string first_line(const std::string& path) {
   std::ifstream in(path);
   std::string line;
   std::getline(in, line);
@@ -241,8 +241,8 @@ std::string machine(int cpu) {
   const std::string of_cpu = fmt::format("/sys/devices/system/cpu/cpu{}/", std::max(cpu, 0));
   std::string out = fmt::format("{}; {} x {}", m.kernel, m.cores, m.processor);
   for (const auto& [name, value] :
-       {std::pair("microcode", first_line((of_cpu + "microcode/version").c_str())),
-        std::pair("governor", first_line((of_cpu + "cpufreq/scaling_governor").c_str())),
+       {std::pair("microcode", first_line(of_cpu + "microcode/version")),
+        std::pair("governor", first_line(of_cpu + "cpufreq/scaling_governor")),
         std::pair("SMT", first_line("/sys/devices/system/cpu/smt/control")),
         std::pair("clock", first_line("/sys/devices/system/clocksource/clocksource0/current_clocksource")),
         std::pair("boot line:", first_line("/proc/cmdline"))}) {

@@ -192,7 +192,7 @@ tl::expected<Result, std::string> result_of_json(std::string_view text) {
     r.rate_Hz = number<double>(in, "rate_Hz");
     r.seconds = number<double>(in, "seconds");
     r.cpu = number<int>(in, "cpu");
-    r.priority = in.contains("priority") ? number<int>(in, "priority") : 0;
+    r.priority = number<int>(in, "priority");
     r.degraded = in.at("degraded").get<bool>();
     r.ticks = number<std::uint64_t>(in, "ticks");
     r.missed = number<std::uint64_t>(in, "missed");

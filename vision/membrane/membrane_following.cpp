@@ -107,16 +107,15 @@ std::optional<SeenOutline> refined(const MembraneSearch& search, const EdgePath&
         edge.other_flatness = other->edge.flatness;
       }
     }
+    if (surroundings.outermost && search.m.polarity == Polarity::relief) {
+      edge.in_shadow = search.picture.in_shadow_of_holder(contour);
+    } else {
+      edge.beside_line = search.band.hidden;
+    }
     if (surroundings.outermost) {
-      if (search.m.polarity == Polarity::relief) {
-        edge.in_shadow = search.picture.in_shadow_of_holder(contour);
-      } else {
-        edge.beside_line = search.band.hidden;
-      }
       edge.modes = kOuterModes;
       edge.nearby = {-wall, kWallTolerance * wall};
     } else {
-      edge.beside_line = search.band.hidden;
       edge.inside = 6;
       edge.outside = 5;
       edge.modes = kInnerModes;

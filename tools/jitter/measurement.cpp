@@ -67,6 +67,9 @@ class EmptyTick {
                            1e-3 * static_cast<double>(tick.late_ns)};
     }
     latest_ns_ = first_ ? tick.late_ns : std::max(latest_ns_, tick.late_ns);
+    if (tick.late_ns > latest_since_asked_ns_.load()) {
+      latest_since_asked_ns_.store(tick.late_ns);
+    }
     last_ns_ = now_ns;
     first_ = false;
     broke_ = broke_ || tick.late_ns > break_ns_;
@@ -74,6 +77,10 @@ class EmptyTick {
   }
   [[nodiscard]] const rt::TimeHistogram& interval() const { return interval_; }
   [[nodiscard]] bool broke() const { return broke_; }
+  // For another thread, live: the latest wake-up since it asked last.
+  [[nodiscard]] double latest_since_asked_us() {
+    return 1e-3 * static_cast<double>(latest_since_asked_ns_.exchange(0));
+  }
   [[nodiscard]] std::vector<Spike> spikes() const {
     return {spike_.begin(), spike_.begin() + static_cast<std::ptrdiff_t>(spikes_)};
   }
@@ -86,6 +93,7 @@ class EmptyTick {
   std::size_t spikes_ = 0;
   std::int64_t first_release_ns_ = 0, last_ns_ = 0, latest_ns_ = 0;
   std::int64_t break_ns_ = 0;
+  std::atomic<std::int64_t> latest_since_asked_ns_{0};
   bool first_ = true, broke_ = false;
 };
 
@@ -108,11 +116,12 @@ Distribution bins_of(const rt::TimeHistogram& histogram) {
 
 Distribution distribution_of(const rt::TimeHistogram& histogram) { return since({}, bins_of(histogram)); }
 
-// Copies the histogram of wake-ups at equal intervals, from an ordinary thread: it may be read live.
+// Copies the histogram of wake-ups at equal intervals, from an ordinary thread: it may be read live. tick:
+// tells how late the latest of a part was, beyond the bins, too; none: it is not known.
 class Parts {
  public:
-  Parts(const rt::CoreStatus& status, double seconds)
-      : status_(status), every_(seconds / kParts), before_(bins_of(status.wake)) {
+  Parts(const rt::CoreStatus& status, double seconds, EmptyTick* tick)
+      : status_(status), tick_(tick), every_(seconds / kParts), before_(bins_of(status.wake)) {
     thread_ = ordinary_thread([this] { watch(); });
   }
   // The parts; of the last one nothing is told unless it was whole.
@@ -137,13 +146,18 @@ class Parts {
       } else if (now >= due) {
         due += std::chrono::duration_cast<Clock::duration>(every_);
         Distribution all = bins_of(status_.wake);
-        parts_.push_back(since(before_, all));
+        Distribution& part = parts_.emplace_back(since(before_, all));
+        const double latest_us = tick_ != nullptr ? tick_->latest_since_asked_us() : 0;
+        if (part.longer > 0) {
+          part.max_us = std::max(part.max_us, latest_us);
+        }
         before_ = std::move(all);
       }
     }
   }
 
   const rt::CoreStatus& status_;
+  EmptyTick* tick_;
   std::chrono::duration<double> every_;
   Distribution before_;
   std::atomic<bool> over_{false};
@@ -295,7 +309,7 @@ tl::expected<Result, std::string> measure(const Wanted& wanted, const Work& work
   }
   rt::Executive executive(monotonic, monotonic, config, slots, status);
 
-  Parts parts(status, wanted.seconds);
+  Parts parts(status, wanted.seconds, &empty_tick);
   tools::late::Witness witness(status, getpid(), gettid(), limit_us > 0);
   std::jthread watching = ordinary_thread([&witness](const std::stop_token& over) {
     while (!over.stop_requested()) {
@@ -375,7 +389,7 @@ tl::expected<Result, std::string> attach(const std::string& station, const Wante
   for (std::size_t i = 0; i < count; ++i) {
     slots.push_back(bins_of(status.slots[i].execution));
   }
-  Parts parts(status, wanted.seconds);
+  Parts parts(status, wanted.seconds, nullptr);
   const ThreadCounts before = thread_counts(pid);
   LatestSeen latest(status);
   tools::late::Witness witness(status, pid, pid, wanted.explain_us > 0);

@@ -93,12 +93,13 @@ void SeenCell::follow(const ClearedPicture& picture, const SeenNeedle& needle, c
   }
   doubt_outer(picture, touch, result);
   NeedlePose on_membrane = result.needle;  // its tip where the membrane on it is seen
-  on_membrane.tip += needle.wall_px() * result.needle.axis;
+  on_membrane.tip = needle.on_membrane(result.needle);
   const auto surroundings = [&] {
     return Surroundings{
         .needle = on_membrane,
-        .last_tip = needle.motion().last,
+        .last_tip = needle.last_on_membrane(),
         .expected_px = needle.expected_px(result.needle),
+        .gone_odds = needle.membrane_gone_odds(),
         .punctured = touch.punctured,
         .wall_px = config_.px(config_.h_m),
         .dents_seen = result.needle.ok || !config_.needle || round_as_if_untouched(picture, touch, result),

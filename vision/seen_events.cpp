@@ -154,7 +154,7 @@ void SeenEvents::measure_depth(const SeenNeedle& needle, const SeenCell& cell, d
   result.wd_px = result.contact ? std::max(0.0, depth) : 0.0;
   if (result.contact) {
     result.wd_sd_px =
-        math::hypot(result.punctured ? kContactPoint_px : needle.seen_tip_sd_px(), cell.entry_sd_px());
+        math::hypot(result.punctured ? kContactPoint_px : needle.on_tip_sd_px(), cell.entry_sd_px());
   }
   if (*result.wd_px > kLeastDimple_px) {
     const auto half = dimple_half_width(result.outer.contour, cell.at_rest(), *result.entry, *result.wd_px,

@@ -18,7 +18,7 @@ constexpr double kUntouched_px = 12;                // further outside, nothing 
 constexpr double kEndShows_px = 2;  // further outside, the end of the needle shows beside the membrane
 constexpr double kWall_px =
     0.4;  // from the membrane, which is what is seen on the tip, to the outermost glass
-constexpr double kAtMembrane_px = 0.45, kInside_px = 1.5;  // to which the picture alone shows the tip there
+constexpr double kAtMembrane_px = 0.3, kInside_px = 1.5;  // to which the picture alone shows the tip there
 // By which the membrane draws the end of the needle ahead: what is seen and put right; and where that is not
 // seen, for each time that it is more blurred.
 constexpr double kDrawn_px = 1.5, kDrawnBlurred_px = 3.5;
@@ -136,19 +136,19 @@ bool SeenNeedle::search(const ClearedPicture& picture, const FollowedMembrane& o
 NeedlePose SeenNeedle::locate(const ClearedPicture& picture, const FollowedMembrane& outer,
                               const Touch& touch, bool at_once) {
   pipette_.in_relief(outer.known && outer.polarity == Polarity::relief);
+  wall_px_ = gone_odds_ = 0;
   NeedlePose n = search(picture, outer, touch, at_once)
                      ? pipette_.as_found(picture.noise)
                      : pipette_.find(picture.field, picture.noise, by_stage_.moved());
+  on_tip_sd_px_ = n.sd;
   if (config_.method == Method::tracker && n.ok && touch.at_membrane() && outer.known) {
     put_right_by_membrane(picture, outer, n);
   }
-  seen_tip_sd_px_ = n.sd;
   // A membrane on the tip draws its end aside, granules round it by several pixels.
   n.sd = math::hypot(n.sd, touch.punctured       ? kInside_px
                            : touch.at_membrane() ? kAtMembrane_px * unsharp(outer)
                                                  : 0);
   seen_ = n;
-  wall_px_ = 0;
   put_right_by_stage(picture, touch, n);
   return n;
 }
@@ -161,10 +161,13 @@ void SeenNeedle::put_right_by_membrane(const ClearedPicture& picture, const Foll
   const auto on = tip_on_membrane_.ahead(picture.field, picture.noise, outer.edge, n);
   if (on) {
     n.tip += on->ahead * n.axis;
+    wall_px_ = on->membrane;
+    gone_odds_ = on->gone_odds;
     const double surprising = std::max(0.0, std::abs(on->ahead) - kDrawn_px * unsharp(outer));
+    on_tip_sd_px_ = math::hypot(math::hypot(n.sd, on->membrane_sd), surprising);
     n.sd = math::hypot(math::hypot(n.sd, on->sd), surprising);
   } else {
-    n.sd = math::hypot(n.sd, kDrawnBlurred_px * (unsharp(outer) - 1));
+    on_tip_sd_px_ = n.sd = math::hypot(n.sd, kDrawnBlurred_px * (unsharp(outer) - 1));
   }
 }
 
@@ -191,7 +194,7 @@ void SeenNeedle::put_right_by_stage(const ClearedPicture& picture, const Touch& 
   // In contact the picture shows where the membrane is, on the tip; of a thin needle it draws the end back.
   if (touch.at_membrane() && pipette_.shows_lumen()) {
     constexpr double kThick_px = 1;
-    wall_px_ = std::clamp((seen_.tip - n.tip).dot(n.axis), -kThick_px, kThick_px);
+    wall_px_ = std::clamp(wall_px_ + (seen_.tip - n.tip).dot(n.axis), -kThick_px, kThick_px);
   }
 }
 

@@ -42,7 +42,10 @@ class SeenNeedle {
                                   const Touch& touch, bool at_once);
   // Takes in what is seen of it while nothing touches its tip. gap_px: empty where no cell is near.
   void learn(const ClearedPicture& picture, const NeedlePose& now, const std::optional<double>& gap_px);
-  void end_frame(const NeedlePose& now) { motion_.update(now); }
+  void end_frame(const NeedlePose& now) {
+    motion_.update(now);
+    last_on_membrane_ = now.ok ? std::optional<Point>(on_membrane(now)) : std::nullopt;
+  }
 
   [[nodiscard]] bool due() const noexcept { return due_; }  // looked for in this frame
   [[nodiscard]] bool started() const noexcept { return pipette_.started(); }
@@ -56,10 +59,15 @@ class SeenNeedle {
   [[nodiscard]] double expected_px(const NeedlePose& now) const {
     return by_stage_.moved() ? by_stage_.moved()->dot(now.axis) : motion_.speed;
   }
-  // From the tip to the middle of the membrane that it pushes, as far as seen, px.
+  // From the tip to the middle of the membrane that it pushes, as far as seen, px; where that lies; and where
+  // it lay one frame ago, empty if that did not show it.
   [[nodiscard]] double wall_px() const noexcept { return wall_px_; }
-  // Standard deviation of its place in the picture, whatever hides the glass there.
-  [[nodiscard]] double seen_tip_sd_px() const noexcept { return seen_tip_sd_px_; }
+  [[nodiscard]] Point on_membrane(const NeedlePose& now) const { return now.tip + wall_px_ * now.axis; }
+  [[nodiscard]] const std::optional<Point>& last_on_membrane() const noexcept { return last_on_membrane_; }
+  // Log odds that the membrane is not on the tip, by what is seen across the mouth of the lumen.
+  [[nodiscard]] double membrane_gone_odds() const noexcept { return gone_odds_; }
+  // Standard deviation of what is seen on its tip: of the membrane that it pushes, px.
+  [[nodiscard]] double on_tip_sd_px() const noexcept { return on_tip_sd_px_; }
 
  private:
   [[nodiscard]] bool looks_again(const ClearedPicture& picture, const Touch& touch);
@@ -79,8 +87,9 @@ class SeenNeedle {
   bool before_gap_ = false;  // it is not known yet whether it is still the same
   TipByStage by_stage_;
   NeedlePose seen_;  // as the picture alone tells it
-  double seen_tip_sd_px_ = 0;
-  double wall_px_ = 0;
+  double on_tip_sd_px_ = 0;
+  double wall_px_ = 0, gone_odds_ = 0;
+  std::optional<Point> last_on_membrane_;
   TipOnMembrane tip_on_membrane_;
   TipMotion motion_;
 };

@@ -441,7 +441,7 @@ std::optional<SeenDimple> likeliest_dimple(const MembraneSearch& search) {
   const bool through = punctured && !(within && m.held);
   double on_tip = through ? -kThrough : m.held && !punctured ? stays : -stays;
   if (on_tip > 0 && !within) {
-    on_tip -= odds_of_jump(search.surroundings);
+    on_tip -= odds_of_jump(search.surroundings) + std::min(kJumped, search.surroundings.gone_odds);
   }
   double by_shape = pushed && free ? free->evidence - pushed->evidence : 0;
   if (search.free_by_motion) {

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <numbers>
+#include <tuple>
 
 #include "hal/math/elementary.hpp"
 #include "vision/image/blurred_step.hpp"
@@ -22,6 +24,8 @@ constexpr std::array kLumen = {-0.4, -0.2, 0.0, 0.2, 0.4};  // of the half-width
 // along the axis neighbours tell the same.
 constexpr double kNoiseShare = 0.05, kJoined_px = 3;
 constexpr double kHeight = 0.5;  // by which a membrane on the tip stands out more or less than elsewhere: sd
+constexpr double kGoneOdds = 2;        // log odds from which on a membrane is no longer on the tip
+constexpr double kUsuallyOff_px = 0.5;  // the membrane from the outermost glass: standard deviation
 constexpr double kUnlike = 0.2;  // of what a membrane on the tip explains, left beyond the noise: it is none
 
 // Grey levels per px along the needle's axis; > 0 for the outer face of a membrane of that polarity.
@@ -121,77 +125,154 @@ void TipOnMembrane::learn(const GradientField& field, const NeedlePose& needle) 
   }
 }
 
-// For every place of the tip the picture is compared with the learnt grey there, the membrane of any contrast
-// at the tip, and a level. Where the picture tells little, what the pose says counts.
+// As the smoothed picture shows it: its shape was learnt from the picture itself.
+TipOnMembrane::Membrane TipOnMembrane::membrane_along(const EdgeLearnt& membrane, const NeedlePose& needle,
+                                                      double smoothed_px) {
+  Membrane out{};
+  const auto place = [](std::ptrdiff_t i) {  // ahead of its face, px
+    return static_cast<double>(i) * kStep_px - kFrom_px - kOffGlass_px;
+  };
+  if (membrane.shape.empty()) {
+    const double blur = math::hypot(std::max(membrane.own_blur_px, kUsualBlur_px), smoothed_px);
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      out[i] = 0.5 * blurred_step(place(static_cast<std::ptrdiff_t>(i)) / (std::numbers::sqrt2 * blur));
+    }
+    return out;
+  }
+  constexpr std::ptrdiff_t kReach = 12;
+  std::array<double, 2 * kReach + 1> weights{};
+  double sum = 0;
+  for (std::ptrdiff_t j = -kReach; j <= kReach; ++j) {
+    const double blurs = static_cast<double>(j) * kStep_px / smoothed_px;
+    sum += weights[static_cast<std::size_t>(j + kReach)] = math::exp(-0.5 * blurs * blurs);
+  }
+  std::array<double, std::tuple_size_v<Membrane> + 2 * kReach> own{};
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    own[i] = grey_beside_face(membrane, -needle.axis, -place(static_cast<std::ptrdiff_t>(i) - kReach));
+  }
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    for (std::size_t j = 0; j < weights.size(); ++j) {
+      out[i] += weights[j] / sum * own[i + j];
+    }
+  }
+  return out;
+}
+
+// For every place of the tip, and of the membrane beside it, the picture is compared with the learnt grey
+// there, the membrane of any contrast, and a level. Where the picture tells little, what the pose says counts.
 std::optional<TipOnMembrane::Tip> TipOnMembrane::ahead(const GradientField& field, double noise,
                                                        const EdgeLearnt& membrane,
                                                        const NeedlePose& needle) const {
   constexpr double kReach_px = 5, kDrawn_px = 3;  // by which the tip may be wrong: at most, and deviation
-  constexpr double kFrom_px = 8, kTo_px = 3;      // of the tip: what is compared
   constexpr double kRounded = 0.3;                // grey levels, standard deviation of whole ones
-  constexpr int kPlacesSeen = static_cast<int>((kFrom_px + kTo_px + 2 * kReach_px) / kStep_px) + 1;
+  constexpr std::size_t kTips = static_cast<std::size_t>(2 * kReach_px / kStep_px) + 1;
+  constexpr std::size_t kLearntFrom = static_cast<std::size_t>((kBack_px - kFrom_px) / kStep_px);
   if (frames_ == 0) {
     return std::nullopt;
   }
-  std::array<double, static_cast<std::size_t>(kPlacesSeen)> seen{};  // from behind
-  for (int i = 0; i < kPlacesSeen; ++i) {
-    const auto grey = grey_in_lumen(field, needle, kFrom_px + kReach_px - i * kStep_px);
+  std::array<double, kCompared + kTips - 1> seen{};  // from behind
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    const auto grey = grey_in_lumen(field, needle, kFrom_px + kReach_px - static_cast<double>(i) * kStep_px);
     if (!grey) {
       return std::nullopt;
     }
-    seen[static_cast<std::size_t>(i)] = *grey;
+    seen[i] = *grey;
   }
-  constexpr int kTips = static_cast<int>(2 * kReach_px / kStep_px) + 1;
-  constexpr int kCompared = static_cast<int>((kFrom_px + kTo_px) / kStep_px) + 1;
-  constexpr int kLearntFrom = static_cast<int>((kBack_px - kFrom_px) / kStep_px);
-  const double blur = math::hypot(std::max(membrane.own_blur_px, kUsualBlur_px), field.sigma);
   // Samples that are nearer than the smoothing tell the same.
   const double grey = std::max(noise, kRounded), variance = grey * grey * kNoiseShare * kJoined_px / kStep_px;
-  std::array<double, static_cast<std::size_t>(kTips)> unlikely{};  // -2 times the log-likelihood
-  std::array<bool, static_cast<std::size_t>(kTips)> explained{};
-  std::array<double, static_cast<std::size_t>(kCompared)> step{};
-  double s = 0, ss = 0;
-  for (int i = 0; i < kCompared; ++i) {
-    const double place = i * kStep_px - kFrom_px;  // ahead of the tip
-    const double here = step[static_cast<std::size_t>(i)] =
-        membrane.shape.empty() ? 0.5 * blurred_step(place / (std::numbers::sqrt2 * blur))
-                               : grey_beside_face(membrane, -needle.axis, -place);
-    s += here;
-    ss += here * here;
-  }
   constexpr double n = kCompared;
   // Certainty of its height, where it is known how the membrane looks.
-  const double own = membrane.shape.empty() ? 0 : 1 / (kHeight * kHeight);
-  for (int t = 0; t < kTips; ++t) {  // the tip lies t steps ahead of the range's back end
-    double d = 0, sd = 0, dd = 0;
-    for (int i = 0; i < kCompared; ++i) {
-      const double rest =
-          seen[static_cast<std::size_t>(t + i)] - grey_[static_cast<std::size_t>(kLearntFrom + i)];
-      d += rest;
-      sd += step[static_cast<std::size_t>(i)] * rest;
-      dd += rest * rest;
+  const double own = membrane.shape.empty() ? 0 : 1 / (kHeight * kHeight), known = variance * own;
+  const Membrane along = membrane_along(membrane, needle, field.sigma);
+  struct Fit {
+    double unlikely = 0, left = 0, by_membrane = 0;  // -2 times the log-likelihood; grey levels squared
+  };
+  std::array<std::array<Fit, kOffGlass>, kTips> fits{};
+  Fit gone{.unlikely = std::numeric_limits<double>::infinity()};  // the likeliest far behind the tip
+  double gone_to_px = 0;
+  constexpr std::size_t kCoarse = 2;  // steps between two places of one that went back
+  const auto of_tip = [](std::size_t t) { return static_cast<double>(t) * kStep_px - kReach_px; };
+  const auto off_glass = [](std::size_t m) { return static_cast<double>(m) * kStep_px - kOffGlass_px; };
+  for (std::size_t t = 0; t < kTips; ++t) {
+    std::array<double, kCompared> rest{};
+    double d = 0, dd = 0;
+    for (std::size_t i = 0; i < kCompared; ++i) {
+      rest[i] = seen[t + i] - grey_[kLearntFrom + i];
+      d += rest[i];
+      dd += rest[i] * rest[i];
     }
-    // The height that fits best, and is the membrane's own as far as that is known: not upside down.
-    const double with = sd - s * d / n, power = ss - s * s / n, known = variance * own;
-    const double best = (with + known) / (power + known), height = own > 0 ? std::max(0.0, best) : best,
-                 other = height - 1, off = (t * kStep_px - kReach_px) / kDrawn_px;
-    const double by_membrane = height * (2 * with - height * power), left = dd - d * d / n - by_membrane;
-    unlikely[static_cast<std::size_t>(t)] = left / variance + own * other * other + off * off;
-    explained[static_cast<std::size_t>(t)] =
-        left < n * kNoiseShare * grey * grey + kUnlike * kUnlike * by_membrane;
+    const double drawn = of_tip(t) / kDrawn_px;
+    const auto fit = [&](const double* shown) -> Fit {
+      double s = 0, ss = 0, sd = 0;
+      for (std::size_t i = 0; i < kCompared; ++i) {
+        s += shown[i];
+        ss += shown[i] * shown[i];
+        sd += shown[i] * rest[i];
+      }
+      // The height that fits best, and is the membrane's own as far as that is known: not upside down.
+      const double with = sd - s * d / n, power = ss - s * s / n;
+      const double best = (with + known) / (power + known), height = own > 0 ? std::max(0.0, best) : best,
+                   other = height - 1;
+      const double by_membrane = height * (2 * with - height * power), left = dd - d * d / n - by_membrane;
+      return {left / variance + own * other * other + drawn * drawn, left, by_membrane};
+    };
+    const double* const foremost = along.data() + kOffGlass - 1;
+    for (std::size_t m = 0; m < kOffGlass; ++m) {
+      const double off = off_glass(m) / kUsuallyOff_px;
+      fits[t][m] = fit(foremost - m);
+      fits[t][m].unlikely += off * off;
+    }
+    for (std::size_t m = kCoarse; m <= kGone && t % kCoarse == 0; m += kCoarse) {
+      if (const Fit there = fit(foremost + m); there.unlikely < gone.unlikely) {
+        gone = there;
+        gone_to_px = -kOffGlass_px - static_cast<double>(m) * kStep_px;
+      }
+    }
   }
-  const auto best = std::min_element(unlikely.begin() + 1, unlikely.end() - 1);
-  const auto i = static_cast<std::size_t>(best - unlikely.begin());
-  if (!explained[i]) {
+  // Where a membrane on the tip does not explain what is seen even just on it, or one that went back does so
+  // better, it is not there.
+  constexpr std::size_t kOnGlass = kOffGlass / 2;
+  const auto likeliest = std::min_element(fits.begin(), fits.end(), [](const auto& a, const auto& b) {
+    return a[kOnGlass].unlikely < b[kOnGlass].unlikely;
+  });
+  const auto explains = [&](const Fit& fit) {
+    return fit.left < n * kNoiseShare * grey * grey + kUnlike * kUnlike * fit.by_membrane;
+  };
+  const Fit& on = (*likeliest)[kOnGlass];
+  double least = on.unlikely;
+  for (const auto& of_one : fits) {
+    for (const Fit& fit : of_one) {
+      least = std::min(least, fit.unlikely);
+    }
+  }
+  if (const double odds = 0.5 * (least - gone.unlikely); odds > kGoneOdds) {
+    return Tip{.membrane = gone_to_px, .membrane_sd = kStep_px * kCoarse, .gone_odds = odds};
+  }
+  if (!explains(on)) {
     return Tip{};
   }
-  const double curvature = (unlikely[i - 1] - 2 * *best + unlikely[i + 1]) / (kStep_px * kStep_px);
-  if (*best > unlikely[i - 1] || *best > unlikely[i + 1] || curvature <= 0) {
-    return Tip{0, kReach_px};
+  if (likeliest == fits.begin()) {  // the tip was not seen there, but the membrane is, or still further back
+    return Tip{.membrane = -kReach_px, .membrane_sd = kGone_px - kReach_px, .gone_odds = kGoneOdds};
   }
-  return Tip{(static_cast<double>(i) + vertex_offset(-unlikely[i - 1], -*best, -unlikely[i + 1])) * kStep_px -
-                 kReach_px,
-             std::sqrt(2 / curvature)};
+  if (likeliest == fits.end() - 1) {
+    return Tip{.sd = kReach_px};
+  }
+  double sum = 0, tip = 0, tips = 0, place = 0, places = 0;  // of the weights; means; of squares
+  for (std::size_t t = 0; t < kTips; ++t) {
+    for (std::size_t m = 0; m < kOffGlass; ++m) {
+      const double weight = math::exp(-0.5 * (fits[t][m].unlikely - least)), at = of_tip(t),
+                   seen_at = at + off_glass(m);
+      sum += weight;
+      tip += weight * at;
+      tips += weight * at * at;
+      place += weight * seen_at;
+      places += weight * seen_at * seen_at;
+    }
+  }
+  tip /= sum;
+  place /= sum;
+  return Tip{tip, std::sqrt(std::max(tips / sum - tip * tip, 0.0)), place - tip,
+             std::sqrt(std::max(places / sum - place * place, 0.0))};
 }
 
 }  // namespace punctum::vision

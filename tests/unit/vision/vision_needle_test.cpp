@@ -307,7 +307,8 @@ struct Wide {
   double side = 1;        // of the axis
   double other_wall = 1;  // grey levels of the upper wall, over those of the lower one
   bool closed = false;    // by a line of glass across the lumen
-  double membrane = 0;    // that the tip touches: dark ahead of it, grey levels
+  double membrane = 0;    // dark ahead of its face, grey levels
+  double behind = 0;      // px by which that lies behind the outermost glass; 0: the tip touches it
   double halo = 0;        // of that membrane: bright 1.5 px outside, grey levels
   double lump_px = 0;     // dark, over all of the shaft, behind the tip
   double fringes = 0;     // bright, beside the needle, grey levels
@@ -347,8 +348,9 @@ GradientField draw(const Wide& wide, unsigned seed = 2000) {
         if (wide.lump_px > 0 && std::hypot(s - wide.lump_px, u) < kLump_px) {
           dark = kLump_grey;
         }
-        dark += s < 0 ? wide.membrane : 0;
-        dark -= wide.halo * std::exp(-0.5 * (s - kHalo_px) * (s - kHalo_px));
+        const double outside = s - wide.behind, of_halo = outside - kHalo_px;
+        dark += outside < 0 ? wide.membrane : 0;
+        dark -= wide.halo * std::exp(-0.5 * of_halo * of_halo);
         m.at<float>(y, x) -= static_cast<float>(dark / (kFine * kFine));
       }
     }
@@ -771,15 +773,15 @@ NeedlePose pose_at(const Point& tip) {
   return pose;
 }
 
-// A membrane as it looks all round the cell: blurred, with a halo. Without one a step of its blur says the
-// same.
-EdgeLearnt membrane_of(const Wide& wide, double smoothed_px) {
+// A membrane as the picture itself shows it all round the cell: blurred, with a halo. Without one a step of its
+// blur says the same.
+EdgeLearnt membrane_of(const Wide& wide) {
   constexpr double kStep_px = 0.5, kOutside_px = 6;
   EdgeLearnt out;
   out.own_blur_px = wide.blur_px;
   if (wide.halo > 0) {
     out.inside = 8;
-    const double step = std::hypot(wide.blur_px, smoothed_px), line = std::hypot(1, step);
+    const double step = wide.blur_px, line = std::hypot(1, step);
     for (double x = -out.inside; x <= kOutside_px; x += kStep_px) {
       const double off = (x - kHalo_px) / line;
       out.shape.push_back(150 - 0.5 * wide.membrane * std::erfc(x / (std::sqrt(2) * step)) +
@@ -789,18 +791,25 @@ EdgeLearnt membrane_of(const Wide& wide, double smoothed_px) {
   return out;
 }
 
-// A pose that is drawn aside by a membrane on the tip is put right, in focus, in a halo, and out of focus.
+// A pose that is drawn aside by a membrane on the tip is put right, in focus, in a halo, and out of focus; and
+// the membrane is seen where it is, be that a little behind the outermost glass.
 TEST(TipOnMembrane, is_where_glass_and_membrane_meet) {
-  constexpr double kBias_px = 0.3, kScatter_px = 0.7;
+  struct World {
+    double blur_px, halo, behind, scatter_px;
+  };
+  constexpr double kBias_px = 0.3, kMembrane_px = 0.2;
   constexpr unsigned kLearnt = 12, kFrames = 8;
   const NeedlePose true_pose = pose_at({150.3, kAxis_y});
-  for (const auto& [blur_px, halo] : {std::pair{1.1, 0.0}, std::pair{1.1, 25.0}, std::pair{2.5, 0.0}}) {
+  for (const auto& [blur_px, halo, behind, scatter_px] :
+       {World{1.1, 0, 0, 0.5}, World{1.1, 25, 0, 0.5}, World{2.5, 0, 0, 1.2}, World{1.1, 0, 0.6, 0.5},
+        World{1.1, 25, 0.6, 0.5}}) {
     const Wide clear{.closed = true, .blur_px = blur_px, .radius = 6};
     Wide touching = clear;
     touching.membrane = 30;
     touching.halo = halo;
+    touching.behind = behind;
     TipOnMembrane tip;
-    const EdgeLearnt membrane = membrane_of(touching, draw(clear).sigma);
+    const EdgeLearnt membrane = membrane_of(touching);
     EXPECT_FALSE(tip.ahead(draw(touching), kWideNoise, membrane, true_pose));
     for (unsigned frame = 1; frame <= kLearnt; ++frame) {
       tip.learn(draw(clear, frame), true_pose);
@@ -808,15 +817,38 @@ TEST(TipOnMembrane, is_where_glass_and_membrane_meet) {
     for (const double drawn_px : {-1.5, 0.0, 2.5}) {
       NeedlePose drawn = true_pose;
       drawn.tip += drawn_px * drawn.axis;
-      double bias = 0;
+      double bias = 0, of_membrane = 0;
       for (unsigned frame = 1; frame <= kFrames; ++frame) {
         const auto seen = tip.ahead(draw(touching, kLearnt + frame), kWideNoise, membrane, drawn);
         ASSERT_TRUE(seen) << blur_px << ' ' << halo << ' ' << drawn_px;
         EXPECT_LT(std::abs(seen->ahead + drawn_px), 3 * seen->sd + kBias_px) << blur_px << ' ' << halo;
-        EXPECT_LT(seen->sd, kScatter_px) << blur_px << ' ' << halo << ' ' << drawn_px;
+        EXPECT_LT(seen->sd, scatter_px) << blur_px << ' ' << halo << ' ' << drawn_px;
+        EXPECT_EQ(seen->gone_odds, 0) << blur_px << ' ' << halo << ' ' << drawn_px;
         bias += (seen->ahead + drawn_px) / kFrames;
+        of_membrane += (seen->ahead + drawn_px + seen->membrane + behind) / kFrames;
       }
-      EXPECT_NEAR(bias, 0, kBias_px) << blur_px << ' ' << halo << ' ' << drawn_px;
+      EXPECT_NEAR(bias, 0, kBias_px) << blur_px << ' ' << halo << ' ' << behind << ' ' << drawn_px;
+      EXPECT_NEAR(of_membrane, 0, kMembrane_px) << blur_px << ' ' << halo << ' ' << behind << ' ' << drawn_px;
+    }
+  }
+}
+
+// A membrane that gave way crosses the lumen behind the tip, which is then where its glass is.
+TEST(TipOnMembrane, is_left_where_it_is_by_a_membrane_that_went_back) {
+  constexpr double kMembrane_px = 1.2;
+  const NeedlePose pose = pose_at({150.3, kAxis_y});
+  TipOnMembrane tip;
+  for (unsigned frame = 1; frame <= 12; ++frame) {
+    tip.learn(draw({.closed = true, .radius = 6}, frame), pose);
+  }
+  for (const double halo : {0.0, 25.0}) {
+    for (const double behind : {2.5, 4.0, 6.0}) {
+      const Wide wide{.closed = true, .membrane = 30, .behind = behind, .halo = halo, .radius = 6};
+      const auto seen = tip.ahead(draw(wide, 20), kWideNoise, membrane_of(wide), pose);
+      ASSERT_TRUE(seen);
+      EXPECT_GT(seen->gone_odds, 2) << behind << ' ' << halo;
+      EXPECT_EQ(seen->ahead, 0) << behind << ' ' << halo;
+      EXPECT_NEAR(seen->membrane, -behind, kMembrane_px) << behind << ' ' << halo;
     }
   }
 }

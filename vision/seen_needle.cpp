@@ -164,7 +164,7 @@ void SeenNeedle::put_right_by_membrane(const ClearedPicture& picture, const Foll
     wall_px_ = on->membrane;
     gone_odds_ = on->gone_odds;
     const double surprising = std::max(0.0, std::abs(on->ahead) - kDrawn_px * unsharp(outer));
-    on_tip_sd_px_ = math::hypot(math::hypot(n.sd, on->membrane_sd), surprising);
+    on_tip_sd_px_ = math::hypot(on->membrane_sd > 0 ? on->membrane_sd : n.sd, surprising);
     n.sd = math::hypot(math::hypot(n.sd, on->sd), surprising);
   } else {
     on_tip_sd_px_ = n.sd = math::hypot(n.sd, kDrawnBlurred_px * (unsharp(outer) - 1));

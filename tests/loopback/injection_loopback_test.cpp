@@ -211,7 +211,8 @@ TEST_F(Injection, injects_a_cell_through_four_drivers_without_a_missed_tick) {
   const std::int64_t began_ns = clock.now_ns();
   std::int64_t opened_ns = 0, shut_ns = 0;
   const int status = run("30", [&](const e2e::Running&) {
-    constexpr std::int64_t kLook_ns = 20'000'000;  // at the kernel's file, which takes the guest longer than a tick
+    constexpr std::int64_t kLook_ns =
+        20'000'000;  // at the kernel's file, which takes the guest longer than a tick
     if (wait_for([&] { return gate_is_open(); }, 25, kLook_ns)) {
       opened_ns = clock.now_ns();
     }

@@ -36,8 +36,6 @@ using test::frame_of;
 
 constexpr int kFrames = 40;
 constexpr double kPixel_um = 0.825;
-constexpr double kGlassAhead_px =
-    0.65;  // the membrane is drawn through the glass, so far behind its outermost part
 constexpr double kRight_px = 2, kWrong_px = 4;  // nowhere further away; somewhere further away
 
 Contour contour_of(const nlohmann::json& points) {
@@ -165,7 +163,7 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
   std::map<std::string, Score> outer, inner;
   std::vector<double> tip_px, depth_px;        // seen minus true: along the axis before contact, in contact
   std::vector<double> told_px, told_depth_px;  // likewise in all phases, and in contact, with the pose
-  std::vector<double> touching_px;             // tip in contact, from the membrane
+  std::vector<double> touching_px;             // tip in contact
   double furthest_px = 0;                      // of those
   double surest = 0;                           // tip, when the membrane gives way: deviations off
   Events begun, seen_in, told_in;
@@ -202,7 +200,7 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
     if (phase == "approach" && seen.needle.ok) {
       tip_px.push_back(ahead);
     } else if (phase == "contact" && seen.needle.ok) {
-      touching_px.push_back(ahead + kGlassAhead_px);
+      touching_px.push_back(ahead);
       furthest_px = std::max(furthest_px, std::abs(touching_px.back()));
     } else if (phase == "puncture" && seen.needle.ok) {
       surest = std::max(surest, std::abs(ahead) / seen.needle.sd);
@@ -245,9 +243,10 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
   const bool sharp = GetParam().blur_px < 2;
   EXPECT_LT(outer["puncture"].rms_um(), sharp ? 0.2 : 0.4);
   EXPECT_EQ(outer["puncture"].wrong, 0);
-  expect_near_truth("tip that touches", touching_px, sharp ? 0.5 : 1.5);
+  // The membrane is drawn through the glass, 0.65 px behind its outermost part.
+  expect_near_truth("tip that touches", touching_px, !sharp ? 1.5 : GetParam().halo > 0 ? 0.7 : 0.5);
   if (sharp) {
-    EXPECT_LT(furthest_px, 0.5);
+    EXPECT_LT(furthest_px, 1);
   }
   std::printf("tip that touches: at most %.2f px off\n", furthest_px);
   std::printf("tip when the membrane gives way: %.1f deviations off at most\n", surest);
@@ -255,8 +254,7 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
   if (!sharp) {
     expect_near_truth("tip", tip_px, 1.5);
     expect_near_truth("depth of the dimple", depth_px, 1.8);
-  } else if (GetParam().noise <= 5 &&
-             GetParam().halo == 0) {  // a halo draws the tip that touches it a pixel ahead
+  } else if (GetParam().noise <= 5) {
     expect_near_truth("tip", tip_px, 0.4);
     expect_near_truth("depth of the dimple", depth_px, 0.3);
     expect_near_truth("tip with the pose", told_px, 0.26);
@@ -274,7 +272,7 @@ std::string name_of_sequence(const testing::TestParamInfo<Sequence>& of) {
 // gave way was once taken for one on the tip, 12 px off.
 INSTANTIATE_TEST_SUITE_P(Seeds, ForeignFrames,
                          testing::Values(Sequence{107, 5, 0.055, 0.35, 0.09},
-                                         Sequence{108, 10, 0.108, 0.4, 0.128},
+                                         Sequence{108, 10, 0.12, 0.4, 0.128},
                                          Sequence{109, 5, 0.085, 0.35, 0.09, 25}),
                          name_of_sequence);
 INSTANTIATE_TEST_SUITE_P(Further, ForeignFrames,

@@ -24,7 +24,8 @@ constexpr std::array kLumen = {-0.4, -0.2, 0.0, 0.2, 0.4};  // of the half-width
 // along the axis neighbours tell the same.
 constexpr double kNoiseShare = 0.05, kJoined_px = 3;
 constexpr double kHeight = 0.5;  // by which a membrane on the tip stands out more or less than elsewhere: sd
-constexpr double kGoneOdds = 2;        // log odds from which on a membrane is no longer on the tip
+constexpr double kTells = 4;     // variances: what a membrane explains where it tells its place
+constexpr double kGoneOdds = 2;  // log odds from which on a membrane is no longer on the tip
 constexpr double kUsuallyOff_px = 0.5;  // the membrane from the outermost glass: standard deviation
 constexpr double kUnlike = 0.2;  // of what a membrane on the tip explains, left beyond the noise: it is none
 
@@ -159,7 +160,8 @@ TipOnMembrane::Membrane TipOnMembrane::membrane_along(const EdgeLearnt& membrane
 }
 
 // For every place of the tip, and of the membrane beside it, the picture is compared with the learnt grey
-// there, the membrane of any contrast, and a level. Where the picture tells little, what the pose says counts.
+// there, the membrane of any contrast, and a level. Where the picture tells little, what the pose says
+// counts.
 std::optional<TipOnMembrane::Tip> TipOnMembrane::ahead(const GradientField& field, double noise,
                                                        const EdgeLearnt& membrane,
                                                        const NeedlePose& needle) const {
@@ -239,10 +241,13 @@ std::optional<TipOnMembrane::Tip> TipOnMembrane::ahead(const GradientField& fiel
     return fit.left < n * kNoiseShare * grey * grey + kUnlike * kUnlike * fit.by_membrane;
   };
   const Fit& on = (*likeliest)[kOnGlass];
-  double least = on.unlikely;
-  for (const auto& of_one : fits) {
-    for (const Fit& fit : of_one) {
-      least = std::min(least, fit.unlikely);
+  double least = on.unlikely, likeliest_place = of_tip(static_cast<std::size_t>(likeliest - fits.begin()));
+  for (std::size_t t = 0; t < kTips; ++t) {
+    for (std::size_t m = 0; m < kOffGlass; ++m) {
+      if (fits[t][m].unlikely < least) {
+        least = fits[t][m].unlikely;
+        likeliest_place = of_tip(t) + off_glass(m);
+      }
     }
   }
   if (const double odds = 0.5 * (least - gone.unlikely); odds > kGoneOdds) {
@@ -251,17 +256,25 @@ std::optional<TipOnMembrane::Tip> TipOnMembrane::ahead(const GradientField& fiel
   if (!explains(on)) {
     return Tip{};
   }
+  if (on.by_membrane < kTells * variance) {  // noise hides it, and the pose counts
+    return Tip{.sd = kDrawn_px, .membrane_sd = kDrawn_px};
+  }
   if (likeliest == fits.begin()) {  // the tip was not seen there, but the membrane is, or still further back
     return Tip{.membrane = -kReach_px, .membrane_sd = kGone_px - kReach_px, .gone_odds = kGoneOdds};
   }
   if (likeliest == fits.end() - 1) {
     return Tip{.sd = kReach_px};
   }
+  // Further off other pixels are compared, which the membrane may not even be in.
+  constexpr double kSamePlace_px = 1.5;
   double sum = 0, tip = 0, tips = 0, place = 0, places = 0;  // of the weights; means; of squares
   for (std::size_t t = 0; t < kTips; ++t) {
     for (std::size_t m = 0; m < kOffGlass; ++m) {
-      const double weight = math::exp(-0.5 * (fits[t][m].unlikely - least)), at = of_tip(t),
-                   seen_at = at + off_glass(m);
+      const double at = of_tip(t), seen_at = at + off_glass(m);
+      if (std::abs(seen_at - likeliest_place) > kSamePlace_px) {
+        continue;
+      }
+      const double weight = math::exp(-0.5 * (fits[t][m].unlikely - least));
       sum += weight;
       tip += weight * at;
       tips += weight * at * at;

@@ -773,8 +773,8 @@ NeedlePose pose_at(const Point& tip) {
   return pose;
 }
 
-// A membrane as the picture itself shows it all round the cell: blurred, with a halo. Without one a step of its
-// blur says the same.
+// A membrane as the picture itself shows it all round the cell: blurred, with a halo. Without one a step of
+// its blur says the same.
 EdgeLearnt membrane_of(const Wide& wide) {
   constexpr double kStep_px = 0.5, kOutside_px = 6;
   EdgeLearnt out;
@@ -791,8 +791,8 @@ EdgeLearnt membrane_of(const Wide& wide) {
   return out;
 }
 
-// A pose that is drawn aside by a membrane on the tip is put right, in focus, in a halo, and out of focus; and
-// the membrane is seen where it is, be that a little behind the outermost glass.
+// A pose that is drawn aside by a membrane on the tip is put right, in focus, in a halo, and out of focus;
+// and the membrane is seen where it is, be that a little behind the outermost glass.
 TEST(TipOnMembrane, is_where_glass_and_membrane_meet) {
   struct World {
     double blur_px, halo, behind, scatter_px;

@@ -161,11 +161,14 @@ void SeenNeedle::put_right_by_membrane(const ClearedPicture& picture, const Foll
   const auto on = tip_on_membrane_.ahead(picture.field, picture.noise, outer.edge, n);
   if (on) {
     n.tip += on->ahead * n.axis;
-    wall_px_ = on->membrane;
-    gone_odds_ = on->gone_odds;
-    const double surprising = std::max(0.0, std::abs(on->ahead) - kDrawn_px * unsharp(outer));
-    on_tip_sd_px_ = math::hypot(on->membrane_sd > 0 ? on->membrane_sd : n.sd, surprising);
-    n.sd = math::hypot(math::hypot(n.sd, on->sd), surprising);
+    const double surprising = std::max(0.0, std::abs(on->ahead) - kDrawn_px * unsharp(outer)),
+                 found_sd = n.sd;
+    n.sd = on_tip_sd_px_ = math::hypot(math::hypot(n.sd, on->sd), surprising);
+    if (pipette_.shows_lumen()) {  // across the mouth of a thin one its walls are what is seen
+      wall_px_ = on->membrane;
+      gone_odds_ = on->gone_odds;
+      on_tip_sd_px_ = math::hypot(on->membrane_sd > 0 ? on->membrane_sd : found_sd, surprising);
+    }
   } else {
     on_tip_sd_px_ = n.sd = math::hypot(n.sd, kDrawnBlurred_px * (unsharp(outer) - 1));
   }
@@ -186,6 +189,7 @@ void SeenNeedle::put_right_by_stage(const ClearedPicture& picture, const Touch& 
   if (!n.ok) {
     n = pipette_.by_shaft(picture.field, picture.noise, *told).value_or(n);
     n.sd = by_stage_.sd();
+    wall_px_ = gone_odds_ = 0;
     return;
   }
   n.sd = math::hypot(n.sd, touch.at_membrane() ? kWall_px : 0);
@@ -193,8 +197,9 @@ void SeenNeedle::put_right_by_stage(const ClearedPicture& picture, const Touch& 
   pipette_.put(n.tip);
   // In contact the picture shows where the membrane is, on the tip; of a thin needle it draws the end back.
   if (touch.at_membrane() && pipette_.shows_lumen()) {
-    constexpr double kThick_px = 1;
-    wall_px_ = std::clamp(wall_px_ + (seen_.tip - n.tip).dot(n.axis), -kThick_px, kThick_px);
+    constexpr double kThick_px = 1;  // of a membrane that is still on it
+    const double wall = wall_px_ + (seen_.tip - n.tip).dot(n.axis);
+    wall_px_ = gone_odds_ > 0 ? wall : std::clamp(wall, -kThick_px, kThick_px);
   }
 }
 

@@ -227,7 +227,7 @@ std::optional<TipOnMembrane::Tip> TipOnMembrane::ahead(const GradientField& fiel
     for (std::size_t m = kCoarse; m <= kGone && t % kCoarse == 0; m += kCoarse) {
       if (const Fit there = fit(foremost + m); there.unlikely < gone.unlikely) {
         gone = there;
-        gone_to_px = -kOffGlass_px - static_cast<double>(m) * kStep_px;
+        gone_to_px = of_tip(t) - kOffGlass_px - static_cast<double>(m) * kStep_px;
       }
     }
   }
@@ -237,9 +237,6 @@ std::optional<TipOnMembrane::Tip> TipOnMembrane::ahead(const GradientField& fiel
   const auto likeliest = std::min_element(fits.begin(), fits.end(), [](const auto& a, const auto& b) {
     return a[kOnGlass].unlikely < b[kOnGlass].unlikely;
   });
-  const auto explains = [&](const Fit& fit) {
-    return fit.left < n * kNoiseShare * grey * grey + kUnlike * kUnlike * fit.by_membrane;
-  };
   const Fit& on = (*likeliest)[kOnGlass];
   double least = on.unlikely, likeliest_place = of_tip(static_cast<std::size_t>(likeliest - fits.begin()));
   for (std::size_t t = 0; t < kTips; ++t) {
@@ -253,7 +250,7 @@ std::optional<TipOnMembrane::Tip> TipOnMembrane::ahead(const GradientField& fiel
   if (const double odds = 0.5 * (least - gone.unlikely); odds > kGoneOdds) {
     return Tip{.membrane = gone_to_px, .membrane_sd = kStep_px * kCoarse, .gone_odds = odds};
   }
-  if (!explains(on)) {
+  if (on.left >= n * kNoiseShare * grey * grey + kUnlike * kUnlike * on.by_membrane) {
     return Tip{};
   }
   if (on.by_membrane < kTells * variance) {  // noise hides it, and the pose counts

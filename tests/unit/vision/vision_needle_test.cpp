@@ -801,7 +801,7 @@ TEST(TipOnMembrane, is_where_glass_and_membrane_meet) {
   constexpr unsigned kLearnt = 12, kFrames = 8;
   const NeedlePose true_pose = pose_at({150.3, kAxis_y});
   for (const auto& [blur_px, halo, behind, scatter_px] :
-       {World{1.1, 0, 0, 0.5}, World{1.1, 25, 0, 0.5}, World{2.5, 0, 0, 1.2}, World{1.1, 0, 0.6, 0.5},
+       {World{1.1, 0, 0, 0.5}, World{1.1, 25, 0, 0.5}, World{2.5, 0, 0, 0.75}, World{1.1, 0, 0.6, 0.5},
         World{1.1, 25, 0.6, 0.5}}) {
     const Wide clear{.closed = true, .blur_px = blur_px, .radius = 6};
     Wide touching = clear;

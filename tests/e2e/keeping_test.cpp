@@ -200,7 +200,7 @@ TEST_F(Programs, with_overwrite_the_old_report_stays_until_the_new_one_is_whole)
 
 // ---- samples that are lost ----
 
-TEST_F(Programs, samples_that_a_stopped_parent_did_not_read_are_counted) {
+TEST_F(Programs, samples_that_a_stopped_parent_did_not_read_are_told_and_what_they_may_hold_is_not) {
   Running run({"run", "free", "--rate", "8000", "--seconds", "60", "--set", kPatientRelay, "--report",
                report(), "--no-figure", "--quiet"},
               words());
@@ -217,10 +217,13 @@ TEST_F(Programs, samples_that_a_stopped_parent_did_not_read_are_counted) {
   ASSERT_GE(passed, kRing + kMore) << "the core has not ticked on";
   std::this_thread::sleep_for(100ms);
   run.send(SIGINT);
-  (void)run.wait();
+  EXPECT_EQ(run.wait(), 1) << run.output();
   const auto r = json();
   EXPECT_GE(r["samples"]["lost"].get<std::uint64_t>(), passed - kRing) << run.output();
-  EXPECT_NE(run.output().find("samples were overrun"), std::string::npos) << run.output();
+  EXPECT_EQ(r["not_kept"].at(0)["file"], "samples.csv");
+  EXPECT_TRUE(r["peak_hand_force_N"].is_null());
+  EXPECT_NE(r["sentence"].get<std::string>().find("samples of it are missing"), std::string::npos);
+  EXPECT_NE(run.output().find("were overwritten before they were read"), std::string::npos) << run.output();
 }
 
 }  // namespace

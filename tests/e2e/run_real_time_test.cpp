@@ -1,8 +1,11 @@
 // Runs in real time, one at a time: the core's grid and rights, and what happens when a program is ended,
 // killed or stopped.
 #include <gtest/gtest.h>
+#include <poll.h>
+#include <pty.h>
 #include <sys/mman.h>
 
+#include <array>
 #include <map>
 #include <sstream>
 
@@ -61,6 +64,69 @@ TEST_F(Programs, ctrl_c_stops_cleanly_and_the_report_is_written) {
   EXPECT_EQ(r["outcome"], "done");
   EXPECT_LT(r["seconds"], 20);
   EXPECT_NE(run.output().find("stopping"), std::string::npos);
+}
+
+// A terminal on which somebody pressed Ctrl-S takes no words: the stop does not wait for them, and Ctrl-Z,
+// which would leave the needle to a core that nobody watches, does nothing.
+TEST_F(Programs, a_halted_terminal_keeps_no_stop_waiting) {
+  constexpr char kSuspend = '\x1a', kHalt = '\x13', kGoOn = '\x11';
+  int master = -1;
+  const pid_t pid = forkpty(&master, nullptr, nullptr, nullptr);
+  if (pid == 0) {
+    const std::string program = std::string(PUNCTUM_BIN_DIR) + "/punctum", folder = report();
+    execl(program.c_str(), "punctum", "run", "free", "--seconds", "60", "--set", "scene.cells=0", "--set",
+          kPatientRelay, "--no-figure", "--report", folder.c_str(), nullptr);
+    _exit(127);
+  }
+  ASSERT_GT(pid, 0);
+  const auto press = [master](char key) { ASSERT_EQ(write(master, &key, 1), 1); };
+  const fs::path samples = fs::path(report()) / "samples.csv", told = fs::path(report()) / "report.json";
+  const auto comes = [](const auto& what) {
+    for (int i = 0; i < 2000; ++i) {
+      if (what()) {
+        return true;
+      }
+      std::this_thread::sleep_for(10ms);
+    }
+    return false;
+  };
+  std::string words;
+  const auto listen = [&] {
+    std::array<char, 4096> some{};
+    pollfd ready{master, POLLIN, 0};
+    while (poll(&ready, 1, 0) > 0) {
+      const ssize_t n = read(master, some.data(), some.size());
+      if (n <= 0) {
+        return;
+      }
+      words.append(some.data(), static_cast<std::size_t>(n));
+    }
+  };
+  EXPECT_TRUE(comes([&] {
+    listen();
+    return words.find("left") != std::string::npos;  // the line with the time that is left
+  })) << words;
+  press(kSuspend);
+  press(kHalt);
+  std::this_thread::sleep_for(500ms);
+  const std::string before = read_all(samples);
+  EXPECT_TRUE(comes([&] { return read_all(samples).size() > before.size(); })) << "suspended";
+  kill(pid, SIGTERM);
+  EXPECT_TRUE(comes([&] { return fs::exists(told); })) << "the stop waits for the terminal";
+  press(kGoOn);
+  int status = -1;
+  EXPECT_TRUE(comes([&] {
+    listen();
+    return waitpid(pid, &status, WNOHANG) == pid;
+  }));
+  if (status == -1) {
+    kill(pid, SIGKILL);
+    waitpid(pid, &status, 0);
+  }
+  close(master);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status << words;
+  EXPECT_EQ(json()["outcome"], "done");
+  EXPECT_LT(json()["seconds"], 30);
 }
 
 TEST_F(Programs, a_core_that_is_told_three_times_to_end_leaves_its_devices_without_force_and_power) {

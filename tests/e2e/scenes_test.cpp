@@ -82,7 +82,7 @@ TEST_F(Scenes, explain_says_in_words_what_was_measured) {
     ASSERT_TRUE(std::regex_search(said_, said, std::regex("(\\d+) processes of one thread each"))) << said_;
     EXPECT_EQ(std::stod(said[1]), costs.number(i, "processes"));
     for (const std::size_t p : rows_of(processes, scene)) {
-      EXPECT_EQ(processes.number(p, "threads"), 1);
+      EXPECT_EQ(processes.number(p, "threads"), processes.text(p, "process") == "punctum" ? 2 : 1);
     }
     ASSERT_TRUE(std::regex_search(said_, said, std::regex("force effects +(\\d+): "))) << said_;
     EXPECT_EQ(std::stod(said[1]), costs.number(i, "effects"));

@@ -52,8 +52,8 @@ void CoreProcess::watch_stop(double now_s, int stop_signals) {
   };
   if (step_ == Step::none && stop_signals > 0) {
     step(Step::commanded);
-    terminal_.say("stopping: needle held, force to zero (again Ctrl-C to insist)");
     ask(rt::Command::stop);
+    terminal_.say("stopping: needle held, force to zero (again Ctrl-C to insist)");
   }
   if (step_ == Step::commanded && (stop_signals > 1 || now_s > stepped_s_ + kTimeToAnswer_s)) {
     step(Step::signalled);

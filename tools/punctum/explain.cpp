@@ -163,11 +163,11 @@ std::string task_text(const Scene& s) {
 std::string processes_text(const Scene& s) {
   const bool falcon = s.devices.haptic == kFalcon;
   std::string out = fmt::format(
-      "{} processes of one thread each{}\n"
+      "{} processes of one thread each{}, and one that writes to the terminal\n"
       "  punctum         ordinary, memory not locked: starts, watches, records, reports\n"
       "  punctum-core    one real-time thread: SCHED_FIFO {}, {}, memory locked, {} Hz (every "
       "{:g} us)\n",
-      s.vision ? 3 : 2, falcon ? ", and one of the handle" : "", s.core_priority, cpu(s.core_cpu),
+      s.vision ? 3 : 2, falcon ? ", one of the handle" : "", s.core_priority, cpu(s.core_cpu),
       s.servo.rate_Hz, 1e6 / s.servo.rate_Hz);
   if (falcon) {
     const int own_cpu = s.falcon ? s.falcon->cpu : -1;

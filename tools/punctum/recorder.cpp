@@ -1,5 +1,7 @@
 #include "tools/punctum/recorder.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -65,6 +67,7 @@ std::uint64_t Recorder::drain(std::uint64_t until) {
   while (taken < kMostTicksPerRound && telemetry_.position() < until &&
          telemetry_.next(sample_) == hal::Read::ok) {
     ++taken;
+    note_gap();
     if (usable(sample_)) {
       record(sample_, world_of(sample_));
     } else {
@@ -79,6 +82,19 @@ std::uint64_t Recorder::drain(std::uint64_t until) {
   events_.lost = event_ring_.lost();
   flush_now_and_then();
   return taken;
+}
+
+// The first one; how many samples all of them have cost is counted.
+void Recorder::note_gap() {
+  if (gap_noted_ || telemetry_.lost() == 0) {
+    return;
+  }
+  gap_noted_ = true;
+  not_kept_.push_back(
+      {samples_.name, before_.t_s,
+       fmt::format("the samples up to {:.3f} s were overwritten before this program, which did "
+                   "not get to run, came to read them",
+                   sample_.t_s)});
 }
 
 // A ring whose counter is wrong may seem to have run far ahead; no more can be lost than was executed.

@@ -45,7 +45,7 @@ class Recorder {
   // Samples that named what does not exist; they are in no file.
   [[nodiscard]] std::uint64_t unusable() const noexcept { return unusable_; }
   [[nodiscard]] std::uint64_t every() const noexcept { return every_; }
-  // What could not be written so far: of each file the first failure. The run goes on without.
+  // What could not be written so far: of each file the first failure, and the first gap. The run goes on.
   [[nodiscard]] const std::vector<NotKept>& not_kept() const noexcept { return not_kept_; }
   void finish();
 
@@ -65,6 +65,7 @@ class Recorder {
            sim::Bench* bench, std::uint64_t every);
   [[nodiscard]] const sim::Snapshot* world_of(const rt::TelemetrySample& s);  // null: there is none
   void record(const rt::TelemetrySample& s, const sim::Snapshot* world);
+  void note_gap();
   void flush_now_and_then();
   void record_fault(const rt::TelemetrySample& s, const sim::Snapshot* world);
   void row(Table& table, const rt::TelemetrySample& s, const sim::Snapshot* world);
@@ -75,6 +76,7 @@ class Recorder {
   Table samples_{.name = "samples.csv", .file = {}};
   Table fault_{.name = "fault.csv", .file = {}};  // open from the first fault on
   std::vector<NotKept> not_kept_;
+  bool gap_noted_ = false;
   std::vector<Tick> recent_;  // a ring of two seconds
   std::uint64_t recent_end_ = 0, recent_count_ = 0;
   std::uint64_t after_fault_ = 0;  // rows that are still to be written after it

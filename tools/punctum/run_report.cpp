@@ -70,6 +70,26 @@ double seconds_of(const Measures& m, std::uint64_t ticks) {
   return m.ticks > 0 ? static_cast<double>(ticks) * m.last_s / static_cast<double>(m.ticks) : 0;
 }
 
+// Peaks, sums and what single cells came to may lie in the samples that are missing.
+void forget_what_needs_every_sample(Json& j) {
+  for (const char* measure :
+       {"contact_delay_ms", "puncture_delay_ms", "puncture_inner_delay_ms", "force_error_rms_N",
+        "force_error_mean_N", "true_force_rms_N", "E_fit_kPa", "E_fit_sd_kPa", "lateral_error_um",
+        "lateral_error_contact_um", "peak_force_N", "peak_hand_force_N", "max_depth_um",
+        "depth_beyond_puncture_um", "withdrawal_s", "tremor_ratio", "tremor_hand_um", "tremor_tip_um"}) {
+    j[measure] = nullptr;
+  }
+  for (Json* group : {&j["cells"], &j["least_clearance_um"]}) {
+    for (auto& [name, value] : group->items()) {
+      value = nullptr;
+    }
+  }
+  if (!j["dose"].is_null()) {
+    j["dose"]["given_s"] = nullptr;
+  }
+  j["cell_list"] = Json::array();
+}
+
 }  // namespace
 
 std::string in_words(const Whereabouts& needle) {
@@ -325,6 +345,9 @@ nlohmann::ordered_json report_facts(const Scene& scene, const RunResult& result,
        {std::pair{"wake_histogram", &core.wake}, std::pair{"tick_histogram", &core.tick}}) {
     j[name] = bins(*histogram);
   }
+  if (result.samples_lost > 0) {
+    forget_what_needs_every_sample(j);
+  }
   j["sentence"] = run_sentence(j);
   return j;
 }
@@ -454,7 +477,9 @@ std::string summary(const Scene& scene, const RunResult& result, const Measures&
     line("not kept", fmt::format("{} from {:.3f} s on: {}", n.file, n.t_s, n.why));
   }
   if (result.samples_lost > 0) {
-    line("recording", fmt::format("{} samples were overrun before they were read", result.samples_lost));
+    line("not whole", fmt::format("{} samples of {} were overwritten before they were read: what the run "
+                                  "came to above is that of the others",
+                                  result.samples_lost, core.ticks.load()));
   }
   if (result.samples_unusable > 0) {
     line("recording", fmt::format("{} samples were not usable", result.samples_unusable));

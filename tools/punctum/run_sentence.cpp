@@ -68,6 +68,9 @@ std::string ending(const Json& facts) {
 
 std::string run_sentence(const Json& facts) {
   std::string s = ending(facts);
+  if (const auto lost = number_in(fact(facts, "samples"), "lost"); lost && *lost > 0) {
+    s += fmt::format(" {:.0f} samples of it are missing, and what can lie in them is not known.", *lost);
+  }
   const Json& needle = fact(facts, "needle_at_end");
   const std::string where = text_in(needle, "where");
   if (where == "unknown") {

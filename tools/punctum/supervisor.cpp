@@ -740,6 +740,10 @@ int run_scene(const Scene& scene, const RunSettings& settings) {
   // Before anything exists that an end would leave behind.
   stop_signal::watch({SIGINT, SIGTERM, SIGHUP, SIGQUIT});
   signal(SIGPIPE, SIG_IGN);
+  // The needle would go on without anybody who writes down what it does, or takes the stop.
+  for (const int suspends : {SIGTSTP, SIGTTIN, SIGTTOU}) {
+    signal(suspends, SIG_IGN);
+  }
   Terminal terminal;
   const auto refuse = [&terminal](const std::string& why) {
     terminal.complain(why);

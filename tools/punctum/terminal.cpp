@@ -5,8 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <condition_variable>
 #include <cstdlib>
+#include <deque>
+#include <mutex>
 #include <string_view>
+#include <system_error>
+#include <thread>
 #include <vector>
 
 #include "tools/shared/say.hpp"
@@ -190,34 +195,111 @@ std::string painted(Colour colour, const std::string& text, bool coloured) {
   return kCodes[static_cast<std::size_t>(colour)] + text + "\033[0m";
 }
 
+// Writes in a thread of its own: whoever says something watches a needle meanwhile. Without a thread it
+// writes at once.
+class Terminal::Writer {
+ public:
+  using Say = void (*)(std::string_view) noexcept;
+
+  Writer() {
+    try {
+      thread_ = std::thread([this] { write(); });
+    } catch (const std::system_error&) {
+    }
+  }
+  ~Writer() {
+    {
+      const std::lock_guard lock(mutex_);
+      over_ = true;
+    }
+    changed_.notify_one();
+    if (thread_.joinable()) {
+      thread_.join();
+    }
+  }
+  Writer(const Writer&) = delete;
+  Writer& operator=(const Writer&) = delete;
+
+  void say(Say how, std::string text) {
+    constexpr std::size_t kMostWaiting = 10'000;  // more nobody will read
+    if (!thread_.joinable()) {
+      how(text);
+      return;
+    }
+    {
+      const std::lock_guard lock(mutex_);
+      if (waiting_.size() < kMostWaiting) {
+        waiting_.push_back({how, std::move(text)});
+      }
+    }
+    changed_.notify_one();
+  }
+  [[nodiscard]] bool has_written_all() {
+    const std::lock_guard lock(mutex_);
+    return waiting_.empty();
+  }
+
+ private:
+  struct Words {
+    Say how;
+    std::string text;
+  };
+  void write() {
+    std::unique_lock lock(mutex_);
+    for (;;) {
+      changed_.wait(lock, [this] { return over_ || !waiting_.empty(); });
+      if (waiting_.empty()) {
+        return;
+      }
+      const Words& next = waiting_.front();  // stays there until it is written
+      lock.unlock();
+      next.how(next.text);
+      lock.lock();
+      waiting_.pop_front();
+    }
+  }
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Words> waiting_;
+  bool over_ = false;
+  std::thread thread_;
+};
+
 Terminal::Terminal()
-    : is_terminal_(isatty(STDOUT_FILENO) != 0),
+    : writer_(std::make_unique<Writer>()),
+      is_terminal_(isatty(STDOUT_FILENO) != 0),
       coloured_(shows_colour(STDOUT_FILENO)),
       errors_coloured_(shows_colour(STDERR_FILENO)) {}
 
+Terminal::~Terminal() = default;
+
 void Terminal::complain(const std::string& text) {
   clear_progress();
-  tools::complain(
-      painted(Colour::bad, wrapped("punctum: " + text, columns_of(STDERR_FILENO)), errors_coloured_));
+  writer_->say(tools::complain, painted(Colour::bad, wrapped("punctum: " + text, columns_of(STDERR_FILENO)),
+                                        errors_coloured_));
 }
 
 void Terminal::print(const std::string& text) {
   clear_progress();
-  tools::say(wrapped(text, columns_of(STDOUT_FILENO)));
+  writer_->say(tools::say, wrapped(text, columns_of(STDOUT_FILENO)));
 }
 
 void Terminal::progress(const std::string& line) {
+  if (!writer_->has_written_all()) {
+    return;
+  }
   if (!is_terminal_) {
     say("{}", line);
     return;
   }
-  tools::say("\r\033[K" + line);
+  writer_->say(tools::say, "\r\033[K" + line);
   progress_drawn_ = true;
 }
 
 void Terminal::clear_progress() {
   if (progress_drawn_) {
-    tools::say("\r\033[K");
+    writer_->say(tools::say, "\r\033[K");
   }
   progress_drawn_ = false;
 }

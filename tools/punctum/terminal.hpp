@@ -1,12 +1,14 @@
 // What the parent says while a run goes on: lines that stay, and on a terminal one line that is drawn again.
 // Colour only where a terminal shows it and NO_COLOR is not set; what cannot be written (a closed pipe, a
-// terminal that is gone) ends no run.
+// terminal that is gone) ends no run, and a terminal that is halted (Ctrl-S) or hangs keeps nobody waiting
+// before the end.
 #pragma once
 
 #include <fmt/format.h>
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -35,6 +37,7 @@ struct LineStyle {
 class Terminal {
  public:
   Terminal();
+  ~Terminal();  // when all is written
 
   template <class... Args>
   void say(fmt::format_string<Args...> text, Args&&... args) {
@@ -42,7 +45,7 @@ class Terminal {
   }
   void complain(const std::string& text);  // on the standard error output
   void print(const std::string& text);     // as it is, but for lines that a terminal would break
-  void progress(const std::string& line);
+  void progress(const std::string& line);  // not where earlier words are still to be written
   void clear_progress();
   // How often progress is worth telling.
   [[nodiscard]] double progress_every_s() const { return is_terminal_ ? 0.1 : 5; }
@@ -50,6 +53,8 @@ class Terminal {
   [[nodiscard]] LineStyle line_style() const;                // of the line that is drawn again
 
  private:
+  class Writer;
+  std::unique_ptr<Writer> writer_;
   bool is_terminal_, coloured_, errors_coloured_;
   bool progress_drawn_ = false;
 };

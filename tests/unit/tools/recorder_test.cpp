@@ -83,6 +83,9 @@ TEST_F(RecorderTest, samples_that_were_overwritten_before_they_were_read_are_cou
   r.finish();
   EXPECT_GE(r.lost(), 500U);
   EXPECT_EQ(r.lost() + r.rows(), 10 + more) << "each sample is a row or lost";
+  ASSERT_EQ(r.not_kept().size(), 1U);
+  EXPECT_EQ(r.not_kept()[0].file, "samples.csv");
+  EXPECT_NEAR(r.not_kept()[0].t_s, 0.009, 1e-9) << "the last row before";
 }
 
 // Each number of a sample is another: where two change places, both are wrong.

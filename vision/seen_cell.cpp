@@ -232,9 +232,11 @@ int SeenCell::fit_undeformed_membrane(const ClearedPicture& picture, const Touch
   }
   const bool touched_before = touch.contact || touch.punctured || needle_hidden;
   const bool touched = entry || touched_before;
-  constexpr double kCertainMotion_px = 0.25;  // a less certain motion of the holding pipette is none
-  const bool certain = result.holder.sd < kCertainMotion_px;
-  const Point shift = undeformed_.update(*now, touched, certain ? mouth : std::nullopt);
+  std::optional<LearntUndeformed::Mouth> certain;
+  if (constexpr double kCertain_px = 0.25; mouth && result.holder.sd < kCertain_px) {
+    certain = {*mouth, result.holder.sd};
+  }
+  const Point shift = undeformed_.update(*now, touched, certain);
   for (FollowedMembrane* m : {&outer_, &inner_}) {
     m->rest.centre += shift;
   }

@@ -137,7 +137,7 @@ void SeenEvents::without_the_cell(Result& result) {
     result.punctured = reversal_.update(touch_.contact, std::nullopt);
     result.inner_punctured = inner_reversal_.update(result.punctured, std::nullopt);
   } else {
-    result.punctured = puncture_.update({.t_ns = result.exposure_ns});
+    result.punctured = puncture_.update({.t_ns = result.exposure_ns, .contact = touch_.contact});
     result.inner_punctured = inner_puncture_.update(result.punctured, std::nullopt, 0);
   }
   touch_.punctured = result.punctured;

@@ -188,12 +188,16 @@ void SeenNeedle::put_right_by_stage(const ClearedPicture& picture, const Touch& 
   }
   if (!n.ok) {
     n = pipette_.by_shaft(picture.field, picture.noise, *told).value_or(n);
-    n.sd = by_stage_.sd();
+    n.sd = on_tip_sd_px_ = by_stage_.sd();
     wall_px_ = gone_odds_ = 0;
     return;
   }
   n.sd = math::hypot(n.sd, touch.at_membrane() ? kWall_px : 0);
+  const double seen_sd = n.sd;
   n = by_stage_.most_likely(n);
+  if (n.sd > seen_sd) {  // the two do not agree
+    on_tip_sd_px_ = math::hypot(on_tip_sd_px_, n.sd);
+  }
   pipette_.put(n.tip);
   // In contact the picture shows where the membrane is, on the tip; of a thin needle it draws the end back.
   if (touch.at_membrane() && pipette_.shows_lumen()) {

@@ -66,7 +66,8 @@ struct Injections {
   std::vector<int> contact, puncture;  // frames by which they are told late; 99: never
 };
 
-void inject(Microscope m, Injections& out) {
+// drift: px per frame, of all that is in the picture.
+void inject(Microscope m, Injections& out, const cv::Point2d& drift = {}) {
   std::mt19937 random(m.seed + 7);
   const auto between = [&random](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random);
@@ -84,6 +85,7 @@ void inject(Microscope m, Injections& out) {
     m.gap_px = at.gap_px;
     m.dimple_px = at.dimple_px;
     m.shot = static_cast<unsigned>(k) + 1;
+    m.moved = k * drift;
     const auto [picture, truth] = DrawnMicroscope(m).draw();
     const Result& r = tracker.process(frame_of(picture, static_cast<std::uint64_t>(k)));
     if (at.phase == "in contact" && !touched) {
@@ -175,6 +177,22 @@ TEST_P(DrawnInjection, shows_the_dimple_and_when_the_membrane_gives_way) {
   }
   for (const int late : all.puncture) {
     EXPECT_TRUE(late >= 0 && late <= 2) << late;
+  }
+}
+
+// The stage creeps: the outline at rest goes with the cell.
+TEST(DriftingInjection, shows_the_dimple_as_deep_as_it_is) {
+  for (const cv::Point2d& drift : {cv::Point2d(0.2, 0.2), cv::Point2d(-0.25, 0)}) {
+    Injections all;
+    Microscope m;
+    m.seed = 1;
+    inject(m, all, drift);
+    print("drift", all);
+    const Seen& pushed = all.in["in contact"];
+    EXPECT_GE(pushed.depths, pushed.frames - 2);
+    EXPECT_LT(std::sqrt(pushed.depth / pushed.depths), 0.6);
+    EXPECT_GE(pushed.deep_covered, 8 * pushed.depths / 10);
+    EXPECT_LE(std::abs(all.contact[0]), 1);
   }
 }
 

@@ -212,6 +212,34 @@ void learn_path_outside(const MembraneSearch& search, const EdgePath& path, cons
   }
 }
 
+// In relief the rim of the pit, above and below the focus, covers the edge of the dimple. The membrane lies
+// on the tip that pushes it; what the contour lies short of that its dimple does, the less the further aside.
+void deepen_to_the_tip(const MembraneSearch& search, const EdgeFound& found, Contour& contour) {
+  constexpr double kRim_px = 1;            // by so much the rim may lie outside: sd
+  constexpr double kWide = 1.5, kFar = 3;  // half widths of the needle; of these
+  const Surroundings& s = search.surroundings;
+  const NeedlePose& n = s.needle;
+  if (search.m.polarity != Polarity::relief || !s.outermost || s.punctured || !found.held || !search.needle ||
+      search.rest.empty() || search.depth_of_tip() < 0) {
+    return;
+  }
+  const Point tip = n.point();
+  const auto entry = entry_point(contour, tip, n.axis);
+  if (!entry) {
+    return;
+  }
+  const double short_of = std::max(0.0, (tip - *entry).dot(n.axis)) * kRim_px * kRim_px /
+                          (kRim_px * kRim_px + n.sd * n.sd),
+               wide = kWide * n.half_width;
+  for (Point& p : contour) {
+    const Point off = p - *entry;
+    const double aside = off.cross(n.axis) / wide;
+    if (std::abs(aside) < kFar && cv::norm(off) < 2 * kFar * wide) {
+      p += short_of * math::exp(-aside * aside) * n.axis;
+    }
+  }
+}
+
 // Away from the needle a membrane keeps its outline. An arc that has left the outline follows something else.
 bool left_outline(const MembraneSearch& s, const EdgePath& path) {
   if (s.rest.size() != path.r.size() || !s.needle || !s.m.rest.reliable()) {
@@ -321,12 +349,13 @@ Membrane follow(FollowedMembrane& m, const ClearedPicture& picture, const Vision
     ++m.lost_frames;
     return out;
   }
-  const auto shown = refined(search, path, config, surroundings, m.edge);
+  auto shown = refined(search, path, config, surroundings, m.edge);
   if (!shown) {
     out.reason = "edge does not look alike all round";
     ++m.lost_frames;
     return out;
   }
+  deepen_to_the_tip(search, found, shown->contour);
   const SeenOutline& seen = *shown;
   out.contour = seen.contour;
   out.support = path.support;

@@ -11,12 +11,14 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr int kReliable = 6;              // frames without contact; then the outline is relied on
-constexpr int kOutlineMemory = 12;        // frames averaged
-constexpr int kCircleMemory = 20;         // frames averaged
-constexpr double kDentHalf = 0.9;         // rad to either side of the entry
-constexpr double kHolderHalf = 0.6;       // rad to either side of the holding pipette's mouth
-constexpr double kHolderMotion_px = 1.0;  // less is no motion of the holding pipette
+constexpr int kReliable = 6;             // frames without contact; then the outline is relied on
+constexpr int kOutlineMemory = 12;       // frames averaged
+constexpr int kCircleMemory = 20;        // frames averaged
+constexpr double kDentHalf = 0.9;        // rad to either side of the entry
+constexpr double kHolderHalf = 0.6;      // rad to either side of the holding pipette's mouth
+constexpr double kMotion_sd = 2.5;       // less is no motion of the holding pipette
+constexpr double kLeastMotion_px = 0.1;  // likewise, however certain its place is
+constexpr double kLeastDrift_px = 0.02;  // per frame: less may be noise
 
 // The angle between them has a larger cosine.
 bool within(const Point& d, const Point& e, double cosine) {
@@ -35,13 +37,24 @@ Vector<double> RestOutline::seen_from(const Point& other_centre) const {
 
 void RestOutline::learn(const Point& now_centre, const Vector<double>& now_r) {
   if (r.empty() || cv::norm(centre - now_centre) > 0.1 * median_of(now_r)) {
-    *this = {now_centre, now_r, 1};
+    *this = {.centre = now_centre, .r = now_r, .frames = 1, .last = now_centre};
     return;
   }
-  const Vector<double> now = polar_radii(from_polar(now_centre, now_r), centre, static_cast<int>(r.size()));
-  const double gain = 1.0 / std::min(++frames, kOutlineMemory);
+  const int angles = static_cast<int>(r.size());
+  const auto rays = unit_rays(angles);
+  const Vector<double> now = polar_radii(from_polar(now_centre, now_r), centre, angles);
+  // It moves with the cell at once: what differs as the cosine of the angle. Its form is the mean of the
+  // frames.
+  Point shift;
   for (std::size_t i = 0; i < now.size(); ++i) {
-    r[i] += gain * (now[i] - r[i]);
+    shift += 2.0 / angles * (now[i] - r[i]) * rays[i];
+  }
+  centre += shift;
+  const double gain = 1.0 / std::min(++frames, kOutlineMemory);
+  drift += (centre - last - drift) / std::min(frames - 1, kOutlineMemory);
+  last = centre;
+  for (std::size_t i = 0; i < now.size(); ++i) {
+    r[i] += gain * (now[i] - shift.dot(rays[i]) - r[i]);
   }
 }
 
@@ -71,7 +84,7 @@ RestOutline outline_within(const RestOutline& around, const Point& centre, const
   return out;
 }
 
-Point LearntUndeformed::update(const Undeformed& now, bool touched, const std::optional<Point>& mouth) {
+Point LearntUndeformed::update(const Undeformed& now, bool touched, const std::optional<Mouth>& mouth) {
   if (!shape_ || (!touched && now.round)) {
     if (shape_ && shape_->round && now.round &&
         cv::norm(now.circle.centre - shape_->circle.centre) < 0.05 * shape_->circle.r) {
@@ -86,21 +99,31 @@ Point LearntUndeformed::update(const Undeformed& now, bool touched, const std::o
       shape_ = now;
       frames_ = 1;
     }
-    mouth_ = mouth;
   } else if (!touched) {
     shape_ = now;
-    mouth_ = mouth;
-  } else if (mouth_ && mouth && cv::norm(*mouth - *mouth_) > kHolderMotion_px) {
-    const Point shift = *mouth - *mouth_;
+  } else {
+    const Point shift = moved(mouth);
     shape_->circle.centre += shift;
     face_.centre += shift;
     for (Point& p : shape_->shape) {
       p += shift;
     }
-    mouth_ = mouth;
     return shift;
   }
+  mouth_ = mouth ? std::optional(mouth->at) : std::nullopt;
   return {};
+}
+
+Point LearntUndeformed::moved(const std::optional<Mouth>& mouth) {
+  if (!mouth_) {
+    return face_.reliable() && cv::norm(face_.drift) > kLeastDrift_px ? face_.drift : Point();
+  }
+  if (!mouth || cv::norm(mouth->at - *mouth_) < std::max(kMotion_sd * mouth->sd, kLeastMotion_px)) {
+    return {};
+  }
+  const Point shift = mouth->at - *mouth_;
+  mouth_ = mouth->at;
+  return shift;
 }
 
 void LearntUndeformed::learn_outline(const Contour& contour, const Point& centre) {

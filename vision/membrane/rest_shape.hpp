@@ -14,6 +14,8 @@ struct RestOutline {
   Point centre;
   Vector<double> r;  // px per angle; empty: not known
   int frames = 0;    // that it was learnt from
+  Point drift = {};  // px per frame, while it was learnt
+  Point last = {};   // centre when it was learnt last
 
   [[nodiscard]] bool reliable() const noexcept;                             // learnt from enough frames
   [[nodiscard]] Vector<double> seen_from(const Point& other_centre) const;  // empty: not known
@@ -30,9 +32,13 @@ struct RestOutline {
 // outline of its outer face as it was seen. Both move with the holding pipette.
 class LearntUndeformed {
  public:
-  // now: fitted to this frame. mouth: of the holding pipette, where it is seen. Returns by how much the
-  // holding pipette has moved the cell.
-  [[nodiscard]] Point update(const Undeformed& now, bool touched, const std::optional<Point>& mouth);
+  // now: fitted to this frame. mouth: of the holding pipette, where it is seen. Returns by how much the cell
+  // has moved while the needle touches it: with the holding pipette, or else as it drifted before.
+  struct Mouth {
+    Point at;
+    double sd = 0;  // px
+  };
+  [[nodiscard]] Point update(const Undeformed& now, bool touched, const std::optional<Mouth>& mouth);
   // The contour of a frame in which nothing touches it, seen from `centre`.
   void learn_outline(const Contour& contour, const Point& centre);
   void forget();
@@ -47,6 +53,7 @@ class LearntUndeformed {
   std::optional<Undeformed> shape_;
   RestOutline face_;
   int frames_ = 0;  // that it was learnt from
+  [[nodiscard]] Point moved(const std::optional<Mouth>& mouth);
   std::optional<Point> mouth_;
 };
 

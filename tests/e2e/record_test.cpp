@@ -158,6 +158,25 @@ TEST_F(Recordings, a_run_goes_on_when_its_recorder_is_killed_and_the_report_says
   EXPECT_NE(said_.find(replayed_ticks(cut.rows.size())), std::string::npos) << said_;
 }
 
+TEST_F(Recordings, a_recorder_that_somebody_asks_to_end_has_not_kept_the_run) {
+  Running running({"run", "free", "--seconds", "2", "--quiet", "--no-figure", "--record", "--report",
+                   report(), "--set", kPatientRelay},
+                  words());
+  const std::string recording = report() + "/recording.mcap";
+  for (int i = 0; i < 1000 && (!fs::exists(recording) || fs::file_size(recording) < 100'000);
+       ++i, std::this_thread::sleep_for(5ms)) {
+  }
+  const pid_t recorder = child_named(running.pid(), "punctum-record");
+  ASSERT_NE(recorder, 0);
+  kill(recorder, SIGTERM);
+  EXPECT_EQ(running.wait(), 1);
+  EXPECT_NE(
+      running.output().find("recording.mcap is not whole: punctum-record ended before the run had ended"),
+      std::string::npos)
+      << running.output();
+  EXPECT_EQ(json()["not_kept"][0]["file"], "recording.mcap");
+}
+
 TEST_F(Recordings, virtual_time_waits_for_a_recorder_that_stands_still) {
   Running running({"run", "icsi", "--clock", "virtual", "--seconds", "6", "--quiet", "--no-figure",
                    "--record", "--report", report()},

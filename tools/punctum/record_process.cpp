@@ -55,10 +55,16 @@ tl::expected<void, std::string> RecordProcess::start(const std::string& station,
 }
 
 std::string RecordProcess::why(const Ended& how) const {
-  if (how.exited && how.code == exit_done) {
-    return {};
+  if (!how.exited) {
+    return "punctum-record " + how.text();
   }
-  return fmt::format("punctum-record {}{}", how.text(), how.exited ? ": " + last_line(child_.log()) : "");
+  if (how.code != exit_done) {
+    return fmt::format("punctum-record {}: {}", how.text(), last_line(child_.log()));
+  }
+  // Somebody asked it to end, for example: what it took is in order, and not the run.
+  return (*progress_)->ended.load(std::memory_order_acquire) == 0
+             ? "punctum-record ended before the run had ended"
+             : std::string();
 }
 
 std::string RecordProcess::watch() {

@@ -224,6 +224,10 @@ int run(int argc, char** argv) {
   record(**recorder, recorded.core.status, scene->clock,
          mapped->progress ? mapped->progress->get() : nullptr);
   (*recorder)->finish();
+  if (mapped->progress &&
+      ((*recorder)->core_has_ended() || is_gone(recorded.core.status.pid.load(std::memory_order_relaxed)))) {
+    (*mapped->progress)->ended.store(1, std::memory_order_release);
+  }
   say(summary(options.out, **recorder));
   if (const std::string& failure = (*recorder)->failure(); !failure.empty()) {
     complain("punctum-record: " + options.out + ": it ends here: " + failure);

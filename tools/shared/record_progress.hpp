@@ -1,5 +1,5 @@
-// How far the recording of a run has come, in shared memory: up to when it is whole if it ends early, and in
-// virtual time what the station waits for.
+// How far the recording of a run has come, in shared memory: up to when it is whole if it ends early, in
+// virtual time what the station waits for, and whether it has come to the run's end.
 #pragma once
 
 #include <atomic>
@@ -14,13 +14,15 @@ namespace punctum::tools {
 struct RecordProgress {
   static constexpr bool kOneWriter = true;
   static constexpr std::uint64_t kMagic = 0x0064726f63655250ULL;  // "PRecord"
-  static constexpr std::uint64_t kVersion = 1;
+  static constexpr std::uint64_t kVersion = 2;
   static const std::uint64_t kLayout;
 
   hal::SegmentHeader header;
   std::atomic<std::uint64_t> taken{0};  // ticks, from the first on
+  std::atomic<std::uint64_t> ended{0};  // 1: the core was over, and all that it had told was taken
 };
 inline constexpr std::uint64_t RecordProgress::kLayout =
-    hal::fingerprint(RecordProgress::kVersion, sizeof(RecordProgress), offsetof(RecordProgress, taken));
+    hal::fingerprint(RecordProgress::kVersion, sizeof(RecordProgress), offsetof(RecordProgress, taken),
+                     offsetof(RecordProgress, ended));
 
 }  // namespace punctum::tools

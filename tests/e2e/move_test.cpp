@@ -67,5 +67,16 @@ TEST_F(Move, an_interrupt_stops_it_on_the_way_and_a_fault_ends_it) {
   EXPECT_NE(said_.find("positioner: device 1 axis 1: rejected: BADDATA"), std::string::npos) << said_;
 }
 
+TEST_F(Move, what_something_else_stopped_on_the_way_is_not_there) {
+  Running moving({"move", (folder_ / "slow.toml").string(), "--to", "26000,10000,10000"}, folder_ / "moving");
+  std::this_thread::sleep_for(700ms);
+  devices_.tell("knob 1");
+  EXPECT_EQ(moving.wait(), 3);
+  const std::string said = read_all(folder_ / "moving");
+  EXPECT_NE(said.find("positioner: it came to rest at [1"), std::string::npos) << said;
+  EXPECT_NE(said.find(", not at [26000.00, 10000.00, 10000.00] um: something else"), std::string::npos)
+      << said;
+}
+
 }  // namespace
 }  // namespace punctum::e2e

@@ -146,7 +146,7 @@ int main_or_throw(int argc, char** argv) {
                              {{exit_done, "it is there"},
                               {exit_not_done, "stopped on the way, by control-C"},
                               {exit_bad_input, "bad input: nothing has moved"},
-                              {exit_fault, "the manipulator has a fault"}}));
+                              {exit_fault, "the manipulator has a fault, or came to rest somewhere else"}}));
   listing->footer(
       help_footer({{"punctum devices", "what a scene could name on this machine"}}, {{exit_done, "listed"}}));
   reporting->footer(

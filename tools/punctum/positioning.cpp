@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 #include <signal.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <memory>
 #include <string>
 #include <thread>
@@ -18,13 +20,25 @@ namespace punctum::tools {
 namespace {
 
 constexpr auto kLook = std::chrono::milliseconds(50);
+constexpr double kThere_m = 1e-6;  // or a step: what a device calls settled
 
 std::string um(const hal::Vec3& v) {
   return fmt::format("[{:.2f}, {:.2f}, {:.2f}] um", v.x() * 1e6, v.y() * 1e6, v.z() * 1e6);
 }
 
+bool is_there(const hal::Vec3& at_m, const hal::Vec3& wanted_m, const zaber::ZaberParams& params) {
+  for (std::size_t i = 0; i < params.axes.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    if (std::abs(at_m[k] - wanted_m[k]) > std::max(kThere_m, std::abs(params.axes[i].microstep_m))) {
+      return false;
+    }
+  }
+  return true;
+}
+
 // Until it rests, or somebody interrupts.
-int wait_for_rest(zaber::ZaberPositioner& positioner, Terminal& terminal) {
+int wait_for_rest(zaber::ZaberPositioner& positioner, const zaber::ZaberParams& params,
+                  const hal::Vec3& wanted_m, Terminal& terminal) {
   bool stopped = false;
   for (hal::PositionerState state;; std::this_thread::sleep_for(kLook)) {
     if (stop_signal::count() > 0 && !stopped) {
@@ -36,6 +50,12 @@ int wait_for_rest(zaber::ZaberPositioner& positioner, Terminal& terminal) {
       return exit_fault;
     }
     if (!state.moving) {
+      if (!stopped && !is_there(state.position_m, wanted_m, params)) {
+        terminal.complain(fmt::format(
+            "positioner: it came to rest at {}, not at {}: something else stopped or moved it on the way",
+            um(state.position_m), um(wanted_m)));
+        return exit_fault;
+      }
       terminal.say("{} at {}", stopped ? "stopped" : "there,", um(state.position_m));
       return stopped ? exit_not_done : exit_done;
     }
@@ -68,7 +88,7 @@ int move_positioner(const Scene& scene, const std::optional<hal::Vec3>& target_m
   const hal::Vec3 wanted_m = target_m.value_or(scene.zaber->park_m);
   int code = exit_bad_input;
   if (positioner.move_to(wanted_m)) {
-    code = wait_for_rest(positioner, terminal);
+    code = wait_for_rest(positioner, *scene.zaber, wanted_m, terminal);
   } else if (!positioner.why().empty()) {
     terminal.complain(fmt::format("positioner: {}", positioner.why()));
     code = exit_fault;

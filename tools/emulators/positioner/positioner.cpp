@@ -44,7 +44,8 @@ unsigned sum_of(std::string_view text) {
 }  // namespace
 
 const char* const Positioner::kCommands =
-    "stall DEVICE [AXIS] (it stops and says FS), unhome DEVICE [AXIS] (WR), stick DEVICE [AXIS] (its "
+    "stall DEVICE [AXIS] (it stops and says FS), knob DEVICE [AXIS] (it stops and says NI), unhome DEVICE "
+    "[AXIS] (WR), stick DEVICE [AXIS] (its "
     "position hangs), "
     "flag XX DEVICE [AXIS], mute [N] (no answer, to the next N or for ever), speak, late MILLISECONDS, "
     "garbage N, "
@@ -401,10 +402,10 @@ std::string Positioner::command(std::string_view line) {
     return unknown();
   }
   Axis& axis = at(number, axis_number);
-  if (verb == "stall") {
+  if (verb == "stall" || verb == "knob") {
     axis.target = axis.at;
     axis.speed = 0;
-    axis.flag = "FS";
+    axis.flag = verb == "stall" ? "FS" : "NI";
   } else if (verb == "unhome") {
     axis.homed = false;
   } else if (verb == "stick") {

@@ -78,5 +78,29 @@ TEST_F(Move, what_something_else_stopped_on_the_way_is_not_there) {
       << said;
 }
 
+TEST_F(Move, an_axis_that_hangs_is_not_waited_for) {
+  devices_.tell("stick 1");
+  EXPECT_EQ(punctum({"--to", "10100,10000,10000"}), 3);
+  EXPECT_NE(
+      said_.find("positioner: it says that it moves, stands at [10000.00, 10000.00, 10000.00] um and comes "
+                 "no nearer: it was told to stop"),
+      std::string::npos)
+      << said_;
+}
+
+TEST_F(Move, a_second_interrupt_does_not_wait_for_an_axis_that_does_not_stop) {
+  Running moving({"move", (folder_ / "slow.toml").string(), "--to", "26000,10000,10000"}, folder_ / "moving");
+  std::this_thread::sleep_for(700ms);
+  devices_.tell("stick 1");  // at speed
+  std::this_thread::sleep_for(100ms);
+  const auto begun = std::chrono::steady_clock::now();
+  moving.send(SIGINT);
+  std::this_thread::sleep_for(300ms);
+  moving.send(SIGINT);
+  EXPECT_EQ(moving.wait(), 3);
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, 2s);
+  EXPECT_NE(read_all(folder_ / "moving").find("has not said that it stopped"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace punctum::e2e

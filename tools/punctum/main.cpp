@@ -141,12 +141,13 @@ int main_or_throw(int argc, char** argv) {
   checking->footer(
       help_footer({{"punctum check my.toml", "before the first run on a machine"}},
                   {{exit_done, "it can run"}, {exit_bad_input, "it cannot; the text says why"}}));
-  moving->footer(help_footer({{"punctum move my.toml --to 1000,2500,-300", "it says when it is there"},
-                              {"punctum move my.toml --park", "out of the way"}},
-                             {{exit_done, "it is there"},
-                              {exit_not_done, "stopped on the way, by control-C"},
-                              {exit_bad_input, "bad input: nothing has moved"},
-                              {exit_fault, "the manipulator has a fault, or came to rest somewhere else"}}));
+  moving->footer(help_footer(
+      {{"punctum move my.toml --to 1000,2500,-300", "it says when it is there"},
+       {"punctum move my.toml --park", "out of the way"}},
+      {{exit_done, "it is there"},
+       {exit_not_done, "stopped on the way, by control-C"},
+       {exit_bad_input, "bad input: nothing has moved"},
+       {exit_fault, "the manipulator has a fault, came to rest somewhere else, or does not come to rest"}}));
   listing->footer(
       help_footer({{"punctum devices", "what a scene could name on this machine"}}, {{exit_done, "listed"}}));
   reporting->footer(

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <string>
 #include <thread>
@@ -20,7 +21,8 @@ namespace punctum::tools {
 namespace {
 
 constexpr auto kLook = std::chrono::milliseconds(50);
-constexpr double kThere_m = 1e-6;  // or a step: what a device calls settled
+constexpr auto kPatience = std::chrono::seconds(3);  // with an axis that is busy and does not come nearer
+constexpr double kThere_m = 1e-6;                    // or a step: what a device calls settled
 
 std::string um(const hal::Vec3& v) {
   return fmt::format("[{:.2f}, {:.2f}, {:.2f}] um", v.x() * 1e6, v.y() * 1e6, v.z() * 1e6);
@@ -36,14 +38,18 @@ bool is_there(const hal::Vec3& at_m, const hal::Vec3& wanted_m, const zaber::Zab
   return true;
 }
 
-// Until it rests, or somebody interrupts.
+// Until it rests, hangs, or somebody interrupts: the first signal brakes, the second is not waited for.
 int wait_for_rest(zaber::ZaberPositioner& positioner, const zaber::ZaberParams& params,
                   const hal::Vec3& wanted_m, Terminal& terminal) {
+  using Clock = std::chrono::steady_clock;
   bool stopped = false;
+  double least_left_m = std::numeric_limits<double>::infinity();
+  auto nearer = Clock::now();
   for (hal::PositionerState state;; std::this_thread::sleep_for(kLook)) {
     if (stop_signal::count() > 0 && !stopped) {
       positioner.stop();
       stopped = true;
+      nearer = Clock::now();
     }
     if (positioner.read(state) != hal::Status::ok || state.fault) {
       terminal.complain(fmt::format("positioner: {}", positioner.why()));
@@ -58,6 +64,19 @@ int wait_for_rest(zaber::ZaberPositioner& positioner, const zaber::ZaberParams& 
       }
       terminal.say("{} at {}", stopped ? "stopped" : "there,", um(state.position_m));
       return stopped ? exit_not_done : exit_done;
+    }
+    if (const double left_m = (wanted_m - state.position_m).norm(); left_m < least_left_m - kThere_m) {
+      least_left_m = left_m;
+      nearer = Clock::now();
+    }
+    if (stop_signal::count() > 1 || Clock::now() > nearer + kPatience) {
+      if (!stopped) {
+        positioner.stop();
+      }
+      terminal.complain(
+          fmt::format("positioner: it says that it moves, stands at {} and {}", um(state.position_m),
+                      stopped ? "has not said that it stopped" : "comes no nearer: it was told to stop"));
+      return exit_fault;
     }
     if (terminal.line_style().columns > 0) {
       terminal.progress(um(state.position_m));

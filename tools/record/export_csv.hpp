@@ -10,7 +10,7 @@ namespace punctum::tools {
 
 struct Exported {
   std::uint64_t ticks = 0, events = 0, observations = 0;
-  std::string ends;  // why the recording ends before its end, in a line; empty if it does not
+  std::string ends;  // why the recording is not the whole run, in a line; empty if it is
 };
 
 // samples.csv and events.csv as the run wrote them, scene.toml, and observations.csv, into a folder that may

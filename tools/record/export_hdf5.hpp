@@ -8,8 +8,8 @@
 
 namespace punctum::tools {
 
-// The file is there as a whole or not at all; refused where there is one. The value: why the recording ends
-// before its end, in a line; empty if it does not. The error is one line: nothing could be read or written.
+// The file is there as a whole or not at all; refused where there is one. The value: why the recording
+// is not the whole run, in a line; empty if it is. The error is one line: nothing could be read or written.
 [[nodiscard]] tl::expected<std::string, std::string> export_hdf5(const std::string& recording,
                                                                  const std::string& file);
 

@@ -6,7 +6,7 @@
 
 namespace punctum::tools {
 
-// The value: why the recording ends before its end, in a line; empty if it does not. The error is one line:
+// The value: why the recording is not the whole run, in a line; empty if it is. The error is one line:
 // no pictures in it, or they cannot be written. What is there already is not replaced.
 [[nodiscard]] tl::expected<std::string, std::string> export_png(const std::string& recording,
                                                                 const std::string& folder);

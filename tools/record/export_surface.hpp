@@ -8,8 +8,8 @@
 namespace punctum::tools {
 
 // Those that vision told nearest to a time of the run (none: the last ones): STEM.obj and what else
-// tools/vision/surface_files.hpp writes. The value: why the recording ends before its end, in a line; empty
-// if it does not. The error is one line: nothing could be read or written.
+// tools/vision/surface_files.hpp writes. The value: why the recording is not the whole run, in a line; empty
+// if it is. The error is one line: nothing could be read or written.
 [[nodiscard]] tl::expected<std::string, std::string> export_surface(const std::string& recording,
                                                                     const std::string& stem,
                                                                     std::optional<double> at_s);

@@ -85,10 +85,7 @@ class Reading {
       facts_.wake_max_us = wake_.max_us();
     }
   }
-  void operator()(const v1::Loss& l) {
-    facts_.lost_messages = l.telemetry() + l.observations() + l.surfaces() + l.events() + l.truth() +
-                           l.unusable() + l.inputs() + l.pictures();
-  }
+  void operator()(const v1::Loss& l) { facts_.lost_messages = lost_messages(l); }
 
   // False: there was no tick.
   [[nodiscard]] bool finish() {

@@ -26,7 +26,7 @@ struct RunFacts {
   std::string first_fault, end;  // empty: none; the run's end is not recorded
   std::uint64_t missed_ticks = 0, lost_messages = 0;
   std::optional<double> wake_p999_us, wake_max_us;  // nothing: not told
-  std::string ends;  // why the recording ends before its end; empty: it does not
+  std::string ends;                                 // why the recording is not the whole run; empty: it is
 };
 
 // The error is one line: no recording, or no tick in it.

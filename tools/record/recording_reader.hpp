@@ -16,6 +16,12 @@
 
 namespace punctum::tools {
 
+// Of all kinds together: what the recorder has not seen.
+[[nodiscard]] inline std::uint64_t lost_messages(const v1::Loss& l) {
+  return l.telemetry() + l.observations() + l.surfaces() + l.events() + l.truth() + l.unusable() +
+         l.inputs() + l.pictures();
+}
+
 class RecordingReader {
  public:
   // The error is one line.
@@ -49,20 +55,31 @@ class RecordingReader {
     return true;
   }
 
-  // All that are left, in the order of the file. The result: why it ends before its end, in a line; empty if
-  // it does not.
+  // All that are left, in the order of the file. The result: why it is not the whole run, in a line, for it
+  // ends before its end or has holes; empty if it is.
   template <class Take>
   [[nodiscard]] std::string read_all(Take& take) {
     for (;;) {
       const auto more = next(take);
-      if (!more || !*more) {
-        return more ? std::string() : more.error();
+      if (!more) {
+        return more.error();
+      }
+      if (!*more) {
+        return holes();
       }
     }
   }
 
  private:
   RecordingReader(mcap::Reader file, std::string path) : file_(std::move(file)), path_(std::move(path)) {}
+
+  [[nodiscard]] std::string holes() const {
+    const std::uint64_t lost = lost_messages(loss_);
+    return lost == 0
+               ? std::string()
+               : fmt::format("{}: has holes: {} messages did not reach the recorder, {} ticks among them",
+                             path_, lost, loss_.telemetry());
+  }
 
   template <class Message, class Take>
   [[nodiscard]] bool give(const mcap::Message& m, Message& message, Take& take) {

@@ -235,7 +235,8 @@ int run(int argc, char** argv) {
         "whether this build's servo does, tick by tick, what was recorded"},
        {"punctum-replay recording.mcap --console --speed 0.25", "the run once more in a browser, slowly"}},
       {{exit_done, "bit-identical, and the recording is whole"},
-       {exit_not_done, "it differs, and the first difference is said; or the recording ends early"},
+       {exit_not_done,
+        "it differs, and the first difference is said; or the recording ends early or has holes"},
        {exit_bad_input, "no recording, or none that holds the inputs of a run from its first tick on"}}));
   app.add_flag("--console", showing.console,
                "show it in a browser instead, as a run; what is typed seeks, changes the speed, pauses");

@@ -340,13 +340,16 @@ TEST_F(ExportTest, many_runs_stand_side_by_side) {
     EXPECT_NEAR(rows.number(name).value_or(-1), value, 1e-9) << name;
   }
   EXPECT_EQ(rows.text("fault"), "command_stop") << "the first";
-  EXPECT_EQ(rows.text("whole"), "yes");
+  EXPECT_EQ(rows.text("whole"), "no") << "it has holes";
+  EXPECT_EQ(runs.front().ends, (folder_ / "run.mcap").string() +
+                                   ": has holes: 5 messages did not reach the recorder, 2 ticks among them");
   // A station that is not simulated and tells neither its scene nor its timing.
   ASSERT_TRUE(rows.next());
   for (const char* unknown : {"scene", "seed", "lost", "depth_um", "fault", "wake_max_us"}) {
     EXPECT_EQ(rows.text(unknown), "") << unknown;
   }
   EXPECT_EQ(rows.number("seconds"), 9);
+  EXPECT_EQ(rows.text("whole"), "yes");
   EXPECT_FALSE(rows.next());
   EXPECT_TRUE(std::filesystem::exists(std::filesystem::path(out) / "runs.svg"));
   EXPECT_FALSE(write_overview(runs, out)) << "nothing is replaced";

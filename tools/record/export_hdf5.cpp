@@ -360,6 +360,7 @@ tl::expected<std::string, std::string> export_hdf5(const std::string& recording,
   if (std::filesystem::exists(file, ec)) {
     return tl::unexpected(file + ": is there already; an export replaces nothing");
   }
+  (void)H5dont_atexit();  // it would touch a file again that could not be closed for want of room, and crash
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // its own words
   const std::string part = unfinished(file).string();
   std::string ends;

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iostream>
 #include <iterator>
 #include <limits>
 #include <optional>
@@ -17,6 +19,7 @@
 #include "hal/recorded/picture.hpp"
 #include "tests/support/full_disk.hpp"
 #include "tools/record/export_csv.hpp"
+#include "tools/record/export_hdf5.hpp"
 #include "tools/record/export_pictures.hpp"
 #include "tools/record/export_surface.hpp"
 #include "tools/record/mcap_writer.hpp"
@@ -305,6 +308,21 @@ std::string recorded_run(const std::filesystem::path& folder, bool whole = true)
     file->close_chunk();
   }
   return path;
+}
+
+// To the end of a process, where the library closes what is still open.
+TEST_F(ExportTest, a_full_disk_is_told_by_an_export_to_hdf5_and_crashes_nothing) {
+  const std::string run = recorded_run(folder_), out = folder_ / "run.nwb";
+  EXPECT_EXIT(
+      {
+        full_beyond(30'000);
+        const auto exported = export_hdf5(run, out);
+        std::cerr << (exported ? "exported" : exported.error());
+        std::exit(3);
+      },
+      testing::ExitedWithCode(3), "run.nwb: cannot be written");
+  EXPECT_FALSE(std::filesystem::exists(out));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "run.part.nwb"));
 }
 
 TEST_F(ExportTest, many_runs_stand_side_by_side) {

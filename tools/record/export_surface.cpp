@@ -1,10 +1,13 @@
 #include "tools/record/export_surface.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <iterator>
 #include <limits>
+#include <optional>
 #include <string>
 
 #include "tools/record/recording_reader.hpp"
@@ -24,10 +27,13 @@ class NearestSurface {
  public:
   explicit NearestSurface(std::optional<double> at_s) : at_s_(at_s) {}
 
-  void operator()(const v1::Telemetry& t) { now_s_ = t.t_s(); }
+  void operator()(const v1::Telemetry& t) {
+    now_s = t.t_s();
+    first_s = first_s.value_or(now_s);
+  }
   void operator()(const v1::CellSurface& s) {
     ++seen;
-    const double off_s = at_s_ ? std::abs(now_s_ - *at_s_) : 0;
+    const double off_s = at_s_ ? std::abs(now_s - *at_s_) : 0;
     if (off_s <= off_s_) {
       off_s_ = off_s;
       from_wire(s, surface);
@@ -36,10 +42,11 @@ class NearestSurface {
 
   rt::CellSurface surface;
   std::uint64_t seen = 0;
+  std::optional<double> first_s;  // of the ticks; nothing: there is none
+  double now_s = 0;
 
  private:
   std::optional<double> at_s_;
-  double now_s_ = 0;
   double off_s_ = std::numeric_limits<double>::infinity();
 };
 
@@ -53,6 +60,11 @@ tl::expected<std::string, std::string> export_surface(const std::string& recordi
   }
   NearestSurface nearest(at_s);
   std::string ends = reader->read_all(nearest);
+  const double first_s = nearest.first_s.value_or(0);
+  if (at_s && !(*at_s >= first_s && *at_s <= nearest.now_s)) {
+    return tl::unexpected(fmt::format("--at: {}: not in {}, allowed: from {:.3f} to {:.3f}", *at_s, recording,
+                                      first_s, nearest.now_s));
+  }
   if (nearest.seen == 0) {
     return tl::unexpected(recording + ": holds no surface; a scene tells them with vision.surface = true");
   }

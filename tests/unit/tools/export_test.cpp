@@ -233,7 +233,20 @@ TEST_F(ExportTest, the_surface_is_the_one_that_was_told_nearest_to_the_moment) {
   EXPECT_EQ(frame_at(0), "2");
   EXPECT_EQ(frame_at(4.4), "4");
   EXPECT_EQ(frame_at(5.6), "6");
-  EXPECT_EQ(frame_at(100), "8");
+  EXPECT_EQ(frame_at(9), "8");
+}
+
+TEST_F(ExportTest, a_moment_that_is_not_in_the_recording_is_refused) {
+  const std::string stem = folder_ / "cell";
+  for (const double at_s : {-1.0, 9.1, 1e300, std::numeric_limits<double>::infinity(),
+                            std::numeric_limits<double>::quiet_NaN()}) {
+    const auto exported = export_surface(recording(), stem, at_s);
+    ASSERT_FALSE(exported) << at_s;
+    EXPECT_NE(exported.error().find(": not in " + recording() + ", allowed: from 0.000 to 9.000"),
+              std::string::npos)
+        << exported.error();
+  }
+  EXPECT_FALSE(std::filesystem::exists(stem + ".json"));
 }
 
 TEST_F(ExportTest, a_full_disk_is_told) {

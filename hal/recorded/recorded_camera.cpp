@@ -325,6 +325,7 @@ void Camera::release(const hal::Frame&) {}
 
 const std::string& Camera::last_error() const noexcept { return impl_->error; }
 const std::string& Camera::name() const noexcept { return impl_->name; }
+const std::vector<std::string>& Camera::files() const noexcept { return impl_->files; }
 int Camera::width() const noexcept { return impl_->width; }
 int Camera::height() const noexcept { return impl_->height; }
 double Camera::fps() const noexcept { return impl_->fps; }

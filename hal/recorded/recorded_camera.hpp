@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 #include <tl/expected.hpp>
+#include <vector>
 
 #include "hal/devices.hpp"
 
@@ -32,6 +33,7 @@ class Camera final : public hal::Camera {
 
   [[nodiscard]] const std::string& last_error() const noexcept;  // why the last next() was not ok; or empty
   [[nodiscard]] const std::string& name() const noexcept;  // of the last picture: its file, or "video.avi:12"
+  [[nodiscard]] const std::vector<std::string>& files() const noexcept;  // that it plays; of a video none
   [[nodiscard]] int width() const noexcept;
   [[nodiscard]] int height() const noexcept;
   [[nodiscard]] double fps() const noexcept;

@@ -77,6 +77,14 @@ TEST_F(LabReport, is_made_again_from_what_a_crash_left_and_several_runs_are_comp
   const std::size_t last_row = samples.rfind('\n', samples.size() - 2) + 1;
   fs::resize_file(fs::path(report("a")) / "samples.csv", last_row + 40);  // in the middle of it
   const std::string out = (folder_ / "compared.html").string();
+  for (const char* of_a_run : {"a/samples.csv", "b/report.html"}) {
+    const std::string there = (folder_ / of_a_run).string(), before = read_all(there);
+    EXPECT_EQ(program("punctum", {"report", report("a"), report("b"), "--out", there}), 2) << said_;
+    EXPECT_TRUE(
+        contains(said_, "--out: " + there + ": belongs to one of these reports, allowed: another file"))
+        << said_;
+    EXPECT_EQ(read_all(there), before);
+  }
   ASSERT_EQ(program("punctum", {"report", report("a"), report("b"), "--out", out}), 0) << said_;
   const auto again = json("a");
   EXPECT_EQ(again["rebuilt"], true);

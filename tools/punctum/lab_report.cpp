@@ -3,6 +3,7 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <ctime>
 #include <filesystem>
 #include <fstream>
@@ -64,6 +65,19 @@ Done write_page(const std::string& folder, const Json& facts, const std::optiona
   return write_whole(fs::path(folder) / "report.html", run_page(folder, facts, drawing));
 }
 
+// A page that would take the place of what one of these reports holds. Another page of its own it may hold.
+bool would_destroy(const fs::path& page, const std::vector<std::string>& folders) {
+  std::error_code ec;
+  const fs::path real = fs::weakly_canonical(page, ec);
+  if (!fs::is_regular_file(real, ec) || (real.extension() == ".html" && real.filename() != "report.html")) {
+    return false;
+  }
+  return std::any_of(folders.begin(), folders.end(), [&](const std::string& folder) {
+    const fs::path from = real.lexically_relative(fs::weakly_canonical(folder, ec));
+    return !from.empty() && *from.begin() != "..";
+  });
+}
+
 }  // namespace
 
 Json whole_facts(const Json& begun, Json facts) {
@@ -87,6 +101,10 @@ Done write_report_page(const std::string& folder, const Json& facts, bool figure
 }
 
 int report_folders(const std::vector<std::string>& folders, const std::string& out) {
+  if (folders.size() > 1 && would_destroy(out, folders)) {
+    complain(fmt::format("--out: {}: belongs to one of these reports, allowed: another file", out));
+    return exit_bad_input;
+  }
   std::vector<ComparedRun> runs;
   for (const std::string& folder : folders) {
     const fs::path path = fs::path(folder).lexically_normal();

@@ -163,6 +163,9 @@ int evaluate_pairs_file(const std::string& input, const std::string& output) {
   if (file.bad()) {
     return fail(fmt::format("--input: {}: cannot be read", input));
   }
+  if (tools::same_file(output, input)) {
+    return fail(fmt::format("--output: {}: is the file of --input, allowed: another one", output));
+  }
   const auto rows = evaluate_pairs(text);
   if (!rows) {
     return fail(fmt::format("{}: {}", input, rows.error()));

@@ -73,6 +73,13 @@ tl::expected<void, std::string> put_in_place(const fs::path& path, Sync sync) {
   return {};
 }
 
+bool same_file(const fs::path& a, const fs::path& b) {
+  std::error_code ec;
+  const fs::file_status there = fs::status(a, ec);
+  return fs::exists(there) ? fs::is_regular_file(there) && fs::equivalent(a, b, ec)
+                           : fs::weakly_canonical(a, ec) == fs::weakly_canonical(b, ec);
+}
+
 tl::expected<void, std::string> write_whole(const fs::path& path, std::string_view content, Sync sync) {
   std::error_code ec;
   const fs::file_status there = fs::status(path, ec);

@@ -22,6 +22,10 @@ enum class Sync : std::uint8_t {
 [[nodiscard]] tl::expected<void, std::string> put_in_place(const std::filesystem::path& path,
                                                            Sync sync = Sync::to_disk);
 
+// Both are, or would be, one plain file: what is written to the one destroys what stands in the other. Never
+// of devices: whoever wants no table has it written to /dev/null.
+[[nodiscard]] bool same_file(const std::filesystem::path& a, const std::filesystem::path& b);
+
 // A pipe, a terminal or another device is written directly.
 [[nodiscard]] tl::expected<void, std::string> write_whole(const std::filesystem::path& path,
                                                           std::string_view content,

@@ -10,11 +10,13 @@
 #include <system_error>
 #include <tl/expected.hpp>
 #include <utility>
+#include <vector>
 
 #include "hal/recorded/picture.hpp"
 #include "hal/recorded/recorded_camera.hpp"
 #include "tools/scene/scene.hpp"
 #include "tools/shared/say.hpp"
+#include "tools/shared/whole_file.hpp"
 #include "tools/vision/observation_csv.hpp"
 #include "tools/vision/picture_file.hpp"
 #include "tools/vision/stage_poses.hpp"
@@ -173,6 +175,40 @@ struct Output {
   void write_surfaces(const vision::Result& result, const Input& input, const std::string& picture_name);
 };
 
+// Which output would replace what is read, or come into the file of another; empty: none.
+std::string clash(const TrackOptions& options, const Input& input) {
+  namespace fs = std::filesystem;
+  std::vector<std::pair<std::string, std::string>> taken = {
+      {"--frames", options.frames},
+      {"--scene", options.scene},
+      {"--poses", options.poses},
+      {"--template", options.holder_template},
+      {"the scene's template", input.config.holder ? input.config.holder->template_path : ""}};
+  for (const std::string& file : input.camera.files()) {
+    taken.emplace_back("--frames", file);
+  }
+  std::error_code ec;
+  std::erase_if(taken, [&ec](const auto& one) { return !fs::is_regular_file(one.second, ec); });
+  for (const auto& [option, path] : {std::pair{"--out", options.out},
+                                     {"--contours", options.contours},
+                                     {"--deviations", options.deviations}}) {
+    if (path.empty()) {
+      continue;
+    }
+    for (const auto& [other, file] : taken) {
+      if (same_file(path, file)) {
+        return fmt::format("{} {}: is the file of {}, allowed: another one", option, path, other);
+      }
+    }
+    taken.emplace_back(option, path);
+  }
+  if (!options.overlay.empty() && !fs::is_regular_file(options.frames, ec) && !input.camera.files().empty() &&
+      fs::equivalent(options.overlay, fs::absolute(input.camera.files().front()).parent_path(), ec)) {
+    return fmt::format("--overlay {}: is the folder of --frames, allowed: another one", options.overlay);
+  }
+  return {};
+}
+
 Or<Output> open_output(const TrackOptions& options) {
   auto observations = ObservationCsv::open(options.out, false, false);
   if (!observations) {
@@ -293,6 +329,10 @@ int track(const TrackOptions& options) {
   auto input = open_input(options);
   if (!input) {
     complain(input.error());
+    return kBadInput;
+  }
+  if (const std::string mixed_up = clash(options, *input); !mixed_up.empty()) {
+    complain(mixed_up);
     return kBadInput;
   }
   auto output = open_output(options);

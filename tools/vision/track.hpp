@@ -24,7 +24,8 @@ struct TrackOptions {
 };
 
 // Exit code. 0: done. 1: a table could not be written completely. 2, with one line on stderr: a bad scene,
-// first frame, region, seed circle, poses or template, or an output that cannot be opened.
+// first frame, region, seed circle, poses or template, or an output that cannot be opened, or that
+// would destroy an input or another output.
 [[nodiscard]] int track(const TrackOptions& options);
 
 }  // namespace punctum::tools

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "tools/scene/scene.hpp"
 #include "tools/vision/track.hpp"
 
 namespace {
@@ -262,6 +263,39 @@ TEST_F(Track, reports_a_table_that_cannot_be_written) {
   options_.out = (folder_ / "obs.csv").string();
   options_.contours = "/dev/full";
   EXPECT_EQ(track(options_), 1);
+}
+
+TEST_F(Track, refuses_an_output_that_is_an_input_or_another_output) {
+  frame(1);
+  frame(2);
+  const std::string scene = (folder_ / "mine.toml").string();
+  std::ofstream(scene) << punctum::tools::to_toml(*punctum::tools::load_scene("outer-only"));
+  std::ofstream(folder_ / "poses.csv") << "t_s,tip_x_m,tip_y_m\n0,0,0\n";
+  fs::create_symlink(name(2), folder_ / "link.csv");
+  const auto refused = [this, options = options_](auto change, const std::string& words) {
+    options_ = options;
+    change(options_);
+    testing::internal::CaptureStderr();
+    EXPECT_EQ(track(options_), 2);
+    const std::string said = testing::internal::GetCapturedStderr();
+    EXPECT_NE(said.find(words), std::string::npos) << said;
+  };
+  const std::string frames = ": is the file of --frames, allowed: another one\n";
+  refused([this](TrackOptions& o) { o.out = name(1); }, "--out " + name(1) + frames);
+  refused([this](TrackOptions& o) { o.contours = (folder_ / "link.csv").string(); }, "link.csv" + frames);
+  refused([&scene](TrackOptions& o) { o.scene = o.deviations = scene; }, ": is the file of --scene,");
+  refused([this](TrackOptions& o) { o.poses = o.contours = (folder_ / "poses.csv").string(); },
+          ": is the file of --poses,");
+  refused([](TrackOptions& o) { o.contours = o.out; }, ": is the file of --out,");
+  refused([this](TrackOptions& o) { o.overlay = (folder_ / "frames" / ".").string(); },
+          ": is the folder of --frames, allowed: another one\n");
+  EXPECT_FALSE(fs::exists(folder_ / "obs.csv"));
+  EXPECT_GT(fs::file_size(name(1)), 100U);
+  options_.contours = options_.overlay = "";
+  options_.contours = options_.deviations = "/dev/null";
+  options_.out = (folder_ / "frames" / "obs.csv").string();
+  options_.poses = "";
+  EXPECT_EQ(track(options_), 0) << "beside the frames, and twice to nowhere";
 }
 
 TEST_F(Track, refuses_a_seed_circle_outside_the_picture) {

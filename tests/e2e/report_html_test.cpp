@@ -192,6 +192,19 @@ TEST_F(LabReport, what_is_mistyped_is_answered_with_what_was_meant) {
   }
 }
 
+TEST_F(LabReport, a_number_that_is_none_or_too_large_is_refused_with_those_that_are_allowed) {
+  const std::vector<std::tuple<const char*, Strings, const char*>> calls = {
+      {"punctum-positioner", {"--start", "nan"}, "--start: nan, allowed: from 0 to 533333\n"},
+      {"punctum-positioner", {"--start", "1e6"}, "--start: 1e6, allowed: from 0 to 533333\n"},
+      {"punctum-positioner", {"--devices", "10"}, "--devices: 10, allowed: from 1 to 9\n"},
+      {"punctum-positioner", {"--devices", "two"}, "--devices: two, allowed: from 1 to 9\n"},
+  };
+  for (const auto& [name, args, refusal] : calls) {
+    EXPECT_EQ(program(name, args), 2) << said_;
+    EXPECT_EQ(said_, refusal);
+  }
+}
+
 // ---- the terminal ----
 
 // What a program writes to a terminal of that many columns.

@@ -74,7 +74,7 @@ int main_or_throw(int argc, char** argv) {
       ->type_name("NAME");
   const auto* const chosen = app.add_option("--port", port, "0: a free one (default: 8765, or a free one)")
                                  ->type_name("PORT")
-                                 ->check(CLI::Range(0, 65535));
+                                 ->check(within(0, 65535));
   app.add_option("--address", settings.address,
                  "where it listens (default: 127.0.0.1); one that other machines reach needs the next three")
       ->type_name("ADDRESS");

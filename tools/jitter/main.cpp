@@ -186,18 +186,18 @@ int main_or_throw(int argc, char** argv) {
   const CLI::Option* rate =
       app.add_option("--rate", wanted.rate_Hz, "ticks per second (default: 1000, or the scene's)")
           ->type_name("HZ")
-          ->check(CLI::Range(1.0, 20'000.0));
+          ->check(tools::within(1.0, 20'000.0));
   app.add_option("--seconds", wanted.seconds, "how long (default: 10)")
       ->type_name("S")
-      ->check(CLI::Range(0.1, 604'800.0));
+      ->check(tools::within(0.1, 604'800.0));
   const CLI::Option* cpu =
       app.add_option("--cpu", wanted.cpu, "the CPU that the loop is bound to (default: none, or the scene's)")
           ->type_name("N")
-          ->check(CLI::Range(0, last_cpu));
+          ->check(tools::within(0, last_cpu));
   const CLI::Option* priority = app.add_option("--priority", wanted.priority,
                                                "of SCHED_FIFO (default: 80, as the core, or the scene's)")
                                     ->type_name("P")
-                                    ->check(CLI::Range(1, 98));
+                                    ->check(tools::within(1, 98));
   app.add_option("--tick", tick,
                  "empty, or servo and a scene: everything that the core does in a tick, on simulated devices "
                  "(default: empty; of servo: icsi)")
@@ -206,10 +206,10 @@ int main_or_throw(int argc, char** argv) {
   app.add_option("--explain", wanted.explain_us,
                  "name the cause of every tick that ends later than this, by the kernel's trace")
       ->type_name("US")
-      ->check(CLI::Range(1.0, 1e6));
+      ->check(tools::within(1.0, 1e6));
   app.add_option("--break", wanted.break_us, "end at the first wake-up later than this, and name its cause")
       ->type_name("US")
-      ->check(CLI::Range(1.0, 1e6));
+      ->check(tools::within(1.0, 1e6));
   app.add_option("--trace", files.trace,
                  "with --explain or --break: the kernel's trace of the last late tick")
       ->type_name("FILE");

@@ -90,7 +90,7 @@ int main_or_throw(int argc, char** argv) {
                 "new folder");
   run->add_option("--samples-every", settings.samples_every,
                   "write every n-th tick to samples.csv (default: all, of long runs fewer)")
-      ->check(CLI::Range(0, 1'000'000'000))
+      ->check(within(0, 1'000'000'000))
       ->type_name("TICKS");
   run->add_flag("--no-frames", no_frames, "write no annotated frames");
   run->add_flag("--no-figure", no_figure, "draw no figure");

@@ -241,10 +241,11 @@ int run(int argc, char** argv) {
   app.add_flag("--console", showing.console,
                "show it in a browser instead, as a run; what is typed seeks, changes the speed, pauses");
   app.add_flag("--station", as_station, "likewise without a browser: punctum-console and others may join");
-  const auto* const from =
-      app.add_option("--from", showing.from_s, "time of the run to begin at")->type_name("SECONDS");
+  const auto* const from = app.add_option("--from", showing.from_s, "time of the run to begin at")
+                               ->type_name("SECONDS")
+                               ->check(within(0.0, 1e9));
   const auto* const speed = app.add_option("--speed", showing.speed, "times as fast as it was (default: 1)")
-                                ->check(CLI::Range(kSlowestReplay, kFastestReplay))
+                                ->check(within(kSlowestReplay, kFastestReplay))
                                 ->type_name("FACTOR");
   app.add_option("RECORDING", recording, "an MCAP file of `punctum run --record`")->required();
   if (const auto code = parse_command_line(app, argc, argv)) {

@@ -102,7 +102,20 @@ std::string what_is_wrong(const CLI::App& app, const CLI::ParseError& error, int
   return error.what();
 }
 
+template <class Number>
+CLI::Validator between(Number least, Number most) {
+  const auto wrong = [least, most](const std::string& text) {
+    Number number{};
+    const bool is_within = CLI::detail::lexical_cast(text, number) && number >= least && number <= most;
+    return is_within ? std::string() : fmt::format("{}, allowed: from {} to {}", text, least, most);
+  };
+  return {wrong, std::string()};
+}
+
 }  // namespace
+
+CLI::Validator within(double least, double most) { return between(least, most); }
+CLI::Validator within(int least, int most) { return between(least, most); }
 
 std::string help_footer(const std::vector<std::pair<const char*, const char*>>& examples,
                         const std::vector<std::pair<int, const char*>>& exit_codes) {

@@ -17,6 +17,10 @@ namespace punctum::tools {
 // option's type_name says.
 void set_help_style(CLI::App& app);
 
+// What an option's number may be. In place of CLI::Range, which lets through what is no number (NaN).
+[[nodiscard]] CLI::Validator within(double least, double most);
+[[nodiscard]] CLI::Validator within(int least, int most);
+
 // Nothing: go on. Otherwise the program is over with this exit code, and what was to be said has been said.
 [[nodiscard]] std::optional<int> parse_command_line(CLI::App& app, int argc, char** argv);
 

@@ -70,9 +70,11 @@ int run(int argc, char** argv) {
   app.add_option("interface", interface, "a CAN interface that is up")->type_name("NAME");
   app.add_option("--node", nodes, "node numbers, a drive for each")
       ->type_name("N")
-      ->check(CLI::Range(1, 127))
+      ->check(tools::within(1, 127))
       ->delimiter(',');
-  app.add_option("--start", start_counts, "where the drives stand at first, in counts")->type_name("COUNTS");
+  app.add_option("--start", start_counts, "where the drives stand at first, in counts")
+      ->type_name("COUNTS")
+      ->check(tools::within(-2147483648.0, 2147483647.0));
   app.add_flag("--eds", data_sheet, "print its electronic data sheet (CiA 306), and end");
   app.add_option("--do", commands, "a line as on the standard input")->type_name("LINE");
   app.footer(

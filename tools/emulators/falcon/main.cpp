@@ -143,11 +143,11 @@ int run(int argc, char** argv) {
   app.set_version_flag("--version", tools::version_line("punctum-falcon"), "version and commit");
   app.add_option("--circle", radius_mm, "the hand goes round in a circle of this radius")
       ->type_name("MM")
-      ->check(CLI::Range(0.0, 45.0));
-  app.add_option("--rate", rate_Hz, "so often in a second")->type_name("HZ")->check(CLI::Range(0.0, 20.0));
+      ->check(tools::within(0.0, 45.0));
+  app.add_option("--rate", rate_Hz, "so often in a second")->type_name("HZ")->check(tools::within(0.0, 20.0));
   app.add_option("--buttons", buttons, "that are pressed, as a number of four bits")
       ->type_name("BITS")
-      ->check(CLI::Range(0, 15));
+      ->check(tools::within(0, 15));
   app.add_flag("--booted", params.booted, "it has its firmware from the start");
   app.add_flag("--homed", params.homed, "and it is homed");
   app.add_option("--do", commands, "a line as on the standard input")->type_name("LINE");

@@ -102,11 +102,11 @@ int run(int argc, char** argv) {
   std::vector<std::string> commands;
   bool not_homed = false;
   app.set_version_flag("--version", tools::version_line("punctum-positioner"), "version and commit");
-  app.add_option("--devices", params.devices, "of the chain")->type_name("N")->check(CLI::Range(1, 9));
-  app.add_option("--axes", params.axes, "of each device")->type_name("N")->check(CLI::Range(1, 9));
+  app.add_option("--devices", params.devices, "of the chain")->type_name("N")->check(tools::within(1, 9));
+  app.add_option("--axes", params.axes, "of each device")->type_name("N")->check(tools::within(1, 9));
   app.add_option("--start", params.start, "where the axes stand at first")
       ->type_name("MICROSTEPS")
-      ->check(CLI::Range(0.0, params.max_microsteps));
+      ->check(tools::within(0.0, params.max_microsteps));
   app.add_flag("--not-homed", not_homed, "as after power-up");
   app.add_option("--do", commands, "a line as on the standard input")->type_name("LINE");
   app.footer(std::string("Lines on the standard input:\n  ") + emulator::Positioner::kCommands + "\n\n" +

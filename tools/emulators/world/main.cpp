@@ -342,7 +342,7 @@ int run(int argc, char** argv) {
       ->type_name("NAME");
   app.add_option("--nodes", options.nodes, "their node numbers, along x, y and z")
       ->type_name("N,N,N")
-      ->check(CLI::Range(1, 127))
+      ->check(tools::within(1, 127))
       ->delimiter(',')
       ->expected(emulator::WiredWorld::kAxes);
   app.add_flag("--usb", options.usb, "the operator holds a Falcon on the virtual USB host controller");

@@ -169,6 +169,7 @@ struct Output {
   std::optional<ContoursCsv> contours, deviations;
   std::string overlay_folder;  // empty: no overlays
   std::string surface_folder;  // empty: no surfaces
+  bool whole = true;           // else a picture or a surface could not be written
 
   void write_overlay(const cv::Mat& grey, const vision::Result& result, const vision::VisionConfig& config,
                      const std::string& picture_name);
@@ -253,6 +254,7 @@ void Output::write_overlay(const cv::Mat& grey, const vision::Result& result,
   if (const auto written = write_picture(path, vision::draw_overlay(grey, result, config)); !written) {
     complain(written.error() + "; going on without overlays");
     overlay_folder.clear();
+    whole = false;
   }
 }
 
@@ -268,6 +270,7 @@ void Output::write_surfaces(const vision::Result& result, const Input& input,
   if (!written) {
     complain(written.error() + "; going on without surfaces");
     surface_folder.clear();
+    whole = false;
   }
 }
 
@@ -341,7 +344,7 @@ int track(const TrackOptions& options) {
     return kBadInput;
   }
   const Counts counts = track_all(*input, *output);
-  int code = kDone;
+  int code = output->whole ? kDone : kNotWritten;
   const auto check_complete = [&code](bool written, const std::string& file, const std::string& why) {
     if (!written) {
       complain(fmt::format("{}: not complete: {}", file, why));

@@ -23,7 +23,7 @@ struct TrackOptions {
   std::string holder_template;                       // picture file; empty: cut from the first frame
 };
 
-// Exit code. 0: done. 1: a table could not be written completely. 2, with one line on stderr: a bad scene,
+// Exit code. 0: done. 1: not all that was found could be written. 2, with one line on stderr: a bad scene,
 // first frame, region, seed circle, poses or template, or an output that cannot be opened, or that
 // would destroy an input or another output.
 [[nodiscard]] int track(const TrackOptions& options);

@@ -265,6 +265,23 @@ TEST_F(Track, reports_a_table_that_cannot_be_written) {
   EXPECT_EQ(track(options_), 1);
 }
 
+TEST_F(Track, an_overlay_or_a_surface_that_cannot_be_written_is_not_done) {
+  frame(1);
+  const std::string there = (folder_ / "there").string();
+  fs::create_directories(there + "/000000_f1.png/in_its_way");
+  fs::create_directories(there + "/000000_f1.json/in_its_way");
+  options_.overlay = there;
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(track(options_), 1);
+  EXPECT_NE(testing::internal::GetCapturedStderr().find("going on without overlays"), std::string::npos);
+  options_.overlay = "";
+  options_.surface = there;
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(track(options_), 1);
+  EXPECT_NE(testing::internal::GetCapturedStderr().find("going on without surfaces"), std::string::npos);
+  EXPECT_EQ(table(options_.out).size(), 2U) << "the row is there";
+}
+
 TEST_F(Track, refuses_an_output_that_is_an_input_or_another_output) {
   frame(1);
   frame(2);

@@ -5,9 +5,6 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <system_error>
 
 #include "rt/forces/membrane.hpp"
@@ -17,8 +14,6 @@
 
 namespace punctum::report {
 namespace {
-
-namespace fs = std::filesystem;
 
 constexpr const char* kResult = "force_N";
 
@@ -151,22 +146,14 @@ int evaluate_pairs_file(const std::string& input, const std::string& output) {
     tools::complain(text);
     return kBadInput;
   };
-  std::error_code error;
-  if (fs::is_directory(input, error)) {
-    return fail(fmt::format("--input: {}: is a folder", input));
-  }
-  std::ifstream file(input, std::ios::binary);
-  if (!file) {
-    return fail(fmt::format("--input: {}: cannot be read", input));
-  }
-  const std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (file.bad()) {
-    return fail(fmt::format("--input: {}: cannot be read", input));
+  const auto text = tools::read_whole(input);
+  if (!text) {
+    return fail("--input: " + text.error());
   }
   if (tools::same_file(output, input)) {
     return fail(fmt::format("--output: {}: is the file of --input, allowed: another one", output));
   }
-  const auto rows = evaluate_pairs(text);
+  const auto rows = evaluate_pairs(*text);
   if (!rows) {
     return fail(fmt::format("{}: {}", input, rows.error()));
   }

@@ -6,9 +6,11 @@
 #include <cmath>
 #include <cstdio>
 #include <deque>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <stdexcept>
+#include <system_error>
 
 #include "hal/sim/truth.hpp"
 #include "hal/sim/world.hpp"
@@ -20,6 +22,8 @@ namespace punctum::report {
 namespace {
 
 using tools::TapedDevices;
+
+constexpr std::uintmax_t kMostTicks = 1'000'000;  // of a tape: what is in memory at once
 
 // The devices that a scene has, which only answer what was recorded. The injector obeys at once, since a
 // scene may open the gate at other times than the recorded one.
@@ -156,16 +160,22 @@ tl::expected<void, std::string> write_tape(const std::string& path, const std::v
 }
 
 tl::expected<std::vector<TickTold>, std::string> read_tape(const std::string& path) {
+  std::error_code ec;
+  const std::uintmax_t bytes = std::filesystem::file_size(path, ec), ticks = bytes / sizeof(TickTold);
+  if (ec || ticks == 0 || ticks > kMostTicks || bytes % sizeof(TickTold) != 0) {
+    return tl::unexpected(fmt::format(
+        "{}: no tape, allowed: what `punctum-tick-cost record` wrote, of 1 to {} ticks", path, kMostTicks));
+  }
   std::FILE* file = std::fopen(path.c_str(), "rb");
   if (file == nullptr) {
     return tl::unexpected(fmt::format("{}: cannot be read", path));
   }
-  std::vector<TickTold> tape;
-  TickTold told;
-  while (std::fread(&told, sizeof told, 1, file) == 1) {
-    tape.push_back(told);
-  }
+  std::vector<TickTold> tape(ticks);
+  const bool all = std::fread(tape.data(), sizeof(TickTold), ticks, file) == ticks;
   (void)std::fclose(file);
+  if (!all) {
+    return tl::unexpected(fmt::format("{}: cannot be read", path));
+  }
   return tape;
 }
 

@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
 #include <system_error>
 
 namespace punctum::tools {
@@ -71,6 +73,26 @@ tl::expected<void, std::string> put_in_place(const fs::path& path, Sync sync) {
   const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
   (void)bring_to_disk(folder, O_RDONLY | O_DIRECTORY);
   return {};
+}
+
+tl::expected<std::string, std::string> read_whole(const fs::path& path) {
+  const auto wrong = [&path](const std::string& why) {
+    return tl::unexpected(fmt::format("{}: {}", path.string(), why));
+  };
+  std::error_code ec;
+  const fs::file_status there = fs::status(path, ec);
+  if (fs::exists(there) && !fs::is_regular_file(there)) {
+    return wrong("not a file");
+  }
+  std::ifstream in(path, std::ios::binary);
+  std::string text(fs::exists(there) ? std::min(fs::file_size(path, ec), kReadMost + 1) : 0, '\0');
+  if (!in || !in.read(text.data(), static_cast<std::streamsize>(text.size()))) {
+    return wrong("cannot be read");
+  }
+  if (text.size() > kReadMost) {
+    return wrong(fmt::format("too large, allowed: at most {} MB", kReadMost >> 20U));
+  }
+  return text;
 }
 
 bool same_file(const fs::path& a, const fs::path& b) {

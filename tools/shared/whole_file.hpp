@@ -22,6 +22,11 @@ enum class Sync : std::uint8_t {
 [[nodiscard]] tl::expected<void, std::string> put_in_place(const std::filesystem::path& path,
                                                            Sync sync = Sync::to_disk);
 
+// All of a file that people write or a program wrote once. Refused, in one line: what is no file and may
+// never end, such as a pipe or a device, and what is larger than that.
+inline constexpr std::uintmax_t kReadMost = std::uintmax_t{64} << 20U;
+[[nodiscard]] tl::expected<std::string, std::string> read_whole(const std::filesystem::path& path);
+
 // Both are, or would be, one plain file: what is written to the one destroys what stands in the other. Never
 // of devices: whoever wants no table has it written to /dev/null.
 [[nodiscard]] bool same_file(const std::filesystem::path& a, const std::filesystem::path& b);

@@ -95,6 +95,7 @@ TEST(ForcePairs, are_written_completely_or_leave_the_old_file) {
   EXPECT_EQ(evaluate_pairs_file(folder / "bad.csv", folder / "new.csv"), 2);
   EXPECT_EQ(evaluate_pairs_file(folder / "none.csv", folder / "new.csv"), 2);
   EXPECT_EQ(evaluate_pairs_file(folder, folder / "new.csv"), 2);
+  EXPECT_EQ(evaluate_pairs_file("/dev/zero", folder / "new.csv"), 2);
   EXPECT_EQ(evaluate_pairs_file(folder / "good.csv", folder / "no" / "new.csv"), 2);
   EXPECT_EQ(evaluate_pairs_file(folder / "good.csv", folder / "." / "good.csv"), 2)
       << "the rows would be gone";

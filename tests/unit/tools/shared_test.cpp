@@ -111,6 +111,33 @@ TEST_F(FilesTest, a_folder_that_is_not_there_is_an_error_and_a_device_is_written
   EXPECT_TRUE(fs::is_character_file("/dev/full"));
 }
 
+TEST_F(FilesTest, what_is_no_file_or_too_large_is_not_read_to_its_end) {
+  const fs::path file = folder_ / "a.json", pipe = folder_ / "pipe", large = folder_ / "large";
+  ASSERT_TRUE(write_whole(file, "{}\n"));
+  EXPECT_EQ(read_whole(file), "{}\n");
+  ASSERT_TRUE(write_whole(file, ""));
+  EXPECT_EQ(read_whole(file), "");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  for (const fs::path& none : {pipe, folder_, fs::path("/dev/zero")}) {
+    EXPECT_EQ(read_whole(none).error(), none.string() + ": not a file");
+  }
+  EXPECT_EQ(read_whole(folder_ / "none").error(), (folder_ / "none").string() + ": cannot be read");
+  std::ofstream(large) << "{";
+  fs::resize_file(large, kReadMost + 1);
+  EXPECT_EQ(read_whole(large).error(), large.string() + ": too large, allowed: at most 64 MB");
+}
+
+TEST_F(FilesTest, an_output_is_the_same_file_by_whatever_name) {
+  const fs::path file = folder_ / "a.csv", link = folder_ / "link";
+  EXPECT_TRUE(same_file(file, folder_ / "." / "a.csv")) << "that is not there yet";
+  ASSERT_TRUE(write_whole(file, "a"));
+  fs::create_symlink(file, link);
+  EXPECT_TRUE(same_file(file, link));
+  EXPECT_FALSE(same_file(file, folder_ / "b.csv"));
+  EXPECT_FALSE(same_file(folder_ / "b.csv", file));
+  EXPECT_FALSE(same_file("/dev/null", "/dev/null"));
+}
+
 TEST_F(FilesTest, rows_are_written_in_order_and_continued) {
   const std::string file = folder_ / "samples.csv";
   {

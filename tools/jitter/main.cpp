@@ -8,10 +8,8 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
-#include <fstream>
 #include <memory>
 #include <optional>
-#include <sstream>
 #include <string>
 #include <thread>
 #include <utility>
@@ -53,12 +51,11 @@ int columns() {
 }
 
 tl::expected<jitter::Result, std::string> read(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  std::ostringstream text;
-  if (!in || !(text << in.rdbuf())) {
-    return tl::unexpected(fmt::format("{}: cannot be read", path));
+  const auto text = tools::read_whole(path);
+  if (!text) {
+    return tl::unexpected(text.error());
   }
-  auto result = jitter::result_of_json(text.str());
+  auto result = jitter::result_of_json(*text);
   return result ? result : tl::unexpected(fmt::format("{}: {}", path, result.error()));
 }
 

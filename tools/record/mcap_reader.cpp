@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
 namespace punctum::tools::mcap {
@@ -14,6 +16,11 @@ Reader::Wrong Reader::wrong(std::string_view what) const {
 }
 
 tl::expected<Reader, std::string> Reader::open(const std::string& path) {
+  std::error_code ec;
+  const auto there = std::filesystem::status(path, ec);
+  if (std::filesystem::exists(there) && !std::filesystem::is_regular_file(there)) {
+    return tl::unexpected(path + ": not a file, allowed: a recording (MCAP)");
+  }
   std::FILE* file = std::fopen(path.c_str(), "rbe");
   if (file == nullptr) {
     return tl::unexpected(fmt::format("{}: cannot be read: {}", path, std::strerror(errno)));

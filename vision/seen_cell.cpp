@@ -236,11 +236,12 @@ int SeenCell::fit_undeformed_membrane(const ClearedPicture& picture, const Touch
   if (constexpr double kCertain_px = 0.25; mouth && result.holder.sd < kCertain_px) {
     certain = {*mouth, result.holder.sd};
   }
-  const Point shift = undeformed_.update(*now, touched, certain);
+  const bool learns = clear && !touched_before;
+  const Point shift = undeformed_.update(*now, touched, learns, certain);
   for (FollowedMembrane* m : {&outer_, &inner_}) {
     m->rest.centre += shift;
   }
-  if (clear && !touched_before) {
+  if (learns) {
     outer_.rest.learn(outer_.centre, outer_.r);
     undeformed_.learn_outline(contour, outer_.centre);
     if (inner_.known && result.inner.ok) {

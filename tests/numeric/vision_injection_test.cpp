@@ -168,6 +168,7 @@ TEST_P(DrawnInjection, shows_the_dimple_and_when_the_membrane_gives_way) {
   EXPECT_LT(std::sqrt(pushed.depth / pushed.depths), 0.6);
   EXPECT_GE(pushed.deep_right, pushed.depths - 1);
   EXPECT_GE(pushed.deep_covered, 9 * pushed.depths / 10);
+  EXPECT_GE(pushed.outer_right, pushed.frames - 1);
   for (const char* phase : {"before contact", "inside"}) {
     EXPECT_EQ(all.in[phase].outer_right, all.in[phase].frames) << phase;
     EXPECT_LT(std::sqrt(all.in[phase].outer / all.in[phase].outer_claimed), GetParam() ? 0.3 : 0.25) << phase;

@@ -13,6 +13,7 @@ namespace {
 
 constexpr int kReliable = 6;             // frames without contact; then the outline is relied on
 constexpr int kOutlineMemory = 12;       // frames averaged
+constexpr int kDriftMemory = 20;         // frames that tell it
 constexpr int kCircleMemory = 20;        // frames averaged
 constexpr double kDentHalf = 0.9;        // rad to either side of the entry
 constexpr double kHolderHalf = 0.6;      // rad to either side of the holding pipette's mouth
@@ -37,24 +38,25 @@ Vector<double> RestOutline::seen_from(const Point& other_centre) const {
 
 void RestOutline::learn(const Point& now_centre, const Vector<double>& now_r) {
   if (r.empty() || cv::norm(centre - now_centre) > 0.1 * median_of(now_r)) {
-    *this = {.centre = now_centre, .r = now_r, .frames = 1, .last = now_centre};
+    *this = {.centre = now_centre, .r = now_r, .frames = 1};
     return;
   }
   const int angles = static_cast<int>(r.size());
   const auto rays = unit_rays(angles);
   const Vector<double> now = polar_radii(from_polar(now_centre, now_r), centre, angles);
-  // It moves with the cell at once: what differs as the cosine of the angle. Its form is the mean of the
-  // frames.
-  Point shift;
+  // The cell drifts: what differs as the cosine of the angle is its motion, followed by least squares over
+  // the last frames. Its form is their mean.
+  const double n = std::clamp(++frames, kReliable, kDriftMemory), of_place = 2 * (2 * n - 1) / (n * (n + 1)),
+               of_drift = 6 / (n * (n + 1));
+  Point beyond = -drift;  // of what was expected
   for (std::size_t i = 0; i < now.size(); ++i) {
-    shift += 2.0 / angles * (now[i] - r[i]) * rays[i];
+    beyond += 2.0 / angles * (now[i] - r[i]) * rays[i];
   }
+  const Point shift = drift + of_place * beyond;
   centre += shift;
-  const double gain = 1.0 / std::min(++frames, kOutlineMemory);
-  drift += (centre - last - drift) / std::min(frames - 1, kOutlineMemory);
-  last = centre;
+  drift += of_drift * beyond;
   for (std::size_t i = 0; i < now.size(); ++i) {
-    r[i] += gain * (now[i] - shift.dot(rays[i]) - r[i]);
+    r[i] += (now[i] - shift.dot(rays[i]) - r[i]) / std::min(frames, kOutlineMemory);
   }
 }
 
@@ -84,7 +86,8 @@ RestOutline outline_within(const RestOutline& around, const Point& centre, const
   return out;
 }
 
-Point LearntUndeformed::update(const Undeformed& now, bool touched, const std::optional<Mouth>& mouth) {
+Point LearntUndeformed::update(const Undeformed& now, bool touched, bool learns,
+                               const std::optional<Mouth>& mouth) {
   if (!shape_ || (!touched && now.round)) {
     if (shape_ && shape_->round && now.round &&
         cv::norm(now.circle.centre - shape_->circle.centre) < 0.05 * shape_->circle.r) {
@@ -104,10 +107,13 @@ Point LearntUndeformed::update(const Undeformed& now, bool touched, const std::o
   } else {
     const Point shift = moved(mouth);
     shape_->circle.centre += shift;
-    face_.centre += shift;
     for (Point& p : shape_->shape) {
       p += shift;
     }
+    if (learns) {
+      return {};
+    }
+    face_.centre += shift;
     return shift;
   }
   mouth_ = mouth ? std::optional(mouth->at) : std::nullopt;

@@ -15,7 +15,6 @@ struct RestOutline {
   Vector<double> r;  // px per angle; empty: not known
   int frames = 0;    // that it was learnt from
   Point drift = {};  // px per frame, while it was learnt
-  Point last = {};   // centre when it was learnt last
 
   [[nodiscard]] bool reliable() const noexcept;                             // learnt from enough frames
   [[nodiscard]] Vector<double> seen_from(const Point& other_centre) const;  // empty: not known
@@ -32,13 +31,15 @@ struct RestOutline {
 // outline of its outer face as it was seen. Both move with the holding pipette.
 class LearntUndeformed {
  public:
-  // now: fitted to this frame. mouth: of the holding pipette, where it is seen. Returns by how much the cell
-  // has moved while the needle touches it: with the holding pipette, or else as it drifted before.
+  // now: fitted to this frame. touched: the needle is near. learns: the outline of this frame is learnt, too.
+  // mouth: of the holding pipette, where it is seen. Returns by how much an outline that is not learnt has
+  // moved: with the holding pipette, or else as it drifted before.
   struct Mouth {
     Point at;
     double sd = 0;  // px
   };
-  [[nodiscard]] Point update(const Undeformed& now, bool touched, const std::optional<Mouth>& mouth);
+  [[nodiscard]] Point update(const Undeformed& now, bool touched, bool learns,
+                             const std::optional<Mouth>& mouth);
   // The contour of a frame in which nothing touches it, seen from `centre`.
   void learn_outline(const Contour& contour, const Point& centre);
   void forget();

@@ -205,6 +205,7 @@ class Terminal::Writer {
     try {
       thread_ = std::thread([this] { write(); });
     } catch (const std::system_error&) {
+      has_thread_ = false;
     }
   }
   ~Writer() {
@@ -213,7 +214,7 @@ class Terminal::Writer {
       over_ = true;
     }
     changed_.notify_one();
-    if (thread_.joinable()) {
+    if (has_thread_) {
       thread_.join();
     }
   }
@@ -222,7 +223,7 @@ class Terminal::Writer {
 
   void say(Say how, std::string text) {
     constexpr std::size_t kMostWaiting = 10'000;  // more nobody will read
-    if (!thread_.joinable()) {
+    if (!has_thread_) {
       how(text);
       return;
     }
@@ -262,7 +263,7 @@ class Terminal::Writer {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Words> waiting_;
-  bool over_ = false;
+  bool over_ = false, has_thread_ = true;
   std::thread thread_;
 };
 

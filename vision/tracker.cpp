@@ -137,7 +137,7 @@ const Result& Tracker::Impl::process(const hal::Frame& frame, const std::optiona
     } else {
       events.decide(picture, needle, cell, result, watch);
     }
-    if (!result.contact && !events.touch().contact) {  // nor before the cell was out of sight
+    if (!result.contact && !events.touch().contact) {  // nor while a touched cell is out of sight
       needle.learn(picture, result.needle, result.gap_px);
     }
     if (config.surface) {

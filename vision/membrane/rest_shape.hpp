@@ -28,7 +28,8 @@ struct RestOutline {
                                          const Vector<double>& r, const Point& entry);
 
 // The outer membrane with nothing touching it: the shape that is fitted to what touches nothing, and the
-// outline of its outer face as it was seen. Both move with the holding pipette.
+// outline of its outer face as it was seen. In contact both move with the holding
+// pipette or, without one, as the cell drifted before.
 class LearntUndeformed {
  public:
   // now: fitted to this frame. touched: the needle is near. learns: the outline of this frame is learnt, too.
@@ -51,10 +52,11 @@ class LearntUndeformed {
   [[nodiscard]] bool same_cell(const Contour& outer, const Point& centre, const NeedlePose& needle) const;
 
  private:
+  [[nodiscard]] Point moved(const std::optional<Mouth>& mouth);
+
   std::optional<Undeformed> shape_;
   RestOutline face_;
   int frames_ = 0;  // that it was learnt from
-  [[nodiscard]] Point moved(const std::optional<Mouth>& mouth);
   std::optional<Point> mouth_;
 };
 

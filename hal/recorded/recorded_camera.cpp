@@ -37,9 +37,12 @@ bool is_picture_name(const fs::path& path) {
   return std::find(kPictureEndings.begin(), kPictureEndings.end(), ending) != kPictureEndings.end();
 }
 
+// A link that leads nowhere stands for a picture that cannot be read. What is there and no file may have no
+// end.
 bool is_file(const fs::path& path) {
   std::error_code error;
-  return fs::is_regular_file(path, error);
+  const fs::file_type type = fs::status(path, error).type();
+  return type == fs::file_type::regular || type == fs::file_type::not_found;
 }
 
 tl::expected<std::vector<std::string>, std::string> files_of_folder(const std::string& folder) {

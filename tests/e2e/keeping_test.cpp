@@ -67,6 +67,23 @@ TEST_F(Programs, a_result_that_cannot_be_written_is_no_success) {
   }
 }
 
+TEST_F(Programs, no_programs_result_that_cannot_be_written_is_a_success) {
+  ASSERT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "2", "--no-figure", "--record"}), 0);
+  const std::string recording = report() + "/recording.mcap";
+  ASSERT_EQ(shell(program("punctum-jitter") + " --seconds 0.2 --json " + report() + "/a.json >/dev/null"), 0);
+  const Strings commands{"punctum report " + report(),
+                         "punctum-replay " + recording,
+                         "punctum-export " + recording + " --csv " + report() + "/tables",
+                         "punctum-jitter --seconds 0.2",
+                         "punctum-jitter diff " + report() + "/a.json " + report() + "/a.json",
+                         "punctum-report force --quick --out " + report() + "/force"};
+  for (const std::string& command : commands) {
+    EXPECT_EQ(shell(program(command) + " >/dev/full 2>" + words().string()), 1) << command;
+    EXPECT_NE(read_all(words()).find("the standard output cannot be written"), std::string::npos)
+        << command << ": " << read_all(words());
+  }
+}
+
 TEST_F(Programs, a_pipe_that_nobody_reads_any_more_ends_no_run) {
   const std::string run =
       program("punctum") + " run free --clock virtual --seconds 1 --no-figure --report " + report() + " 2>&1";
@@ -111,6 +128,20 @@ TEST_F(Programs, a_run_whose_files_cannot_grow_goes_on_and_says_at_once_what_it_
   EXPECT_EQ(broken_lines(samples), 0U);
   EXPECT_EQ(unfinished_files(report()), 0U);
   EXPECT_FALSE(fs::exists(fs::path(report()) / "reserve"));
+}
+
+TEST_F(Programs, a_table_that_somebody_removes_is_not_kept_and_the_run_says_so) {
+  Running run({"run", "free", "--clock", "virtual", "--seconds", "60", "--no-figure", "--report", report()},
+              words());
+  Look look("free", run);
+  ASSERT_TRUE(look.until_started()) << run.output();
+  fs::remove(fs::path(report()) / "samples.csv");
+  EXPECT_EQ(run.wait(), 1) << run.output();
+  const auto r = json();
+  EXPECT_EQ(r["outcome"], "done");
+  ASSERT_EQ(r["not_kept"].size(), 1U) << run.output();
+  EXPECT_EQ(r["not_kept"][0]["file"], "samples.csv");
+  EXPECT_EQ(r["not_kept"][0]["why"], "it was removed meanwhile");
 }
 
 TEST_F(Programs, files_that_find_no_room_at_all_are_not_there_and_the_exit_code_says_so) {

@@ -280,6 +280,20 @@ TEST_F(LabReport, recorded_runs_on_the_frames_that_come_with_it) {
   const std::string page = left("report.html");
   EXPECT_TRUE(contains(page, "data:image/jpeg;base64,"));
 }
+
+TEST_F(LabReport, a_run_on_pictures_that_show_nothing_was_without_vision) {
+  const fs::path blank = folder_ / "blank";
+  fs::create_directories(blank);
+  for (int i = 0; i < 10; ++i) {
+    std::ofstream(blank / (std::to_string(i) + ".pgm")) << "P5 320 240 255\n"
+                                                        << std::string(320 * 240, '\x80');
+  }
+  EXPECT_EQ(program("punctum", {"run", "recorded", "--report", report(), "--set", kPatientRelay, "--set",
+                                "camera.frames=" + blank.string()}),
+            1)
+      << said_;
+  EXPECT_EQ(json()["outcome"], "without vision") << said_;
+}
 #endif
 
 }  // namespace

@@ -453,11 +453,11 @@ int control(const tools::Scene& scene, StationSegments& segments, StationClock& 
 int run(int argc, char** argv) {
   if (argc == 2 && std::string_view(argv[1]) == "--version") {
     tools::say(tools::version_line("punctum-core") + "\n");
-    return tools::all_was_said() ? tools::exit_done : tools::exit_not_done;
+    return tools::code_after_words(tools::exit_done);
   }
   if (argc == 2 && (std::string_view(argv[1]) == "--help" || std::string_view(argv[1]) == "-h")) {
     tools::say(kHelp);
-    return tools::all_was_said() ? tools::exit_done : tools::exit_not_done;
+    return tools::code_after_words(tools::exit_done);
   }
   stop_signal::watch({SIGTERM, SIGINT, SIGHUP, SIGQUIT}, on_stop_signal);
   const auto arguments = read_arguments(argc, argv);

@@ -149,7 +149,7 @@ int measure(const jitter::Wanted& wanted, const std::string& load, const Files& 
     complain("--gpio: no change was answered: is ASK wired to IN, and OUT to SEEN?");
     return kNotReady;
   }
-  return tools::all_was_said() ? kDone : kNotReady;
+  return kDone;
 }
 
 int main_or_throw(int argc, char** argv) {
@@ -322,7 +322,7 @@ int main_or_throw(int argc, char** argv) {
 int main(int argc, char** argv) {
   punctum::tools::start_program();
   try {
-    return main_or_throw(argc, argv);
+    return punctum::tools::code_after_words(main_or_throw(argc, argv));
   } catch (const std::exception& e) {
     complain(std::string("punctum-jitter: ") + e.what());
     return kBadInput;

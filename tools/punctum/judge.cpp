@@ -16,7 +16,7 @@ RunEnd ended_well(const rt::CoreStatus& core) {
 
 // Without a task a run shows what vision sees, or it shows nothing.
 RunEnd ended_without_task(const RunFacts& facts, const rt::CoreStatus& core, const Measures& measures) {
-  const bool blind = facts.has_vision && 2 * measures.blind_ticks > measures.ticks;
+  const bool blind = facts.has_vision && (facts.found_nothing || 2 * measures.blind_ticks > measures.ticks);
   const RunEnd end = ended_well(core);
   return end == RunEnd::done && blind ? RunEnd::blind : end;
 }

@@ -13,6 +13,7 @@ struct RunFacts {
   bool vision_over = false;     // it ended before the core did
   bool has_task = false;        // of the scene
   bool has_vision = false;      // of the scene
+  bool found_nothing = false;   // in more than half of the pictures
 };
 
 [[nodiscard]] rt::RunEnd judge(const RunFacts& facts, const rt::CoreStatus& core, const Measures& measures);

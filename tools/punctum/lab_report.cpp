@@ -21,6 +21,7 @@
 #include "tools/punctum/run_page.hpp"
 #include "tools/punctum/run_sentence.hpp"
 #include "tools/punctum/terminal.hpp"
+#include "tools/shared/csv.hpp"
 #include "tools/shared/exit_codes.hpp"
 #include "tools/shared/say.hpp"
 #include "tools/shared/whole_file.hpp"
@@ -78,6 +79,21 @@ bool would_destroy(const fs::path& page, const std::vector<std::string>& folders
   });
 }
 
+// Empty where samples.csv is the table of a run, or has no row yet; else what it lacks.
+std::string what_samples_lack(const fs::path& folder) {
+  const CsvReader table((folder / "samples.csv").string());
+  if (table.is_empty()) {
+    return "";
+  }
+  for (const char* column : {"t_s", "phase", "fz_N", "fault"}) {
+    if (!table.has(column)) {
+      return fmt::format("{}: no table of a run: it has no column {}", (folder / "samples.csv").string(),
+                         column);
+    }
+  }
+  return "";
+}
+
 }  // namespace
 
 Json whole_facts(const Json& begun, Json facts) {
@@ -122,6 +138,10 @@ int report_folders(const std::vector<std::string>& folders, const std::string& o
     }
     Json facts = read_json(path / "report.json");
     if (facts.is_null()) {
+      if (const std::string lack = what_samples_lack(path); !lack.empty()) {
+        complain(lack);
+        return exit_bad_input;
+      }
       facts = whole_facts(read_json(path / kBegun), rebuilt_facts(path.string()));
       facts["sentence"] = run_sentence(facts);
       if (auto written = write_report_json(path.string(), facts); !written) {

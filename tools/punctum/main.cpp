@@ -162,10 +162,10 @@ int main_or_throw(int argc, char** argv) {
   }
   if (*listing) {
     Terminal().print(plugged_in(Machine{}));
-    return all_was_said() ? exit_done : exit_not_done;
+    return code_after_words(exit_done);
   }
   if (*reporting) {
-    return report_folders(folders, comparison);
+    return code_after_words(report_folders(folders, comparison));
   }
 
   // Options are overrides too, so that their messages are the same.
@@ -196,13 +196,13 @@ int main_or_throw(int argc, char** argv) {
 
   if (*explaining) {
     Terminal().print(keys ? explain_keys(*scene) : explain(*scene));
-    return all_was_said() ? exit_done : exit_not_done;
+    return code_after_words(exit_done);
   }
   if (*checking) {
     std::string text;
     const int code = check(*scene, text);
     Terminal().print(text);
-    return code == exit_done && !all_was_said() ? exit_not_done : code;
+    return code_after_words(code);
   }
   if (*moving) {
     if (to_um.empty() && !parks) {

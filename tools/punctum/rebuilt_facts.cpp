@@ -150,6 +150,10 @@ struct Delays {
   }
 };
 
+bool may_inject(const rt::TelemetrySample& s) {
+  return s.phase == rt::Phase::puncture || s.phase == rt::Phase::injection;
+}
+
 // As the core and the injector told it: what came out of it is in no row.
 Json told_dose(const Measures& measures, bool is_known) {
   const auto known = [is_known](double s) { return is_known ? Json(s) : Json(nullptr); };
@@ -177,8 +181,12 @@ Json rebuilt_facts(const std::string& folder) {
   Delays delays;
   CsvReader row(folder + "/samples.csv");
   std::uint64_t rows = 0, cut_off = 0;
+  double apart_s = 0;  // at most, of two rows while the injector may have been open
   while (row.next()) {
     if (const auto sample = sample_of(row, scene.servo.rate_Hz)) {
+      if (rows > 0 && (may_inject(*sample) || may_inject(measures.last))) {
+        apart_s = std::max(apart_s, sample->t_s - measures.last.t_s);
+      }
       measures.tick(*sample, nullptr);
       truth.take(row, *sample);
       if (truth.any) {
@@ -237,7 +245,8 @@ Json rebuilt_facts(const std::string& folder) {
   }
   j["cell_list"] = Json::array();
   if (scene.servo.injector) {
-    j["dose"] = told_dose(measures, rows > 0 && row.has("injector_open") && row.has("buttons"));
+    j["dose"] = told_dose(measures, rows > 0 && row.has("injector_open") && row.has("buttons") &&
+                                        apart_s < CellMeasures::kDoseTolerance_s);
   }
   // Of two membranes the rows tell when the inner one gave way.
   const bool inner = scene.sim && scene.sim->cell && scene.sim->cell->inner;

@@ -134,6 +134,18 @@ std::optional<ContourError> read_contour_error(const std::string& obs_csv) {
   return e;
 }
 
+bool found_nothing(const std::string& obs_csv) {
+  CsvReader table(obs_csv);
+  std::uint64_t frames = 0, empty = 0;
+  while (table.next()) {
+    ++frames;
+    const bool found = table.number("outer_ok") == 1.0 || table.number("inner_ok") == 1.0 ||
+                       table.number("tip_x_px") || table.number("holder_x_px");
+    empty += found ? 0 : 1;
+  }
+  return 2 * empty > frames;
+}
+
 std::string fault_text(rt::Fault fault, double t_s, bool coloured) {
   const FaultAdvice& advice = kFaultAdvice[static_cast<std::size_t>(fault)];
   return fmt::format(

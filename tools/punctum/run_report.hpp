@@ -26,6 +26,9 @@ struct ContourError {
 };
 [[nodiscard]] std::optional<ContourError> read_contour_error(const std::string& obs_csv);
 
+// Whether more than half of its pictures showed neither pipettes nor membranes.
+[[nodiscard]] bool found_nothing(const std::string& obs_csv);
+
 // What a run came to, beside its measures. The dose, asked and given, stands there with each cell.
 struct RunResult {
   rt::RunEnd end = rt::RunEnd::done;

@@ -71,6 +71,10 @@ std::string run_sentence(const Json& facts) {
   if (const auto lost = number_in(fact(facts, "samples"), "lost"); lost && *lost > 0) {
     s += fmt::format(" {:.0f} samples of it are missing, and what can lie in them is not known.", *lost);
   }
+  if (const auto restarts = list_in(facts, "vision_restarts").size(); restarts > 0) {
+    s += fmt::format(" Vision died or hung {} on the way.",
+                     restarts == 1 ? "once" : fmt::format("{} times", restarts));
+  }
   const Json& needle = fact(facts, "needle_at_end");
   const std::string where = text_in(needle, "where");
   if (where == "unknown") {

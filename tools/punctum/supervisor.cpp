@@ -640,7 +640,8 @@ void Run::judge_end(const Ended& core) {
                        .stop_was_asked = core_.stop_was_asked(),
                        .vision_over = vision_.over(),
                        .has_task = scene_.has_task(),
-                       .has_vision = scene_.vision.has_value()};
+                       .has_vision = scene_.vision.has_value(),
+                       .found_nothing = !scene_.has_task() && found_nothing(folder_ + "/obs.csv")};
   result_.end = judge(facts, status(), recorder_.measures());
   result_.wall_s = now_s();
   if (result_.end == rt::RunEnd::fault) {
@@ -731,7 +732,7 @@ int Run::report() {
   const bool complete =
       written && result_.not_kept.empty() && recorder_.unusable() == 0 && !result_.silent_from_s;
   const ExitCode code = exit_code(result_.end);
-  return code == exit_done && !complete ? exit_not_done : code;
+  return code == exit_done && !(complete && result_.vision_restarts.empty()) ? exit_not_done : code;
 }
 
 }  // namespace

@@ -266,7 +266,7 @@ int run(int argc, char** argv) {
 int main(int argc, char** argv) {
   start_program();
   try {
-    return run(argc, argv);
+    return code_after_words(run(argc, argv));
   } catch (const std::exception& e) {
     complain(std::string("punctum-replay: ") + e.what());
     return exit_bad_input;

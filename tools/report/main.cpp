@@ -199,7 +199,7 @@ int main_or_throw(int argc, char** argv) {
 int main(int argc, char** argv) {
   punctum::tools::start_program();
   try {
-    return main_or_throw(argc, argv);
+    return punctum::tools::code_after_words(main_or_throw(argc, argv));
   } catch (const std::exception& e) {
     complain(std::string("punctum-report: ") + e.what());
     return kBadInput;

@@ -47,7 +47,7 @@ int record(const char* file, const char* name, const char* variant) {
     return bad(written.error());
   }
   tools::say(fmt::format("{}\n", tape.size()));
-  return tools::all_was_said() ? 0 : 1;
+  return tools::code_after_words(0);
 }
 
 // Three times, of which the fastest for each tick: what the machine does besides is not the servo's.
@@ -74,13 +74,13 @@ int time(const char* file, const char* name, const char* variant) {
   tools::say(
       fmt::format("{} ticks, us with the clock: median {:.3f}, p99 {:.3f}, p99.9 {:.3f}, longest {:.3f}\n",
                   ns.size(), at(0.5), at(0.99), at(0.999), at(1)));
-  return tools::all_was_said() ? 0 : 1;
+  return tools::code_after_words(0);
 }
 
 int run(int argc, char** argv) {
   if (argc == 2 && std::string_view(argv[1]) == "--version") {
     tools::say(tools::version_line("punctum-tick-cost") + "\n");
-    return tools::all_was_said() ? 0 : 1;
+    return tools::code_after_words(0);
   }
   if (argc == 2 && (std::string_view(argv[1]) == "--help" || std::string_view(argv[1]) == "-h")) {
     fmt::print(
@@ -113,7 +113,7 @@ int run(int argc, char** argv) {
     }
     tools::say(fmt::format("{} {}\n", tape->size(), rt::name(run_variant(*scene, *tape))));
   }
-  return tools::all_was_said() ? 0 : 1;
+  return tools::code_after_words(0);
 }
 
 }  // namespace punctum::report

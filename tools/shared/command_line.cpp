@@ -143,7 +143,7 @@ std::optional<int> parse_command_line(CLI::App& app, int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() == 0) {
       (void)app.exit(error);
-      return all_was_said() ? exit_done : exit_not_done;
+      return code_after_words(exit_done);
     }
     complain(what_is_wrong(app, error, argc, argv));
     return exit_bad_input;

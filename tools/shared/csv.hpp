@@ -19,6 +19,7 @@ class CsvReader {
  public:
   explicit CsvReader(const std::string& path);  // a file that cannot be read has no columns and no rows
 
+  [[nodiscard]] bool is_empty() const { return columns_.empty(); }
   [[nodiscard]] bool has(std::string_view column) const { return columns_.contains(column); }
   [[nodiscard]] bool next();  // false: there is no further row
   // Of the present row; empty where the row or the file has no such cell.

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -53,6 +54,10 @@ void RowFile::flush() {
     }
   }
   waiting_.clear();
+  // Written, but to a file that ends with this program.
+  if (struct stat now{}; failure_.empty() && file_ >= 0 && ::fstat(file_, &now) == 0 && now.st_nlink == 0) {
+    failure_ = "it was removed meanwhile";
+  }
 }
 
 void RowFile::cut_off_after(std::string_view written) {

@@ -1,5 +1,6 @@
 // A table that grows row by row while a program runs. It always ends with a whole row: what a full disk took
-// only in part is cut off again, and nothing more is written then.
+// only in part is cut off again, and nothing more is written then. That somebody removed it is a failure,
+// too.
 #pragma once
 
 #include <cstdint>

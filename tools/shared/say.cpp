@@ -3,6 +3,8 @@
 #include <cerrno>
 #include <cstring>
 
+#include "tools/shared/exit_codes.hpp"
+
 namespace punctum::tools {
 namespace {
 
@@ -28,10 +30,10 @@ void complain(std::string_view text) noexcept {
   (void)std::fflush(stderr);
 }
 
-bool all_was_said() noexcept {
+int code_after_words(int code) noexcept {
   errno = 0;
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) {
-    return true;
+    return code;
   }
   const int why = errno;
   write_text(stderr, "the standard output cannot be written");
@@ -40,7 +42,7 @@ bool all_was_said() noexcept {
     write_text(stderr, std::strerror(why));
   }
   complain("");
-  return false;
+  return code == exit_done ? exit_not_done : code;
 }
 
 }  // namespace punctum::tools

@@ -11,8 +11,8 @@ void say(std::string_view text) noexcept;        // on the standard output, as i
 void say_aside(std::string_view text) noexcept;  // on the standard error output, as it is
 void complain(std::string_view text) noexcept;   // likewise, as a line of its own
 
-// For programs whose words are their result: whether all of them were taken. Where they were not, one line on
-// the standard error output says so.
-[[nodiscard]] bool all_was_said() noexcept;
+// The exit code of a program whose words are its result: `code`, but exit_not_done in place of exit_done
+// where not all of them were taken; one line on the standard error output says so.
+[[nodiscard]] int code_after_words(int code) noexcept;
 
 }  // namespace punctum::tools

@@ -91,7 +91,7 @@ int run(int argc, char** argv) {
     if (seed.size() == 3) {
       t.seed_circle = {seed[0], seed[1], seed[2]};
     }
-    return tools::track(t);
+    return tools::code_after_words(tools::track(t));
   }
   return tools::live(l);
 }

@@ -86,7 +86,7 @@ int observe(sim::SimCamera& camera, sim::BenchClock& clock, const sim::Bench& be
 int run(int argc, char** argv) {
   if (argc == 2 && std::string_view(argv[1]) == "--version") {
     tools::say(tools::version_line("punctum-vision") + "\n");
-    return tools::all_was_said() ? tools::exit_done : tools::exit_not_done;
+    return tools::code_after_words(tools::exit_done);
   }
   if (argc == 2 && (std::string_view(argv[1]) == "--help" || std::string_view(argv[1]) == "-h")) {
     tools::say(

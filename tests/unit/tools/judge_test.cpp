@@ -82,6 +82,8 @@ TEST_F(JudgeTest, a_run_without_a_task_that_saw_nothing_most_of_its_time_was_wit
   EXPECT_EQ(judged(), RunEnd::blind) << "also when somebody ended it";
   measures->blind_ticks = 300;
   EXPECT_EQ(judged(), RunEnd::done);
+  facts.found_nothing = true;
+  EXPECT_EQ(judged(), RunEnd::blind) << "pictures came, but nothing was in them";
   facts.has_vision = false;
   measures->blind_ticks = 6200;
   EXPECT_EQ(judged(), RunEnd::done) << "nobody was to look";

@@ -362,6 +362,15 @@ TEST(Rebuilt, what_came_about_between_two_rows_came_at_a_time_that_is_not_known)
   EXPECT_TRUE(contains(run_page(folder.path(), facts, ""), "<dt>contact told</dt><dd>unknown</dd>"));
 }
 
+TEST(Rebuilt, a_dose_that_began_or_ended_between_rows_far_apart_is_unknown) {
+  const Folder folder;
+  folder.put("scene.toml", to_toml(*load_scene("icsi")));
+  folder.put("samples.csv", RecordedInjection::rows(30));
+  const Json facts = rebuilt_facts(folder.path());
+  EXPECT_TRUE(facts["dose"]["given_s"].is_null()) << facts["dose"];
+  EXPECT_TRUE(facts["dose"]["asked_s"].is_null());
+}
+
 TEST(Rebuilt, a_dose_that_no_row_tells_is_unknown_and_not_zero) {
   const Folder folder;
   folder.put("scene.toml", to_toml(*load_scene("icsi")));
@@ -424,6 +433,18 @@ TEST(Rebuilt, an_event_comes_back_from_its_table_as_it_was_written) {
   ASSERT_EQ(events.size(), 2U);
   EXPECT_EQ(events[0], event_row(phase));
   EXPECT_EQ(events[1], event_row(command));
+}
+
+TEST(Rebuilt, a_table_of_something_else_is_refused_and_the_column_it_lacks_is_named) {
+  const Folder folder;
+  folder.put("samples.csv", "t_s,phase,fx_N,fault\n0.000,free,0,none\n");
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(report_folders({folder.path()}, ""), 2);
+  const std::string said = testing::internal::GetCapturedStderr();
+  EXPECT_TRUE(contains(said, "samples.csv: no table of a run: it has no column fz_N")) << said;
+  EXPECT_FALSE(fs::exists(fs::path(folder.path()) / "report.json"));
+  folder.put("samples.csv", "");
+  EXPECT_EQ(report_folders({folder.path()}, ""), 0) << "a crash may leave no row at all";
 }
 
 TEST(Rebuilt, a_folder_that_holds_no_run_is_refused) {

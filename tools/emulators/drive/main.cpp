@@ -91,7 +91,7 @@ int run(int argc, char** argv) {
   }
   if (data_sheet) {
     tools::say(emulator::Drive::data_sheet({}));
-    return tools::all_was_said() ? tools::exit_done : tools::exit_not_done;
+    return tools::code_after_words(tools::exit_done);
   }
   if (const std::string problem = emulator::check_nodes(nodes); !problem.empty()) {
     return bad("--node: " + problem);

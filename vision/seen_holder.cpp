@@ -38,6 +38,7 @@ HolderPose SeenHolder::locate(ClearedPicture& picture, std::span<const Side> sid
     holder = pipette_.find(picture.grey);
     if (config_.method == Method::tracker) {
       pipette_.refine(picture.grey, holder);
+      follow_mouth(holder);
     }
   }
   if (tube_) {
@@ -46,6 +47,19 @@ HolderPose SeenHolder::locate(ClearedPicture& picture, std::span<const Side> sid
     picture.holder_face = {mouth, tube_->axis, tube_->end_half_width};
   }
   return holder;
+}
+
+// One picture tells it less surely than all of them.
+void SeenHolder::follow_mouth(HolderPose& holder) {
+  if (!holder.ok) {
+    mouth_.unseen();
+    return;
+  }
+  const auto [at, sd] = mouth_.next(holder.mouth, holder.sd);
+  holder.box.x += at.x - holder.mouth.x;
+  holder.box.y += at.y - holder.mouth.y;
+  holder.mouth = at;
+  holder.sd = sd;
 }
 
 Polygon SeenHolder::polygon(const ClearedPicture& picture, const FollowedMembrane& outer) const {

@@ -8,6 +8,7 @@
 #include "vision/config.hpp"
 #include "vision/membrane/cleared_picture.hpp"
 #include "vision/membrane/followed_membrane.hpp"
+#include "vision/pipettes/drifting_place.hpp"
 #include "vision/pipettes/holding_pipette.hpp"
 #include "vision/pipettes/pipette_mask.hpp"
 
@@ -33,8 +34,11 @@ class SeenHolder {
   [[nodiscard]] Polygon polygon(const ClearedPicture& picture, const FollowedMembrane& outer) const;
 
  private:
+  void follow_mouth(HolderPose& holder);
+
   const VisionConfig& config_;
   HoldingPipette pipette_;
+  DriftingPlace mouth_;
   std::optional<TubeTrace> tube_;
   bool template_given_ = false;
   bool due_ = false;

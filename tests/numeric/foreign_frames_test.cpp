@@ -35,6 +35,7 @@ using test::distance;
 using test::frame_of;
 
 constexpr int kFrames = 40;
+constexpr int kSettled = 10;  // frames, until the place of the holding pipette is followed
 constexpr double kPixel_um = 0.825;
 constexpr double kRight_px = 2, kWrong_px = 4;  // nowhere further away; somewhere further away
 
@@ -167,6 +168,8 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
   double furthest_px = 0;                      // of those
   double surest = 0;                           // tip, when the membrane gives way: deviations off
   Events begun, seen_in, told_in;
+  std::optional<Point> mouth_off;  // of the holding pipette
+  double mouth_steps2_px2 = 0;     // by which that changes from frame to frame
   for (int k = 0; k < frames; ++k) {
     const cv::Mat picture = drawn(folder, k);
     ASSERT_FALSE(picture.empty()) << k;
@@ -177,6 +180,12 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
     const hal::Frame frame = frame_of(picture, static_cast<std::uint64_t>(k));
     const Result& seen = tracker->process(frame);
     const nlohmann::json& t = truth[static_cast<std::size_t>(k)];
+    const Point off_now =
+        seen.holder.mouth - Point(t["holder"][0].get<double>(), t["holder"][1].get<double>());
+    if (seen.holder.ok && mouth_off && k > kSettled) {
+      mouth_steps2_px2 += (off_now - *mouth_off).dot(off_now - *mouth_off);
+    }
+    mouth_off = seen.holder.ok ? std::optional(off_now) : std::nullopt;
     const std::string phase = t["phase"];
     const std::string part = phase == "contact" || phase == "puncture" ? phase : "at rest";
     outer[part].add(contour_of(t["outer"]), seen.outer);
@@ -240,6 +249,9 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
     EXPECT_GE(puncture, 0) << whose;
     EXPECT_LE(puncture, 2) << whose;
   }
+  const double mouth_step_px = std::sqrt(mouth_steps2_px2 / (frames - 1 - kSettled));
+  std::printf("holding pipette: %.3f px from frame to frame\n", mouth_step_px);
+  EXPECT_LT(mouth_step_px, 0.007 * GetParam().noise) << "it does not move";
   const bool sharp = GetParam().blur_px < 2;
   EXPECT_LT(outer["puncture"].rms_um(), sharp ? 0.2 : 0.4);
   EXPECT_EQ(outer["puncture"].wrong, 0);

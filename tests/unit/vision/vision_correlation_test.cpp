@@ -7,6 +7,7 @@
 
 #include "vision/image/correlation.hpp"
 #include "vision/image/registration.hpp"
+#include "vision/pipettes/drifting_place.hpp"
 #include "vision/pipettes/holding_pipette.hpp"
 #include "vision/pipettes/wide_tube.hpp"
 
@@ -149,6 +150,66 @@ TEST(Registration, claims_nothing_where_there_is_nothing_or_along_an_edge) {
   const auto place =
       Registration(stripes(box), 2.3).place(stripes + noise_picture(110, 120, 6) / 32, box.tl());
   EXPECT_TRUE(!place || place->sd > 0.25);
+}
+
+// What is left of the noise in each of the frames from the 30th on, and how much of it the deviation covers.
+struct Followed {
+  double rms = 0, mean = 0, covered = 0;
+};
+Followed follow_place(const Point& drift, double noise, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> one(0, noise);
+  DriftingPlace place;
+  Followed f;
+  constexpr int kFrames = 400, kFirst = 30;
+  for (int k = 0; k < kFrames; ++k) {
+    const Point truth = Point(100, 50) + k * drift;
+    const auto [at, sd] = place.next(truth + Point(one(random), one(random)), noise);
+    if (k >= kFirst) {
+      for (const double e : {at.x - truth.x, at.y - truth.y}) {
+        f.rms += e * e;
+        f.mean += e;
+        f.covered += std::abs(e) < sd ? 1 : 0;
+      }
+    }
+  }
+  constexpr double kSeen = 2 * (kFrames - kFirst);
+  return {std::sqrt(f.rms / kSeen), f.mean / kSeen, f.covered / kSeen};
+}
+
+TEST(DriftingPlace, is_told_more_surely_than_by_one_picture_whether_it_drifts_or_not) {
+  for (const Point& drift : {Point(0, 0), Point(0.3, 0), Point(-0.1, 0.25)}) {
+    for (const double noise : {0.05, 0.3}) {
+      const Followed f = follow_place(drift, noise, 7);
+      EXPECT_LT(f.rms, 0.65 * noise) << drift << noise;
+      EXPECT_LT(std::abs(f.mean), 0.1 * noise) << drift << noise << ": it lags";
+      EXPECT_GT(f.covered, 0.6) << drift << noise;
+    }
+  }
+}
+
+TEST(DriftingPlace, that_jumps_is_followed_at_once) {
+  DriftingPlace place;
+  for (int k = 0; k < 50; ++k) {
+    (void)place.next(Point(10, 10), 0.1);
+  }
+  const auto [at, sd] = place.next(Point(12, 10), 0.1);
+  EXPECT_EQ(at, Point(12, 10));
+  EXPECT_EQ(sd, 0.1);
+}
+
+TEST(DriftingPlace, that_is_not_seen_goes_on_and_is_less_sure) {
+  DriftingPlace place;
+  DriftingPlace::Place last;
+  for (int k = 0; k < 50; ++k) {
+    last = place.next(Point(0.2 * k, 0), 0.05);
+  }
+  for (int k = 50; k < 60; ++k) {
+    place.unseen();
+  }
+  const auto [at, sd] = place.next(Point(0.2 * 60 + 0.1, 0), 0.05);
+  EXPECT_NEAR(at.x, 12.05, 0.05) << "between what was expected and what is seen";
+  EXPECT_GT(sd, last.sd);
 }
 
 TEST(HoldingPipette, is_followed_in_its_window_and_its_loss_is_reported) {

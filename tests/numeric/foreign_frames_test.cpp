@@ -284,11 +284,11 @@ std::string name_of_sequence(const testing::TestParamInfo<Sequence>& of) {
 // gave way was once taken for one on the tip, 12 px off.
 INSTANTIATE_TEST_SUITE_P(Seeds, ForeignFrames,
                          testing::Values(Sequence{107, 5, 0.055, 0.35, 0.09},
-                                         Sequence{108, 10, 0.12, 0.4, 0.128},
-                                         Sequence{109, 5, 0.085, 0.35, 0.09, 25}),
+                                         Sequence{108, 10, 0.12, 0.4, 0.128}),
                          name_of_sequence);
 INSTANTIATE_TEST_SUITE_P(Further, ForeignFrames,
-                         testing::Values(Sequence{7, 2, 0.05, 0.3, 0.08}, Sequence{106, 2, 0.065, 0.3, 0.085},
+                         testing::Values(Sequence{109, 5, 0.085, 0.35, 0.09, 25},
+                                         Sequence{7, 2, 0.05, 0.3, 0.08}, Sequence{106, 2, 0.065, 0.3, 0.085},
                                          Sequence{110, 5, 0.2, 0.7, 0.25, 0, 40, 2.5},
                                          Sequence{1, 2, 0.04, 0.3, 0.085, 0, 80},
                                          Sequence{134, 5, 0.06, 0.35, 0.1, 0, 80}),
@@ -424,15 +424,14 @@ std::string name_of_film(const testing::TestParamInfo<Relief>& of) {
 // was drawn to a tip that is seen 4 px too far ahead. In 158 the membrane once drew the tip back by 4 px. In
 // 112 the needle's taper is not seen.
 INSTANTIATE_TEST_SUITE_P(Seeds, ReliefFrames,
-                         testing::Values(Relief{101, Light::hoffman, 0.6, 0.35, 0.5},
-                                         Relief{207, Light::hoffman, 0.6, 0.4, 0.25},
-                                         Relief{129, Light::hoffman, 0.8, 0.4, 0.6},
+                         testing::Values(Relief{207, Light::hoffman, 0.6, 0.4, 0.25},
                                          Relief{2, Light::dic, 0.7, 0.45, 0.35},
                                          Relief{104, Light::sheets, 0.35, 0.4, 1.3}),
                          name_of_film);
 INSTANTIATE_TEST_SUITE_P(
     Further, ReliefFrames,
-    testing::Values(Relief{106, Light::hoffman, 0.55, 0.45, 2, 0, 3, 5},
+    testing::Values(Relief{101, Light::hoffman, 0.6, 0.35, 0.5}, Relief{129, Light::hoffman, 0.8, 0.4, 0.6},
+                    Relief{106, Light::hoffman, 0.55, 0.45, 2, 0, 3, 5},
                     Relief{103, Light::hoffman, 0.6, 0.4, 0.6, 2}, Relief{112, Light::hoffman, 0.6, 0.4, 0.9},
                     Relief{158, Light::hoffman, 0.6, 0.4, 0.6}, Relief{131, Light::hoffman, 0.6, 0.4, 1.1},
                     Relief{104, Light::hoffman, 0.6, 0.4, 1.9},

@@ -67,7 +67,7 @@ TEST_F(Programs, a_result_that_cannot_be_written_is_no_success) {
   }
 }
 
-TEST_F(Programs, no_programs_result_that_cannot_be_written_is_a_success) {
+TEST_F(Programs, whose_words_are_their_result_do_not_end_well_where_these_are_lost) {
   ASSERT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "2", "--no-figure", "--record"}), 0);
   const std::string recording = report() + "/recording.mcap";
   ASSERT_EQ(shell(program("punctum-jitter") + " --seconds 0.2 --json " + report() + "/a.json >/dev/null"), 0);
@@ -196,10 +196,12 @@ TEST_F(Programs, with_overwrite_the_new_report_takes_the_place_of_the_old_one_an
       << said_;
   ASSERT_TRUE(fs::exists(fs::path(report()) / "fault.csv"));
   std::ofstream(fs::path(report()) / "notes.txt") << "mine";
+  std::ofstream(fs::path(report()) / "recording.mcap") << "of the old run";
   ASSERT_EQ(punctum({"run", "free", "--clock", "virtual", "--seconds", "0.5"}), 0) << said_;
   EXPECT_EQ(json()["outcome"], "done");
   EXPECT_LT(json()["seconds"], 0.8);
   EXPECT_FALSE(fs::exists(fs::path(report()) / "fault.csv")) << "of the old run";
+  EXPECT_FALSE(fs::exists(fs::path(report()) / "recording.mcap"));
   EXPECT_EQ(read_all(fs::path(report()) / "notes.txt"), "mine");
   EXPECT_FALSE(fs::exists(report("r-2")));
 }

@@ -8,9 +8,11 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -108,6 +110,21 @@ int compare(const jitter::Wanted& wanted, const std::vector<std::string>& tick) 
 // Where the result goes besides the terminal; empty: nowhere.
 struct Files {
   std::string histogram, json, trace, picture;
+
+  // The first of them that has no folder: a measurement takes its time, and would be lost. Empty: none.
+  [[nodiscard]] std::string without_folder() const {
+    for (const auto& [option, file] : {std::pair("--histogram", histogram),
+                                       {"--json", json},
+                                       {"--trace", trace},
+                                       {"--picture", picture}}) {
+      const auto folder = std::filesystem::path(file).parent_path();
+      std::error_code error;
+      if (!folder.empty() && !std::filesystem::is_directory(folder, error)) {
+        return fmt::format("{}: {}: there is no folder {}", option, file, folder.string());
+      }
+    }
+    return {};
+  }
 };
 
 int measure(const jitter::Wanted& wanted, const std::string& load, const Files& files,
@@ -130,12 +147,14 @@ int measure(const jitter::Wanted& wanted, const std::string& load, const Files& 
       continue;
     }
     if (const auto written = tools::write_whole(path, text); !written) {
-      return bad(written.error());
+      complain(written.error());
+      return kNotReady;
     }
   }
   if (!files.picture.empty()) {
     if (const auto drawn = tools::draw(jitter::picture_of(*result), files.picture); !drawn) {
-      return bad("--picture: " + drawn.error());
+      complain("--picture: " + drawn.error());
+      return kNotReady;
     }
   }
   if (!files.trace.empty() && result->trace.empty()) {
@@ -172,7 +191,7 @@ int main_or_throw(int argc, char** argv) {
       {{kDone, "it was measured; the machine is ready; no difference is shown"},
        {kNotReady,
         "the audit found something missing that is required; the results differ; no GPIO line answered; what "
-        "was asked for could not be traced or said"},
+        "was asked for could not be traced, written or said"},
        {kBadInput, "bad input"}}));
   jitter::Wanted wanted;
   Files files;
@@ -269,6 +288,9 @@ int main_or_throw(int argc, char** argv) {
   }
   if (!files.picture.empty() && !files.picture.ends_with(".svg") && !files.picture.ends_with(".png")) {
     return bad("--picture: " + files.picture + ": allowed: a file .svg or .png");
+  }
+  if (const std::string lacks = files.without_folder(); !lacks.empty()) {
+    return bad(lacks);
   }
   if (!station.empty() && (beside || wanted.break_us > 0)) {
     return bad("--attach: only looks on, allowed without --compare and --break");

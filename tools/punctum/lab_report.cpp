@@ -117,6 +117,10 @@ Done write_report_page(const std::string& folder, const Json& facts, bool figure
 }
 
 int report_folders(const std::vector<std::string>& folders, const std::string& out) {
+  if (folders.size() == 1 && !out.empty()) {
+    complain("--out: is for the comparison of several reports, and one is given");
+    return exit_bad_input;
+  }
   if (folders.size() > 1 && would_destroy(out, folders)) {
     complain(fmt::format("--out: {}: belongs to one of these reports, allowed: another file", out));
     return exit_bad_input;

@@ -150,6 +150,17 @@ struct Delays {
   }
 };
 
+constexpr double kApart_s =
+    1;  // by which either table may be behind the other, both being written now and then
+
+double last_time(const Json& events) {
+  double last_s = 0;
+  for (const Json& e : events) {
+    last_s = std::max(last_s, number_in(e, "t_s").value_or(0));
+  }
+  return last_s;
+}
+
 bool may_inject(const rt::TelemetrySample& s) {
   return s.phase == rt::Phase::puncture || s.phase == rt::Phase::injection;
 }
@@ -198,9 +209,17 @@ Json rebuilt_facts(const std::string& folder) {
     }
   }
   measures.finish();
+  const auto events = read_events(folder + "/events.csv");
+  const double told_s = last_time(events);
+  const bool cut = told_s > measures.last_s + kApart_s;
   RunResult result;
   result.rows = rows;
-  result.needle = truth.needle(measures.whereabouts());
+  if (cut) {
+    result.not_kept.push_back(
+        {"samples.csv", measures.last_s, fmt::format("its rows end here, the events at {:.3f} s", told_s)});
+  } else {
+    result.needle = truth.needle(measures.whereabouts());
+  }
   const auto no_core = std::make_unique<rt::CoreStatus>();
   Json j =
       report_facts(scene, result, measures, EventList{}, *no_core, read_contour_error(folder + "/obs.csv"));
@@ -209,7 +228,7 @@ Json rebuilt_facts(const std::string& folder) {
   j["outcome_detail"] = rows > 0
                             ? fmt::format("the recording ends in phase {}", rt::name(measures.last.phase))
                             : "nothing was recorded";
-  j["events"] = read_events(folder + "/events.csv");
+  j["events"] = events;
   for (const Json& e : j["events"]) {
     if (text_in(e, "event") == "ended") {
       j["outcome"] = text_in(e, "what");
@@ -264,6 +283,13 @@ Json rebuilt_facts(const std::string& folder) {
       j["true_force_rms_N"] = std::sqrt(truth.true2 / n);
     }
     j["cells"] = {{"tried", measures.last.cell + 1}, {"lost", truth.lost ? Json(1) : Json(nullptr)}};
+  }
+  if (cut) {
+    forget_what_needs_every_sample(j);
+    j["seconds"] = told_s;
+    if (j["dose"].is_object()) {
+      j["dose"]["asked_s"] = nullptr;
+    }
   }
   return j;
 }

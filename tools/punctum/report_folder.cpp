@@ -23,9 +23,9 @@ namespace fs = std::filesystem;
 
 // What a run writes, or has written in earlier versions.
 constexpr const char* kReportFiles[] = {
-    "report.html",  "begun.json",  "events.csv", "samples.csv", "fault.csv",  "obs.csv",
-    "contours.csv", "report.json", "scene.toml", "figure.png",  "figure.svg", "figure.gp",
-    "figure.log",   "core.log",    "vision.log", "gnuplot.log", "reserve"};
+    "report.html", "begun.json",  "events.csv", "samples.csv",    "fault.csv",  "obs.csv",    "contours.csv",
+    "report.json", "scene.toml",  "figure.png", "figure.svg",     "figure.gp",  "figure.log", "core.log",
+    "vision.log",  "gnuplot.log", "reserve",    "recording.mcap", "record.log", "console.log"};
 constexpr const char* kFrames = "frames";
 constexpr const char* kElsewhere = ", allowed: another --report";
 

@@ -71,6 +71,8 @@ double seconds_of(const Measures& m, std::uint64_t ticks) {
 }
 
 // Peaks, sums and what single cells came to may lie in the samples that are missing.
+}  // namespace
+
 void forget_what_needs_every_sample(Json& j) {
   for (const char* measure :
        {"contact_delay_ms", "puncture_delay_ms", "puncture_inner_delay_ms", "force_error_rms_N",
@@ -89,8 +91,6 @@ void forget_what_needs_every_sample(Json& j) {
   }
   j["cell_list"] = Json::array();
 }
-
-}  // namespace
 
 std::string in_words(const Whereabouts& needle) {
   const double um = needle.depth_m.value_or(0) * 1e6;

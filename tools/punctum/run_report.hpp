@@ -26,6 +26,9 @@ struct ContourError {
 };
 [[nodiscard]] std::optional<ContourError> read_contour_error(const std::string& obs_csv);
 
+// Of a run whose samples have a hole, or end before it does.
+void forget_what_needs_every_sample(nlohmann::ordered_json& facts);
+
 // Whether more than half of its pictures showed neither pipettes nor membranes.
 [[nodiscard]] bool found_nothing(const std::string& obs_csv);
 

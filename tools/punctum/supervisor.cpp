@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cctype>
 #include <chrono>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <thread>
@@ -70,8 +71,8 @@ std::uint64_t rows_every(const Scene& scene, const RunSettings& settings) {
     return std::max<std::uint64_t>(1, settings.samples_every);
   }
   const double seconds = scene.seconds > 0 ? scene.seconds : kOpenEnded_s;
-  return std::max<std::uint64_t>(1, static_cast<std::uint64_t>(seconds * scene.servo.rate_Hz) /
-                                        static_cast<std::uint64_t>(kRowsOfLongRun));
+  return std::max<std::uint64_t>(
+      1, static_cast<std::uint64_t>(std::ceil(seconds * scene.servo.rate_Hz / kRowsOfLongRun)));
 }
 
 bool has_pictures(const Scene& scene) {

@@ -53,7 +53,10 @@ int run(int argc, char** argv) {
   track->add_option("--overlay", t.overlay, "folder for annotated frames")->type_name("FOLDER");
   track->add_option("--surface", t.surface, "folder for the membranes' surfaces (json, obj, stl)")
       ->type_name("FOLDER");
-  track->add_option("--fps", t.fps, "frames per second, where the file does not say")
+  track
+      ->add_option(
+          "--fps", t.fps,
+          "frames per second; without, what the scene says of its recorded frames, a video's own rate, or 25")
       ->check(tools::within(0.001, 1e5))
       ->type_name("RATE");
   track->add_option("--roi", roi, "the part of the picture to look at, in pixels")

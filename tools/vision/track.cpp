@@ -36,15 +36,19 @@ using Or = tl::expected<T, std::string>;  // the error is one line for the user
 
 tl::unexpected<std::string> wrong(std::string text) { return tl::unexpected<std::string>(std::move(text)); }
 
-Or<vision::VisionConfig> vision_of(const TrackOptions& options) {
-  const auto scene = load_scene(options.scene, options.overrides);
+Or<Scene> scene_of(const TrackOptions& options) {
+  auto scene = load_scene(options.scene, options.overrides);
   if (!scene) {
     return wrong(scene.error());
   }
   if (!scene->vision) {
     return wrong(fmt::format("{}: it has no [vision], so there is nothing to look for", options.scene));
   }
-  vision::VisionConfig config = *scene->vision;
+  return std::move(*scene);
+}
+
+vision::VisionConfig vision_of(const Scene& scene, const TrackOptions& options) {
+  vision::VisionConfig config = *scene.vision;
   if (config.method == vision::Method::truth) {  // recorded pictures have none
     config.method = vision::Method::tracker;
   }
@@ -133,11 +137,13 @@ struct Input {
 };
 
 Or<Input> open_input(const TrackOptions& options) {
-  auto config = vision_of(options);
-  if (!config) {
-    return wrong(config.error());
+  const auto scene = scene_of(options);
+  if (!scene) {
+    return wrong(scene.error());
   }
-  auto camera = recorded::Camera::open(options.frames, options.fps);
+  vision::VisionConfig config = vision_of(*scene, options);
+  auto camera = recorded::Camera::open(options.frames,
+                                       options.fps.value_or(scene->recorded ? scene->recorded->fps : 0));
   if (!camera) {
     return wrong(camera.error());
   }
@@ -149,7 +155,7 @@ Or<Input> open_input(const TrackOptions& options) {
   if (!seed) {
     return wrong(seed.error());
   }
-  const auto holder_template = template_of(options, *config, *roi);
+  const auto holder_template = template_of(options, config, *roi);
   if (!holder_template) {
     return wrong(holder_template.error());
   }
@@ -161,7 +167,7 @@ Or<Input> open_input(const TrackOptions& options) {
     }
     poses = std::move(*read);
   }
-  return Input{std::move(*config), std::move(*camera), *roi, *seed, *holder_template, std::move(poses)};
+  return Input{std::move(config), std::move(*camera), *roi, *seed, *holder_template, std::move(poses)};
 }
 
 struct Output {

@@ -9,14 +9,14 @@
 namespace punctum::tools {
 
 struct TrackOptions {
-  std::string frames;                  // folder, glob, one picture or a video file
-  std::string scene;                   // built-in name or path
-  std::vector<std::string> overrides;  // table.key=value
-  std::string out;                     // obs.csv
-  std::string contours, deviations;    // empty: not written
-  std::string overlay;                 // folder; empty: not drawn
-  std::string surface;                 // folder; empty: not reconstructed
-  double fps = 25;
+  std::string frames;                                // folder, glob, one picture or a video file
+  std::string scene;                                 // built-in name or path
+  std::vector<std::string> overrides;                // table.key=value
+  std::string out;                                   // obs.csv
+  std::string contours, deviations;                  // empty: not written
+  std::string overlay;                               // folder; empty: not drawn
+  std::string surface;                               // folder; empty: not reconstructed
+  std::optional<double> fps;                         // none: the video's, the scene's, or 25
   std::optional<std::array<int, 4>> roi;             // x, y, width, height
   std::optional<std::array<double, 3>> seed_circle;  // x, y, r in the whole picture
   std::string poses;                                 // table of the manipulator's poses; empty: none

@@ -362,6 +362,30 @@ TEST(Rebuilt, what_came_about_between_two_rows_came_at_a_time_that_is_not_known)
   EXPECT_TRUE(contains(run_page(folder.path(), facts, ""), "<dt>contact told</dt><dd>unknown</dd>"));
 }
 
+TEST(Rebuilt, where_the_events_go_on_after_the_last_row_nobody_knows_how_it_ended) {
+  const Folder folder;
+  folder.put("scene.toml", to_toml(*load_scene("icsi")));
+  const std::string rows = RecordedInjection::rows(1);
+  folder.put("samples.csv", rows.substr(0, rows.find("\n0.300000,") + 1));  // the needle is in the cell
+  rt::Event last;
+  last.tick = 1350;
+  last.t_s = 1.35;
+  last.kind = rt::Event::ended;
+  last.what = static_cast<std::uint64_t>(rt::RunEnd::done);
+  folder.put("events.csv", kEventColumns + event_line(last));
+  const Json facts = rebuilt_facts(folder.path());
+  EXPECT_EQ(facts["outcome"], "done");
+  EXPECT_EQ(facts["needle_at_end"]["where"], "unknown");
+  EXPECT_TRUE(facts["dose"]["given_s"].is_null() && facts["dose"]["asked_s"].is_null()) << facts["dose"];
+  EXPECT_TRUE(facts["max_depth_um"].is_null());
+  EXPECT_EQ(facts["seconds"], 1.35);
+  ASSERT_EQ(facts["not_kept"].size(), 1U);
+  EXPECT_EQ(facts["not_kept"][0]["file"], "samples.csv");
+  last.t_s = 0.7;  // either table may be behind the other
+  folder.put("events.csv", kEventColumns + event_line(last));
+  EXPECT_TRUE(rebuilt_facts(folder.path())["not_kept"].empty());
+}
+
 TEST(Rebuilt, a_dose_that_began_or_ended_between_rows_far_apart_is_unknown) {
   const Folder folder;
   folder.put("scene.toml", to_toml(*load_scene("icsi")));

@@ -179,16 +179,21 @@ void SeenNeedle::put_right_by_stage(const ClearedPicture& picture, const Touch& 
   if (!told) {
     return;
   }
+  const bool strays = by_stage_.picture_strays(n);
   if (n.ok && pipette_.goes_on_to(picture.field, picture.noise, n, *told)) {
     n.ok = seen_.ok = false;
     n.reason = "a speck looks like its end";
-  } else if (by_stage_.picture_strays(n) && touch.punctured) {
+  } else if (strays && touch.at_membrane() && pipette_.ends_before(picture.field, picture.noise, n, *told)) {
+    n.ok = seen_.ok = false;
+    n.reason = "something ahead of it looks like its end";
+  } else if (strays && touch.punctured) {
     n.ok = seen_.ok = false;
     n.reason = "something within the cell looks like its end";
   }
   if (!n.ok) {
     n = pipette_.by_shaft(picture.field, picture.noise, *told).value_or(n);
-    n.sd = on_tip_sd_px_ = by_stage_.sd();
+    n.sd = by_stage_.sd();
+    on_tip_sd_px_ = math::hypot(n.sd, touch.at_membrane() ? kWall_px : 0);
     wall_px_ = gone_odds_ = 0;
     return;
   }
@@ -205,6 +210,15 @@ void SeenNeedle::put_right_by_stage(const ClearedPicture& picture, const Touch& 
     const double wall = wall_px_ + (seen_.tip - n.tip).dot(n.axis);
     wall_px_ = gone_odds_ > 0 ? wall : std::clamp(wall, -kThick_px, kThick_px);
   }
+}
+
+// One that went back is no membrane on the tip; a tip that is told too far ahead leaves it where it was.
+Point SeenNeedle::on_membrane(const NeedlePose& now) const {
+  constexpr double kBack_px = 1;
+  const Point there = now.tip + wall_px_ * now.axis;
+  const bool back =
+      gone_odds_ > 0 && !(last_on_membrane_ && (there - *last_on_membrane_).dot(now.axis) > -kBack_px);
+  return back ? now.tip : there;
 }
 
 void SeenNeedle::learn(const ClearedPicture& picture, const NeedlePose& now,

@@ -62,9 +62,7 @@ class SeenNeedle {
   // From the tip to the middle of the membrane that it pushes, as far as seen, px; where that lies; and where
   // it lay one frame ago, empty if that did not show it.
   [[nodiscard]] double wall_px() const noexcept { return wall_px_; }
-  [[nodiscard]] Point on_membrane(const NeedlePose& now) const {
-    return now.tip + (gone_odds_ > 0 ? 0 : wall_px_) * now.axis;
-  }
+  [[nodiscard]] Point on_membrane(const NeedlePose& now) const;
   [[nodiscard]] const std::optional<Point>& last_on_membrane() const noexcept { return last_on_membrane_; }
   // Log odds that the membrane is not on the tip, by what is seen across the mouth of the lumen.
   [[nodiscard]] double membrane_gone_odds() const noexcept { return gone_odds_; }

@@ -53,6 +53,19 @@ cv::Mat drawn(const fs::path& folder, int frame) {
   return cv::imread((folder / name).string(), cv::IMREAD_GRAYSCALE);
 }
 
+// As bright as the lumen, and as wide: it sticks to the needle's end.
+cv::Mat with_bright_speck(const cv::Mat& picture, const Point& at) {
+  constexpr double kRadius_px = 4, kGrey = 35;
+  cv::Mat out = picture.clone();
+  for (int y = 0; y < out.rows; ++y) {
+    for (int x = 0; x < out.cols; ++x) {
+      const double more = kGrey / 2 * (1 - std::tanh(std::hypot(x - at.x, y - at.y) - kRadius_px));
+      out.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(out.at<std::uint8_t>(y, x) + more);
+    }
+  }
+  return out;
+}
+
 // The first frames of contact and puncture.
 using Events = std::map<std::string, std::optional<int>>;
 void mark(Events& in, const char* event, bool is, int frame) {
@@ -159,13 +172,14 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
   ASSERT_EQ(truth.size(), frames);
   VisionConfig config;
   config.pixel_m = kPixel_um * 1e-6;
-  std::optional<Tracker> tracker, with_pose;
+  std::optional<Tracker> tracker, with_pose, with_speck;
   const Point off(2.6, -1.9);  // of the pose, px
   std::map<std::string, Score> outer, inner;
   std::vector<double> tip_px, depth_px;        // seen minus true: along the axis before contact, in contact
   std::vector<double> told_px, told_depth_px;  // likewise in all phases, and in contact, with the pose
   std::vector<double> touching_px;             // tip in contact
   double furthest_px = 0;                      // of those
+  std::vector<double> speck_depth_px;          // in contact, with the pose, a speck on the tip
   double surest = 0;                           // tip, when the membrane gives way: deviations off
   Events begun, seen_in, told_in;
   std::optional<Point> mouth_off;  // of the holding pipette
@@ -176,6 +190,7 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
     if (!tracker) {
       tracker.emplace(config, picture.cols, picture.rows);
       with_pose.emplace(config, picture.cols, picture.rows);
+      with_speck.emplace(config, picture.cols, picture.rows);
     }
     const hal::Frame frame = frame_of(picture, static_cast<std::uint64_t>(k));
     const Result& seen = tracker->process(frame);
@@ -204,6 +219,14 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
     }
     if (phase == "contact" && told.wd_px) {
       told_depth_px.push_back(*told.wd_px - t["wd_px"].get<double>());
+    }
+    const cv::Mat stuck = begun["contact"] && k > *begun["contact"] + 3
+                              ? with_bright_speck(picture, tip + 2 * seen.needle.axis)
+                              : picture;
+    const Result& beside_speck =
+        with_speck->process(frame_of(stuck, static_cast<std::uint64_t>(k)), tip + off);
+    if (phase == "contact" && beside_speck.wd_px) {
+      speck_depth_px.push_back(*beside_speck.wd_px - t["wd_px"].get<double>());
     }
     const double ahead = (seen.needle.tip - tip).dot(seen.needle.axis);
     if (phase == "approach" && seen.needle.ok) {
@@ -270,7 +293,9 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
     expect_near_truth("tip", tip_px, 0.4);
     expect_near_truth("depth of the dimple", depth_px, 0.3);
     expect_near_truth("tip with the pose", told_px, 0.26);
-    expect_near_truth("depth of the dimple with the pose", told_depth_px, 0.25);
+    expect_near_truth("depth of the dimple with the pose", told_depth_px, 0.26);
+    expect_near_truth("depth of the dimple beside a speck, with the pose", speck_depth_px,
+                      GetParam().halo > 0 ? 1.6 : 0.9);
   }
 }
 
@@ -281,15 +306,16 @@ std::string name_of_sequence(const testing::TestParamInfo<Sequence>& of) {
 
 // In 7 and 107 the inner membrane was once held in its dimple; 106, 108 and 109 were never tuned on. In 1 the
 // needle begins further away, and its tip was once 2 px off from the third frame on. In 134 the membrane that
-// gave way was once taken for one on the tip, 12 px off.
+// gave way was once taken for one on the tip, 12 px off. In 110 the tip is told 4 px too far ahead in one
+// frame, and once drew the membrane after it in three more.
 INSTANTIATE_TEST_SUITE_P(Seeds, ForeignFrames,
                          testing::Values(Sequence{107, 5, 0.055, 0.35, 0.09},
-                                         Sequence{108, 10, 0.12, 0.4, 0.128}),
+                                         Sequence{108, 10, 0.12, 0.4, 0.128},
+                                         Sequence{110, 5, 0.2, 0.7, 0.25, 0, 40, 2.5}),
                          name_of_sequence);
 INSTANTIATE_TEST_SUITE_P(Further, ForeignFrames,
                          testing::Values(Sequence{109, 5, 0.085, 0.35, 0.09, 25},
                                          Sequence{7, 2, 0.05, 0.3, 0.08}, Sequence{106, 2, 0.065, 0.3, 0.085},
-                                         Sequence{110, 5, 0.2, 0.7, 0.25, 0, 40, 2.5},
                                          Sequence{1, 2, 0.04, 0.3, 0.085, 0, 80},
                                          Sequence{134, 5, 0.06, 0.35, 0.1, 0, 80}),
                          name_of_sequence);

@@ -25,6 +25,7 @@ constexpr double kJump_px = 4;        // along the axis, from what motion and co
 constexpr int kJumpsMax = 3;          // frames in a row; then it is where it is seen
 constexpr double kAside_px = 2;       // across the axis; further aside the shaft must lie there, too
 constexpr double kShortest_px = 4;    // of a wall that an edge is averaged over
+constexpr double kElsewhere_px = 8;   // along the axis: what is seen as its end is something else
 constexpr double kFollowed_px = 24;   // of a faint one while it is followed: it may bend
 constexpr std::size_t kGathered = 4;  // frames that tell an end which one of them does not
 constexpr double kShaft_px = 180;     // of the shaft tell its direction
@@ -272,10 +273,20 @@ bool InjectionPipette::go_on_at(const GradientField& field, double noise, const 
 
 bool InjectionPipette::goes_on_to(const GradientField& field, double noise, const NeedlePose& seen,
                                   const Point& tip) const {
-  constexpr double kSpeck_px = 5, kLeast_px = 8, kAveraged_px = 4;
+  constexpr double kSpeck_px = 5;
   const double ahead = (tip - seen.tip).dot(seen.axis);
-  return ahead > kLeast_px && std::abs((tip - seen.tip).cross(seen.axis)) < seen.half_width &&
-         walls_go_on(field, noise, seen, kSpeck_px, ahead - kAveraged_px / 2, kAveraged_px);
+  return ahead > kElsewhere_px && std::abs((tip - seen.tip).cross(seen.axis)) < seen.half_width &&
+         walls_go_on(field, noise, seen, kSpeck_px, ahead - kShortest_px / 2, kShortest_px);
+}
+
+bool InjectionPipette::ends_before(const GradientField& field, double noise, const NeedlePose& seen,
+                                   const Point& tip) const {
+  const double ahead = (seen.tip - tip).dot(seen.axis);
+  NeedlePose there = seen;
+  there.tip = seen.at(ahead, 0);
+  there.half_width = seen.half_width_at(ahead);
+  return ahead > kElsewhere_px &&
+         !walls_go_on(field, noise, there, kShortest_px / 2, ahead - kShortest_px / 2, kShortest_px);
 }
 
 std::optional<NeedlePose> InjectionPipette::by_shaft(const GradientField& field, double noise,

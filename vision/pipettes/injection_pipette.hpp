@@ -51,6 +51,10 @@ class InjectionPipette {
   // What is taken for its end is a speck: its walls go on from there to a tip that is known otherwise.
   [[nodiscard]] bool goes_on_to(const GradientField& field, double noise, const NeedlePose& seen,
                                 const Point& tip) const;
+  // What is taken for its end lies ahead of it: its walls do not go on to there from a tip that is known
+  // otherwise.
+  [[nodiscard]] bool ends_before(const GradientField& field, double noise, const NeedlePose& seen,
+                                 const Point& tip) const;
   // Its shaft is seen behind a tip that is known otherwise; its axis and width are then as seen.
   [[nodiscard]] std::optional<NeedlePose> by_shaft(const GradientField& field, double noise,
                                                    const Point& tip);

@@ -185,6 +185,24 @@ TEST_F(Needle, goes_on_behind_a_speck_as_far_as_its_walls_do) {
   }
 }
 
+// The manipulator has the tip further back than what is taken for the end.
+TEST_F(Needle, ends_before_what_lies_ahead_of_it) {
+  constexpr double kFurther_px = 14, kLittle_px = 6;
+  for (const unsigned frame : {0U, 1000U, 2000U}) {
+    Drawing d{.frame = frame};
+    needle_ = {Side::right, kTipRadius};
+    ASSERT_TRUE(needle_.start(draw(d), kNoise, [](const Point&) { return true; }));
+    const NeedlePose end = look(d);
+    NeedlePose beyond = end;
+    beyond.tip = end.at(-kFurther_px, 0);
+    EXPECT_TRUE(needle_.ends_before(draw(d), kNoise, beyond, end.tip)) << frame;
+    EXPECT_FALSE(needle_.ends_before(draw(d), kNoise, end, end.at(kFurther_px, 0)))
+        << frame << ": it has slipped, and its walls are seen";
+    beyond.tip = end.at(-kLittle_px, 0);
+    EXPECT_FALSE(needle_.ends_before(draw(d), kNoise, beyond, end.tip)) << frame;
+  }
+}
+
 TEST_F(Needle, is_the_less_certain_the_further_it_is_out_of_focus) {
   Drawing d;
   approach(d);

@@ -99,6 +99,7 @@ TEST_F(Programs, vision_that_cannot_read_its_frames_ends_the_run_as_bad_input) {
             2)
       << said_;
   EXPECT_NE(said_.find("1.png"), std::string::npos) << said_;
+  EXPECT_FALSE(fs::exists(report())) << "nothing has begun";
 }
 
 // The segments that a process maps for writing, by their last names.
@@ -219,6 +220,8 @@ TEST_F(Programs, frames_that_show_nothing_most_of_the_time_are_no_run_that_is_do
   const auto r = json();
   EXPECT_EQ(r["outcome"], "without vision") << said_;
   EXPECT_GT(r["without_vision_s"].get<double>(), 0.5 * r["seconds"].get<double>());
+  EXPECT_EQ(r["pictures_unusable"], 60) << "55 cannot be read, 5 are of one grey";
+  EXPECT_NE(said_.find("60 of 60 pictures unusable"), std::string::npos) << said_;
   EXPECT_EQ(r["vision_restarts"].size(), 0U) << "frames that cannot be read are no vision that hangs";
 }
 

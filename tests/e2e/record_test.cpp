@@ -90,7 +90,7 @@ TEST_F(Recordings, a_recorded_run_is_exported_byte_for_byte_as_the_run_wrote_it)
   EXPECT_EQ(run("punctum-export", {recording, "--hdf5", file("run.nwb")}), 2);
   EXPECT_EQ(said_, "punctum-export: " + file("run.nwb") + ": is there already; an export replaces nothing\n");
   EXPECT_EQ(run("punctum-export", {recording, "--hdf5", "/nowhere/run.nwb"}), 2);
-  EXPECT_EQ(said_, "punctum-export: /nowhere/run.nwb: cannot be written\n");
+  EXPECT_EQ(said_, "punctum-export: /nowhere/run.nwb: cannot be written: No such file or directory\n");
 
   EXPECT_EQ(run("punctum", {"export", recording, "--csv", file("t")}), 2);
   EXPECT_EQ(said_,
@@ -267,6 +267,8 @@ TEST_F(Recordings, a_recording_is_a_station_that_others_join) {
   EXPECT_EQ(second.rows.back()[0], first.rows.back()[0]);
   EXPECT_EQ(run("punctum-replay", {recording, "--speed", "2"}), 2);
   EXPECT_EQ(said_, "punctum-replay: --from and --speed are of --console and --station\n");
+  EXPECT_EQ(run("punctum-replay", {recording, "--station", "--from", "1000"}), 2);
+  EXPECT_EQ(said_.find("punctum-replay: --from: 1000: allowed: up to "), 0U) << said_;
 }
 
 TEST_F(Recordings, bad_input_is_one_line) {
@@ -284,6 +286,10 @@ TEST_F(Recordings, bad_input_is_one_line) {
   EXPECT_EQ(said_,
             "punctum-export: as what? Allowed: --csv FOLDER, --hdf5 FILE, --obj STEM, --png FOLDER, "
             "--ome-tiff FILE, --overview FOLDER\n");
+  EXPECT_EQ(run("punctum-export", {"/dev/null", "--csv", file("t"), "--at", "5"}), 2);
+  EXPECT_EQ(said_, "punctum-export: --at: a time of the surfaces, allowed with --obj\n");
+  EXPECT_EQ(run("punctum-replay", {"/dev/null", "--console", "--station"}), 2);
+  EXPECT_EQ(said_, "punctum-replay: --station is without a browser, allowed without --console\n");
   EXPECT_EQ(run("punctum-export", {"/dev/null", "/dev/zero", "--csv", file("t")}), 2);
   EXPECT_EQ(said_, "punctum-export: 2 recordings: only --overview takes more than one\n");
   EXPECT_EQ(run("punctum-export", {"/dev/null", "--overview", file("t")}), 2);

@@ -254,17 +254,21 @@ TEST_F(Programs, a_lost_hand_stops_the_station) {
 TEST_F(Programs, bad_input_is_refused_in_one_line_and_nothing_starts) {
   const std::vector<std::pair<Strings, std::string>> wrong = {
       {{"run", "icsy"}, "icsy: unknown scene (did you mean icsi?)"},
-      {{"run", "free", "--rate", "3000"}, "--set: servo.rate_hz: 3000 is not one of the choices"},
+      {{"run", "free", "--rate", "3000"}, "--rate: 3000 is not one of the choices"},
       {{"run", "free", "--set", "damping.B1_Ns_m=-1"}, "--set: damping.B1_Ns_m: -1 is out of range"},
       {{"run", "free", "--set", "nonsense"}, "--set: nonsense: not an override"},
-      {{"run", "free", "--seed", "abc"}, "--set: scene.seed: \"abc\" is not a whole number"},
+      {{"run", "free", "--seed", "abc"}, "--seed: \"abc\" is not a whole number"},
       {{"run", "free", "--seconds", "-3"}, "--seconds: "},
       {{"run", "free", "--seconds", "nan"}, "--seconds: nan: not a time limit"},
       {{"run", "free", "--seconds", "0"}, "--seconds: 0: not a time limit"},
-      {{"run", "free", "--rate", "0"}, "--set: servo.rate_hz: 0 is not one of the choices"},
-      {{"run", "free", "--seed", ""}, "--set: scene.seed: "},
+      {{"run", "free", "--rate", "0"}, "--rate: 0 is not one of the choices"},
+      {{"run", "free", "--seed", ""}, "--seed: "},
       {{"run", "free", "--samples-every", "-3"}, "--samples-every: "},
+      {{"run", "free", "--samples-every", "0"}, "--samples-every: 0, allowed: from 1"},
+      {{"run", "free", "--report", ""}, "--report: names no folder"},
+      {{"run", "free", "--overwrite"}, "--overwrite: allowed with --report"},
       {{"run", "free", "--clock", "sundial"}, "--clock: "},
+      {{"exprot", "a.mcap"}, "exprot: unknown command (did you mean export?)"},
       {{"run"}, "SCENE is required"},
       {{"dance"}, ""},
       {{"explain", "icsi", "--set", "cone.K=1"}, "--set: cone.K: unknown key (did you mean K_N_m?)"},
@@ -350,6 +354,18 @@ TEST_F(Programs, check_says_of_each_device_whether_it_is_there_and_devices_lists
   EXPECT_NE(said_.find("cannot run"), std::string::npos) << said_;
   EXPECT_EQ(punctum({"devices"}), 0) << said_;
   EXPECT_NE(said_.find("GPIO chips"), std::string::npos) << said_;
+}
+
+TEST_F(Programs, check_and_run_agree_about_a_processor_that_is_not_there) {
+  const Strings elsewhere{"icsi",  "--clock",        "virtual", "--seconds",      "0.1",
+                          "--set", "servo.cpu=1023", "--set",   "vision.cpu=1023"};
+  Strings args{"check"};
+  args.insert(args.end(), elsewhere.begin(), elsewhere.end());
+  EXPECT_EQ(punctum(args), 0) << said_;
+  EXPECT_NE(said_.find("note vision.cpu         CPU 1023 of "), std::string::npos) << said_;
+  args.front() = "run";
+  EXPECT_EQ(punctum(args), 1) << said_;
+  EXPECT_EQ(json()["outcome"], "time limit") << said_;
 }
 
 TEST_F(Programs, check_finds_frames_that_are_not_there) {

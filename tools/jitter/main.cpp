@@ -111,6 +111,9 @@ int compare(const jitter::Wanted& wanted, const std::vector<std::string>& tick) 
 struct Files {
   std::string histogram, json, trace, picture;
 
+  [[nodiscard]] bool are_none() const {
+    return histogram.empty() && json.empty() && trace.empty() && picture.empty();
+  }
   // The first of them that has no folder: a measurement takes its time, and would be lost. Empty: none.
   [[nodiscard]] std::string without_folder() const {
     for (const auto& [option, file] : {std::pair("--histogram", histogram),
@@ -203,9 +206,9 @@ int main_or_throw(int argc, char** argv) {
       app.add_option("--rate", wanted.rate_Hz, "ticks per second (default: 1000, or the scene's)")
           ->type_name("HZ")
           ->check(tools::within(1.0, 20'000.0));
-  app.add_option("--seconds", wanted.seconds, "how long (default: 10)")
-      ->type_name("S")
-      ->check(tools::within(0.1, 604'800.0));
+  const CLI::Option* seconds = app.add_option("--seconds", wanted.seconds, "how long (default: 10)")
+                                   ->type_name("S")
+                                   ->check(tools::within(0.1, 604'800.0));
   const CLI::Option* cpu =
       app.add_option("--cpu", wanted.cpu, "the CPU that the loop is bound to (default: none, or the scene's)")
           ->type_name("N")
@@ -271,7 +274,7 @@ int main_or_throw(int argc, char** argv) {
   }
   if (audit_option->count() > 0 &&
       (loaded || beside || !station.empty() || !gpio.empty() || !tick.empty() || wanted.explain_us > 0 ||
-       wanted.break_us > 0 || !files.histogram.empty() || !files.json.empty() || !files.picture.empty())) {
+       wanted.break_us > 0 || rate->count() + seconds->count() > 0 || !files.are_none())) {
     return bad("--audit: measures nothing, allowed with --cpu, --priority and --plan");
   }
   if (audit_option->count() > 0) {
@@ -294,6 +297,9 @@ int main_or_throw(int argc, char** argv) {
   }
   if (!station.empty() && (beside || wanted.break_us > 0)) {
     return bad("--attach: only looks on, allowed without --compare and --break");
+  }
+  if (!station.empty() && rate->count() + cpu->count() + priority->count() > 0) {
+    return bad("--attach: a running core has its own, allowed without --rate, --cpu and --priority");
   }
   if (beside && !(files.histogram.empty() && files.json.empty() && files.picture.empty())) {
     return bad("--compare: writes no files, allowed without --histogram, --json and --picture");

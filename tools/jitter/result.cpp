@@ -210,6 +210,12 @@ tl::expected<Result, std::string> result_of_json(std::string_view text) {
       r.parts.push_back(distribution(part));
     }
     return r;
+  } catch (const Json::parse_error& e) {
+    return tl::unexpected(fmt::format("is no result of punctum-jitter --json: no JSON at byte {}", e.byte));
+  } catch (const Json::exception& e) {
+    const std::string_view all = e.what();  // its kind and number in brackets, then words
+    return tl::unexpected(
+        fmt::format("is no result of punctum-jitter --json: {}", all.substr(all.find("] ") + 2)));
   } catch (const std::exception& e) {
     return tl::unexpected(std::string(e.what()));
   }

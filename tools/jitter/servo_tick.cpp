@@ -21,9 +21,7 @@ tl::expected<std::unique_ptr<ServoTick>, std::string> ServoTick::of(const std::s
   }
   auto scene = tools::load_scene(name, overrides);
   if (!scene) {
-    constexpr std::string_view kGiven = "--set: servo.rate_hz";
-    return tl::unexpected(scene.error().starts_with(kGiven) ? "--rate" + scene.error().substr(kGiven.size())
-                                                            : scene.error());
+    return tl::unexpected(tools::said_of_option(scene.error(), "servo.rate_hz", "--rate"));
   }
   if (!scene->sim || tools::any_real(scene->devices)) {
     return tl::unexpected(fmt::format(

@@ -409,11 +409,10 @@ int check(const Scene& s, std::string& text) {
                   : fmt::format("falcon.firmware: {}: cannot be read, allowed: a C2000 boot stream", file)) &&
         good;
   }
-  const int cpus = static_cast<int>(std::thread::hardware_concurrency());
-  for (const auto& [what, n] : {std::pair{"servo.cpu", s.core_cpu}, std::pair{"vision.cpu", s.vision_cpu}}) {
-    if (n >= 0) {
-      good = row(n < cpus, what, fmt::format("CPU {} of {}", n, cpus)) && good;
-    }
+  if (s.vision_cpu >= 0) {  // that of the core is one of its rights
+    const int cpus = static_cast<int>(std::thread::hardware_concurrency());
+    text += fmt::format("  {} {:<18} CPU {} of {}{}\n", s.vision_cpu < cpus ? "ok  " : "note", "vision.cpu",
+                        s.vision_cpu, cpus, s.vision_cpu < cpus ? "" : ": vision runs wherever it may");
   }
 
   // Without the required rights the core runs degraded, and says so.

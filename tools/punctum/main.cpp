@@ -41,6 +41,31 @@ int bad(const std::string& text) {
   return 2;
 }
 
+// Programs of their own, which need libraries that a station does not.
+constexpr std::pair<const char*, const char*> kOtherPrograms[] = {
+    {"export", "make tables, pictures and surfaces of a recording"},
+    {"replay", "give the inputs of a recording to this build's servo again, or show it once more"}};
+
+// Returns where the command line names none of them, or one that is not there: then why, unless help is asked
+// for.
+std::string become_another(int argc, char** argv) {
+  for (const auto& [command, what] : kOtherPrograms) {
+    if (argc > 1 && std::string_view(argv[1]) == command) {
+      const std::string name = std::string("punctum-") + command;
+      if (const std::string program = find_program(name); !program.empty()) {
+        execv(program.c_str(), argv + 1);
+      }
+      const bool asks_for_help = argc > 2 && std::string_view(argv[2]) == "--help";
+      return asks_for_help ? std::string()
+                           : fmt::format(
+                                 "{} is not there, neither beside this program nor in PATH (Debian package "
+                                 "punctum-tools)",
+                                 name);
+    }
+  }
+  return {};
+}
+
 int main_or_throw(int argc, char** argv) {
   CLI::App app{"Haptic cell injection: runs a scene on control core, station and vision, and reports.",
                "punctum"};
@@ -90,7 +115,7 @@ int main_or_throw(int argc, char** argv) {
                 "new folder");
   run->add_option("--samples-every", settings.samples_every,
                   "write every n-th tick to samples.csv (default: all, of long runs fewer)")
-      ->check(within(0, 1'000'000'000))
+      ->check(within(1, 1'000'000'000))
       ->type_name("TICKS");
   run->add_flag("--no-frames", no_frames, "write no annotated frames");
   run->add_flag("--no-figure", no_figure, "draw no figure");
@@ -131,6 +156,9 @@ int main_or_throw(int argc, char** argv) {
   reporting
       ->add_option("--out", comparison, "where the comparison goes (default: reports/comparison-DATE.html)")
       ->type_name("FILE");
+  for (const auto& [command, what] : kOtherPrograms) {
+    (void)app.add_subcommand(command, what);
+  }
   run->footer(
       help_footer({{"punctum run icsi --report reports/mine", "the report goes to that folder"},
                    {"punctum run recorded --set camera.frames=my/pictures", "vision on your own pictures"},
@@ -191,7 +219,11 @@ int main_or_throw(int argc, char** argv) {
   }
   auto scene = load_scene(scene_name, overrides);
   if (!scene) {
-    return bad(scene.error());
+    std::string why = scene.error();
+    for (const auto& [option, key] : {std::pair{"--rate", "servo.rate_hz"}, {"--seed", "scene.seed"}}) {
+      why = given(option) ? said_of_option(why, key, option) : why;
+    }
+    return bad(why);
   }
 
   if (*explaining) {
@@ -216,6 +248,12 @@ int main_or_throw(int argc, char** argv) {
   if (const auto files = files_of(*scene); !files) {
     return bad(files.error());
   }
+  if (given("--report") && settings.report.empty()) {
+    return bad("--report: names no folder");
+  }
+  if (settings.overwrite && settings.report.empty()) {
+    return bad("--overwrite: allowed with --report, which names the folder");
+  }
   settings.frames = !no_frames;
   settings.figure = !no_figure;
   // Its hand is on the page.
@@ -226,22 +264,13 @@ int main_or_throw(int argc, char** argv) {
   return run_scene(*scene, settings);
 }
 
-// Programs of their own, which need libraries that a station does not.
-void become_another(int argc, char** argv) {
-  for (const char* command : {"export", "replay"}) {
-    if (argc > 1 && std::string_view(argv[1]) == command) {
-      if (const std::string program = find_program(std::string("punctum-") + command); !program.empty()) {
-        execv(program.c_str(), argv + 1);
-      }
-    }
-  }
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
   start_program();
-  become_another(argc, argv);
+  if (const std::string lacks = become_another(argc, argv); !lacks.empty()) {
+    return bad(lacks);
+  }
   try {
     return main_or_throw(argc, argv);
   } catch (const std::exception& e) {

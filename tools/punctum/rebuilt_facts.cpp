@@ -221,8 +221,7 @@ Json rebuilt_facts(const std::string& folder) {
     result.needle = truth.needle(measures.whereabouts());
   }
   const auto no_core = std::make_unique<rt::CoreStatus>();
-  Json j =
-      report_facts(scene, result, measures, EventList{}, *no_core, read_contour_error(folder + "/obs.csv"));
+  Json j = report_facts(scene, result, measures, EventList{}, *no_core, read_pictures(folder + "/obs.csv"));
   j["rebuilt"] = true;
   j["outcome"] = "unknown";
   j["outcome_detail"] = rows > 0

@@ -312,9 +312,12 @@ std::string measures_html(const Json& facts) {
   f.row("peak force at the hand", shown(n("peak_hand_force_N"), "N"));
   f.row("tremor, tip / hand", n("tremor_ratio") ? shown(n("tremor_ratio"), "in 8-12 Hz") : std::string());
   if (n("observations").value_or(0) > 0) {
-    f.row("vision", fmt::format("{} observations, {} times stale ({}), {} restarts", whole(n("observations")),
-                                whole(n("stale_observations")), shown(n("stale_s"), "s"),
-                                list_in(facts, "vision_restarts").size()));
+    f.row("vision", fmt::format("{} observations, {} times stale ({}), {} restarts{}",
+                                whole(n("observations")), whole(n("stale_observations")),
+                                shown(n("stale_s"), "s"), list_in(facts, "vision_restarts").size(),
+                                n("pictures_unusable").value_or(0) > 0
+                                    ? fmt::format(", {} pictures unusable", whole(n("pictures_unusable")))
+                                    : std::string()));
   }
   std::string s = "<h2>What came of it</h2>\n" + f.html();
   const auto list = list_in(facts, "cell_list");

@@ -112,38 +112,30 @@ std::string in_words(const Whereabouts& needle) {
   return {};
 }
 
-std::optional<ContourError> read_contour_error(const std::string& obs_csv) {
+PicturesSeen read_pictures(const std::string& obs_csv) {
   CsvReader table(obs_csv);
-  ContourError e;
+  PicturesSeen seen;
   double sum = 0, sum95 = 0;
   while (table.next()) {
+    ++seen.all;
+    const bool found = table.number("outer_ok") == 1.0 || table.number("inner_ok") == 1.0 ||
+                       table.number("tip_x_px") || table.number("holder_x_px");
+    seen.empty += found ? 0 : 1;
+    seen.unusable += table.text("phase").empty() ? 1 : 0;
     const auto rms_um = table.number("outer_rms_um");
     if (!rms_um || *rms_um < 0) {
       continue;
     }
     const double p95_um = table.number("outer_p95_um").value_or(0);
-    ++e.frames;
+    ++seen.compared;
     sum += *rms_um * *rms_um;
     sum95 += p95_um > 0 ? p95_um * p95_um : 0;
   }
-  if (e.frames == 0) {
-    return std::nullopt;
+  if (seen.compared > 0) {
+    seen.contour_rms_um = std::sqrt(sum / static_cast<double>(seen.compared));
+    seen.contour_p95_um = std::sqrt(sum95 / static_cast<double>(seen.compared));
   }
-  e.rms_um = std::sqrt(sum / static_cast<double>(e.frames));
-  e.p95_um = std::sqrt(sum95 / static_cast<double>(e.frames));
-  return e;
-}
-
-bool found_nothing(const std::string& obs_csv) {
-  CsvReader table(obs_csv);
-  std::uint64_t frames = 0, empty = 0;
-  while (table.next()) {
-    ++frames;
-    const bool found = table.number("outer_ok") == 1.0 || table.number("inner_ok") == 1.0 ||
-                       table.number("tip_x_px") || table.number("holder_x_px");
-    empty += found ? 0 : 1;
-  }
-  return 2 * empty > frames;
+  return seen;
 }
 
 std::string fault_text(rt::Fault fault, double t_s, bool coloured) {
@@ -182,7 +174,7 @@ std::string missing_rights(const rt::CoreStatus& core) {
 
 nlohmann::ordered_json report_facts(const Scene& scene, const RunResult& result, const Measures& m,
                                     const EventList& events, const rt::CoreStatus& core,
-                                    const std::optional<ContourError>& contour) {
+                                    const PicturesSeen& pictures) {
   Json j;
   j["outcome"] = rt::name(result.end);
   if (!result.detail.empty()) {
@@ -266,7 +258,9 @@ nlohmann::ordered_json report_facts(const Scene& scene, const RunResult& result,
       m.force_ticks > 0 ? Json(std::sqrt(m.true_force2 / static_cast<double>(m.force_ticks))) : Json(nullptr);
   j["E_fit_kPa"] = mean(m.E_fit_Pa, 1e-3);
   j["E_fit_sd_kPa"] = mean(m.E_fit_sd_Pa, 1e-3);
-  j["contour_error_um"] = contour ? Json{{"rms", contour->rms_um}, {"p95", contour->p95_um}} : Json(nullptr);
+  j["contour_error_um"] = pictures.compared > 0
+                              ? Json{{"rms", pictures.contour_rms_um}, {"p95", pictures.contour_p95_um}}
+                              : Json(nullptr);
   j["lateral_error_um"] = mean(m.lateral_error_m, 1e6);
   j["lateral_error_contact_um"] = mean(m.lateral_contact_m, 1e6);
   const bool cell = scene.sim && scene.sim->cell;
@@ -312,6 +306,7 @@ nlohmann::ordered_json report_facts(const Scene& scene, const RunResult& result,
   j["stale_observations"] = m.stale_spells;  // times an observation became too old
   j["stale_s"] = seconds_of(m, m.stale_ticks);
   j["without_vision_s"] = seconds_of(m, m.blind_ticks);
+  j["pictures_unusable"] = pictures.unusable;
   j["vision_restarts"] = Json::array();
   for (const auto& r : result.vision_restarts) {
     j["vision_restarts"].push_back({{"t_s", r.t_s}, {"why", r.why}});
@@ -365,7 +360,7 @@ nlohmann::ordered_json report_facts(const Scene& scene, const RunResult& result,
 }
 
 std::string summary(const Scene& scene, const RunResult& result, const Measures& m,
-                    const rt::CoreStatus& core, const std::optional<ContourError>& contour, bool coloured) {
+                    const rt::CoreStatus& core, const PicturesSeen& pictures, bool coloured) {
   std::string s;
   const auto line = [&s](const char* what, const std::string& text) {
     s += fmt::format("{:<16}{}\n", what, text);
@@ -447,9 +442,14 @@ std::string summary(const Scene& scene, const RunResult& result, const Measures&
     line("tremor", fmt::format("tip / hand {:.3f} in 8-12 Hz", *r));
   }
   if (scene.vision) {
-    line("vision", fmt::format("{} observations, {} times stale ({:.2f} s), {} restarts{}", m.observations,
+    line("vision", fmt::format("{} observations, {} times stale ({:.2f} s), {} restarts{}{}", m.observations,
                                m.stale_spells, seconds_of(m, m.stale_ticks), result.vision_restarts.size(),
-                               contour ? fmt::format(", outer contour {:.2f} um rms", contour->rms_um) : ""));
+                               pictures.unusable > 0 ? fmt::format(", {} of {} pictures unusable",
+                                                                   pictures.unusable, pictures.all)
+                                                     : "",
+                               pictures.compared > 0
+                                   ? fmt::format(", outer contour {:.2f} um rms", pictures.contour_rms_um)
+                                   : ""));
   }
   line("ticks",
        fmt::format("{} at {} Hz, missed {}{}", core.ticks.load(), scene.servo.rate_Hz, core.missed.load(),

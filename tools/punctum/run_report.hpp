@@ -19,18 +19,21 @@
 
 namespace punctum::tools {
 
-// What vision itself measured against the truth, from its table of observations.
-struct ContourError {
-  double rms_um = 0, p95_um = 0;
-  std::uint64_t frames = 0;
+// What vision's table of observations tells of a run.
+struct PicturesSeen {
+  std::uint64_t all = 0;
+  std::uint64_t unusable = 0;  // could not be read, had another size, or are of one grey
+  std::uint64_t empty = 0;     // showed neither pipettes nor membranes; the unusable ones are among them
+  // By vision itself, against the truth; of pictures in which it could.
+  std::uint64_t compared = 0;
+  double contour_rms_um = 0, contour_p95_um = 0;
+
+  [[nodiscard]] bool show_nothing() const { return 2 * empty > all; }
 };
-[[nodiscard]] std::optional<ContourError> read_contour_error(const std::string& obs_csv);
+[[nodiscard]] PicturesSeen read_pictures(const std::string& obs_csv);
 
 // Of a run whose samples have a hole, or end before it does.
 void forget_what_needs_every_sample(nlohmann::ordered_json& facts);
-
-// Whether more than half of its pictures showed neither pipettes nor membranes.
-[[nodiscard]] bool found_nothing(const std::string& obs_csv);
 
 // What a run came to, beside its measures. The dose, asked and given, stands there with each cell.
 struct RunResult {
@@ -50,13 +53,11 @@ struct RunResult {
 // All of report.json but what was run and where, which lab_report.hpp adds.
 [[nodiscard]] nlohmann::ordered_json report_facts(const Scene& scene, const RunResult& result,
                                                   const Measures& m, const EventList& events,
-                                                  const rt::CoreStatus& core,
-                                                  const std::optional<ContourError>& contour);
+                                                  const rt::CoreStatus& core, const PicturesSeen& pictures);
 // "inside the cell, 23.1 um past its membrane", "outside the cell", ...
 [[nodiscard]] std::string in_words(const Whereabouts& needle);
 [[nodiscard]] std::string summary(const Scene& scene, const RunResult& result, const Measures& m,
-                                  const rt::CoreStatus& core, const std::optional<ContourError>& contour,
-                                  bool coloured);
+                                  const rt::CoreStatus& core, const PicturesSeen& pictures, bool coloured);
 // A fault as it is latched: its cause, what to do, and what clears it.
 [[nodiscard]] std::string fault_text(rt::Fault fault, double t_s, bool coloured);
 // The rights the core did not get, and how to get them; empty when it has all it needs.

@@ -347,6 +347,8 @@ class Run {
   void tell_progress();
   void tell_what_is_not_kept();
   [[nodiscard]] int refuse(const std::string& why);
+  [[nodiscard]] int leave_nothing();
+  [[nodiscard]] bool vision_has_its_camera();
   Ended watch_until_the_core_ends();
   void judge_end(const Ended& core);
   void let_devices_come_to_rest();
@@ -368,8 +370,7 @@ class Run {
   KernelWatchdog watchdog_;
   ServiceManager service_manager_;
   std::optional<late::Witness> witness_;  // of a core in real time
-  std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
-  bool vision_was_refused_ = false;
+  const std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
   bool frames_are_over_ = false, stop_for_good_ = false;
   bool rights_told_ = false;
   std::size_t faults_told_ = 0;
@@ -408,11 +409,12 @@ int Run::run() {
       return refuse(started.error());
     }
   }
-  // Recorded frames play from the core's first tick on; a camera is there before it.
-  const bool vision_follows_core = scene_.recorded && scene_.clock == ClockKind::real;
-  if (scene_.vision && !vision_follows_core) {
+  if (scene_.vision) {
     if (auto started = vision_.start(); !started) {
       return refuse(started.error());
+    }
+    if (!vision_has_its_camera()) {
+      return leave_nothing();
     }
   }
   const HandedSegments handed = for_core(segments_);
@@ -426,7 +428,6 @@ int Run::run() {
       terminal_.complain(started.error());
     }
   }
-  begun_ = std::chrono::steady_clock::now();
   const Ended core = watch_until_the_core_ends();
   watchdog_.disarm();
   service_manager_.stopping();
@@ -453,11 +454,36 @@ int Run::run() {
 // It has not begun: nothing has moved, and there is nothing to keep.
 int Run::refuse(const std::string& why) {
   terminal_.complain(why);
+  return leave_nothing();
+}
+
+int Run::leave_nothing() {
   vision_.end(true);
   record_.abandon();
   reserve_.give_back();
   discard(report_folder_);
   return exit_bad_input;
+}
+
+// Waits for vision to open camera and files; false: it refused one of them. One that dies or hangs keeps no
+// core from starting.
+bool Run::vision_has_its_camera() {
+  while ((*segments_.observation)->rounds.load(std::memory_order_relaxed) == 0 && stop_signal::count() == 0) {
+    switch (vision_.watch(now_s(), 0)) {
+      case VisionProcess::News::refused:
+        return false;
+      case VisionProcess::News::none:
+        break;
+      case VisionProcess::News::frames_ended:
+      case VisionProcess::News::given_up:
+        return true;
+    }
+    if (!vision_.restarts().empty()) {
+      return true;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  return true;
 }
 
 Ended Run::watch_until_the_core_ends() {
@@ -529,13 +555,6 @@ void Run::watch_vision() {
   if (!scene_.vision) {
     return;
   }
-  if (!vision_.was_started() && status().started.load() != 0) {
-    if (auto started = vision_.start(); !started) {
-      terminal_.complain(started.error());
-      vision_was_refused_ = true;
-      stop_signal::request();
-    }
-  }
   const double run_s = recorder_.measures().last_s;
   switch (vision_.watch(now_s(), run_s)) {
     case VisionProcess::News::none:
@@ -553,7 +572,6 @@ void Run::watch_vision() {
       }
       break;
     case VisionProcess::News::refused:
-      vision_was_refused_ = true;
       stop_signal::request();
       break;
   }
@@ -637,12 +655,13 @@ void Run::tell_progress() {
 }
 
 void Run::judge_end(const Ended& core) {
-  const RunFacts facts{.core_exited = core.exited,
-                       .stop_was_asked = core_.stop_was_asked(),
-                       .vision_over = vision_.over(),
-                       .has_task = scene_.has_task(),
-                       .has_vision = scene_.vision.has_value(),
-                       .found_nothing = !scene_.has_task() && found_nothing(folder_ + "/obs.csv")};
+  const RunFacts facts{
+      .core_exited = core.exited,
+      .stop_was_asked = core_.stop_was_asked(),
+      .vision_over = vision_.over(),
+      .has_task = scene_.has_task(),
+      .has_vision = scene_.vision.has_value(),
+      .found_nothing = !scene_.has_task() && read_pictures(folder_ + "/obs.csv").show_nothing()};
   result_.end = judge(facts, status(), recorder_.measures());
   result_.wall_s = now_s();
   if (result_.end == rt::RunEnd::fault) {
@@ -702,10 +721,11 @@ int Run::report() {
   result_.rows_every = recorder_.every();
   result_.samples_lost = recorder_.lost();
   result_.samples_unusable = recorder_.unusable();
-  const auto contour = read_contour_error(folder_ + "/obs.csv");
+  const PicturesSeen pictures = read_pictures(folder_ + "/obs.csv");
   reserve_.give_back();
   const auto facts = [&] {
-    return whole_facts(begun_facts_, report_facts(scene_, result_, m, recorder_.events(), status(), contour));
+    return whole_facts(begun_facts_,
+                       report_facts(scene_, result_, m, recorder_.events(), status(), pictures));
   };
   auto written = write_report_json(folder_, facts());
   if (auto page = write_report_page(folder_, facts(), settings_.figure); !page) {
@@ -717,7 +737,7 @@ int Run::report() {
     terminal_.complain(written.error());
   }
   std::string folder = folder_;
-  if (written && !report_folder_.replaces.empty() && !vision_was_refused_) {
+  if (written && !report_folder_.replaces.empty()) {
     if (auto moved = take_place(report_folder_)) {
       folder = *moved;
     } else {
@@ -726,10 +746,7 @@ int Run::report() {
     }
   }
   const std::string places = written ? fmt::format("report          {}/report.html\n", folder) : "";
-  terminal_.print("\n" + summary(scene_, result_, m, status(), contour, terminal_.coloured()) + places);
-  if (vision_was_refused_) {
-    return exit_bad_input;
-  }
+  terminal_.print("\n" + summary(scene_, result_, m, status(), pictures, terminal_.coloured()) + places);
   const bool complete =
       written && result_.not_kept.empty() && recorder_.unusable() == 0 && !result_.silent_from_s;
   const ExitCode code = exit_code(result_.end);
@@ -780,6 +797,9 @@ int run_scene(const Scene& scene, const RunSettings& settings) {
   }
   if (!space->empty()) {
     terminal.complain(*space);
+  }
+  if (scene.vision && settings.frames && is_long(scene)) {
+    terminal.say("a run that may be longer than {:.0f} min keeps no annotated frames", kLongRun_s / 60);
   }
   if (const std::string& warning = report->lock.not_held(); !warning.empty()) {
     terminal.complain(warning);

@@ -30,7 +30,6 @@ VisionProcess::VisionProcess(std::vector<std::string> args, std::vector<int> des
       watchdog_(real_time) {}
 
 tl::expected<void, std::string> VisionProcess::start() {
-  started_ = true;
   auto child = Child::start("punctum-vision", args_, log_, descriptors_);
   if (!child) {
     over_ = true;

@@ -39,7 +39,6 @@ class VisionProcess {
   // it is asked without waiting, for the plant never was.
   void end(bool at_once = false);
 
-  [[nodiscard]] bool was_started() const noexcept { return started_; }
   [[nodiscard]] bool over() const noexcept { return over_; }
   [[nodiscard]] const std::vector<Restart>& restarts() const noexcept { return restarts_; }
 
@@ -56,7 +55,7 @@ class VisionProcess {
   VisionWatchdog watchdog_;
   bool is_watched_ = false;  // since its newest start
   std::string killed_because_;
-  bool started_ = false, over_ = false;
+  bool over_ = false;
   bool start_is_planned_ = false;
   double next_start_s_ = 0;
   std::vector<Restart> restarts_;

@@ -14,6 +14,7 @@
 #include <iterator>
 #include <random>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -45,11 +46,25 @@ class H5Object {
   Close close_;
 };
 
-struct H5Failed {};  // within this file only: HDF5 says no more than that
+struct H5Failed {   // within this file only
+  std::string why;  // ": No space left on device", or empty
+};
+// The operating system's own words stand in the library's account of each level that failed.
+herr_t find_system_error(unsigned, const H5E_error2_t* level, void* found) {
+  constexpr std::string_view kBefore = "error message = '";
+  const std::string_view text = level->desc == nullptr ? "" : level->desc;
+  if (const auto at = text.find(kBefore); at != std::string_view::npos) {
+    const std::string_view words = text.substr(at + kBefore.size());
+    static_cast<H5Failed*>(found)->why = fmt::format(": {}", words.substr(0, words.find('\'')));
+  }
+  return 0;
+}
 template <class Result>
 Result must_be(Result result) {
   if (result < 0) {
-    throw H5Failed{};
+    H5Failed failed;
+    (void)H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, find_system_error, &failed);
+    throw failed;
   }
   return result;
 }
@@ -368,9 +383,9 @@ tl::expected<std::string, std::string> export_hdf5(const std::string& recording,
     NwbFile nwb(part);
     ends = reader->read_all(nwb);
     nwb.finish(recording);
-  } catch (const H5Failed&) {
+  } catch (const H5Failed& failed) {
     std::filesystem::remove(part, ec);
-    return tl::unexpected(file + ": cannot be written");
+    return tl::unexpected(fmt::format("{}: cannot be written{}", file, failed.why));
   }
   if (auto placed = put_in_place(file); !placed) {
     return tl::unexpected(placed.error());

@@ -74,6 +74,9 @@ int run(int argc, char** argv) {
   if (one && recordings.size() > 1) {
     return refuse(fmt::format("{} recordings: only --overview takes more than one", recordings.size()));
   }
+  if (at_s && surface.empty()) {
+    return refuse("--at: a time of the surfaces, allowed with --obj");
+  }
   const std::string& recording = recordings.front();
   std::vector<std::string> early;  // why an output is not all that was wanted
   const auto ends = [&early](const std::string& why) {

@@ -147,6 +147,11 @@ int show(const std::string& recording, const Showing& how) {
     return exit_bad_input;
   }
   Player& player = **opened;
+  if (how.from_s > player.last_s()) {
+    complain(fmt::format("punctum-replay: --from: {}: allowed: up to {:.3f}, where the recording ends",
+                         how.from_s, player.last_s()));
+    return exit_bad_input;
+  }
   if (!player.ends().empty()) {
     complain("punctum-replay: " + player.ends());
   }
@@ -250,6 +255,10 @@ int run(int argc, char** argv) {
   app.add_option("RECORDING", recording, "an MCAP file of `punctum run --record`")->required();
   if (const auto code = parse_command_line(app, argc, argv)) {
     return *code;
+  }
+  if (as_station && showing.console) {
+    complain("punctum-replay: --station is without a browser, allowed without --console");
+    return exit_bad_input;
   }
   if (as_station || showing.console) {
     return show(recording, showing);

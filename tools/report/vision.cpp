@@ -8,6 +8,7 @@
 #include <cmath>
 #include <iterator>
 #include <map>
+#include <stdexcept>
 #include <utility>
 
 #include "tools/report/foreign_frames.hpp"
@@ -365,7 +366,7 @@ std::string observe_foreign(const Job& job, Measurement& m, PhaseScores& phases)
       }
       job.progress.step();
     }
-    return folders.empty() ? job.frames.string() + " holds no noise-LEVEL/SEQUENCE/truth.json" : "";
+    return "";
   }
   const std::vector<ForeignPlan> injections = foreign_plans(job.quick);
   job.progress.start("another renderer", static_cast<std::int64_t>(injections.size()));
@@ -404,6 +405,10 @@ void observe_phases(const Job& job, PhaseScores& phases) {
 }  // namespace
 
 Result run_vision(const Job& job) {
+  if (!job.frames.empty() && foreign_folders(job.frames).empty()) {
+    throw std::runtime_error(
+        fmt::format("--frames: {}: holds no noise-N[,KEY=VALUE]/SEED/truth.json", job.frames.string()));
+  }
   const std::vector<InjectionPlan> injections = plans(job.quick);
   Measurement m{.methods = vision_methods(), .overhead_us = clock_overhead_us()}, foreign = m;
   job.progress.start("frames", static_cast<std::int64_t>(injections.size()));

@@ -170,6 +170,11 @@ bool Scene::needs_hardware() const {
   });
 }
 
+std::string said_of_option(const std::string& error, std::string_view key, std::string_view option) {
+  const std::string given = fmt::format("--set: {}: ", key);
+  return error.starts_with(given) ? fmt::format("{}: {}", option, error.substr(given.size())) : error;
+}
+
 tl::expected<Scene, std::string> load_scene(std::string_view name_or_path,
                                             const std::vector<std::string>& overrides) {
   if (const auto text = builtin_text(name_or_path)) {

@@ -134,6 +134,10 @@ using Backends = std::map<std::string, std::vector<std::string>, std::less<>>;
 [[nodiscard]] tl::expected<Scene, std::string> load_scene(std::string_view name_or_path,
                                                           const std::vector<std::string>& overrides = {});
 
+// An error about what `--set KEY=` would have set, as one about the option of its own that was given instead.
+[[nodiscard]] std::string said_of_option(const std::string& error, std::string_view key,
+                                         std::string_view option);
+
 // The same for text already in memory; `source` stands in the messages, `folder` resolves relative paths.
 [[nodiscard]] tl::expected<Scene, std::string> parse_scene(std::string_view text, std::string_view source,
                                                            const std::vector<std::string>& overrides = {},

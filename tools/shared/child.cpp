@@ -51,7 +51,7 @@ std::string last_line(const std::string& path) {
       last = line;
     }
   }
-  return last.substr(0, 400);
+  return last.empty() ? path + " is empty, as where the disk is full" : last.substr(0, 400);
 }
 
 tl::expected<Child, std::string> Child::start(const std::string& program,

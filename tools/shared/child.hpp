@@ -51,7 +51,7 @@ class Child {
 // Where `program` is, empty if nowhere.
 [[nodiscard]] std::string find_program(const std::string& program);
 
-// The last line of a log that says something, empty if none.
+// The last line of a log that says something, or that it is empty.
 [[nodiscard]] std::string last_line(const std::string& path);
 
 }  // namespace punctum::tools

@@ -46,6 +46,7 @@ namespace punctum::tools {
 namespace {
 
 constexpr std::int64_t kFrameTimeout_ns = 100'000'000;
+constexpr std::int64_t kLookAtCore_ns = 1'000'000;
 // A camera that is unplugged is looked for so often; to plug one in takes a person longer.
 constexpr std::int64_t kLookAgain_ns = 500'000'000;
 
@@ -112,6 +113,7 @@ class LiveVision {
                        : static_cast<hal::Camera&>(*recorded_);
   }
   [[nodiscard]] bool plant_has_stopped() const { return bench_ && (*bench_)->finished.load() != 0; }
+  void wait_for_core();
   void go_round();
   void wait_until(std::int64_t t_ns);
   void look_for_camera();
@@ -129,7 +131,8 @@ class LiveVision {
   bool simulated_ = false;   // the camera
   bool truth_only_ = false;  // no picture is drawn or looked at
   std::optional<hal::Shared<rt::ObservationSegment>> station_;
-  std::optional<hal::Shared<const rt::CoreSegment>> core_;  // where a stage moves what the camera sees
+  std::optional<hal::Shared<const rt::CoreSegment>>
+      core_;  // moves what a camera sees; begins what is recorded
   std::optional<PictureTeller> pictures_;
   std::optional<hal::Shared<const sim::Bench>> bench_;
   std::optional<hal::Shared<sim::CameraAnswers>> answers_;
@@ -202,7 +205,7 @@ Opened LiveVision::join_station() {
     return tl::unexpected(std::string("the program that started vision has died"));
   }
   if (const int core = segments->descriptor(kCoreSegment);
-      core >= 0 && !scene_->devices.stage.empty() && !scene_->recorded) {
+      core >= 0 && (!scene_->devices.stage.empty() || scene_->recorded)) {
     auto attached = hal::Shared<const rt::CoreSegment>::attach(kCoreSegment, core);
     if (!attached) {
       return tl::unexpected(attached.error());
@@ -316,7 +319,20 @@ Opened LiveVision::open_files() {
   return {};
 }
 
+// Recorded pictures play from the core's first tick on.
+void LiveVision::wait_for_core() {
+  while (core_ && scene_->clock == ClockKind::real && (*core_)->status.started.load() == 0 &&
+         stop_signal::count() == 0) {
+    go_round();
+    clock().sleep_until_ns(clock().now_ns() + kLookAtCore_ns);
+  }
+  began_ns_ = clock().now_ns();
+}
+
 ExitCode LiveVision::run() {
+  if (recorded_) {
+    wait_for_core();
+  }
   while (stop_signal::count() == 0 && !(recorded_ && plant_has_stopped())) {
     go_round();
     hal::Frame frame;
@@ -448,7 +464,7 @@ void LiveVision::tell_unusable(const hal::Frame& frame, double t_s) {
 
 // In pixels, but for what the two frames are apart.
 std::optional<vision::Point> LiveVision::stage_at(std::int64_t exposure_ns) const {
-  const auto tip_m = core_ ? stage_tip_at(**core_, exposure_ns) : std::nullopt;
+  const auto tip_m = core_ && !recorded_ ? stage_tip_at(**core_, exposure_ns) : std::nullopt;
   return tip_m ? std::optional<vision::Point>(*tip_m / scene_->vision->pixel_m) : std::nullopt;
 }
 

@@ -333,7 +333,7 @@ TEST_F(ExportTest, a_full_disk_is_told_by_an_export_to_hdf5_and_crashes_nothing)
         std::cerr << (exported ? "exported" : exported.error());
         std::exit(3);
       },
-      testing::ExitedWithCode(3), "run.nwb: cannot be written");
+      testing::ExitedWithCode(3), "run.nwb: cannot be written: File too large");
   EXPECT_FALSE(std::filesystem::exists(out));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "run.part.nwb"));
 }

@@ -224,7 +224,8 @@ TEST(ResultFile, is_refused_with_one_line_that_says_where) {
     return changed.dump();
   };
   for (const auto& [text, word] : std::vector<std::pair<std::string, std::string>>{
-           {"", "parse"},
+           {"", "no JSON at byte 1"},
+           {"{\"kind\": \"punctum-jitter\"}", "key 'rate_Hz' not found"},
            {"[]", "no result"},
            {"{\"kind\": 3}", "type"},
            {with("/kind", "cyclictest"), "no result"},
@@ -239,6 +240,7 @@ TEST(ResultFile, is_refused_with_one_line_that_says_where) {
     ASSERT_FALSE(result) << text.substr(0, 80);
     EXPECT_NE(result.error().find(word), std::string::npos) << result.error();
     EXPECT_EQ(result.error().find('\n'), std::string::npos) << result.error();
+    EXPECT_EQ(result.error().find("exception"), std::string::npos) << result.error();
   }
 }
 

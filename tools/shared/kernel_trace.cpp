@@ -42,6 +42,7 @@ constexpr std::array kWanted{"irq/irq_handler_entry",
                              "irq_vectors/irq_work_exit",
                              "irq_vectors/thermal_apic_entry",
                              "irq_vectors/thermal_apic_exit",
+                             "nmi/nmi_handler",
                              "power/cpu_frequency"};
 // Of the loop's thread alone: others make them by the thousand.
 constexpr std::array kOfThread{"exceptions/page_fault_user", "exceptions/page_fault_kernel",

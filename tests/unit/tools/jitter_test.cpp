@@ -854,6 +854,32 @@ TEST(CauseOfALateTick, lies_within_the_tick) {
             Cause::device_or_bus);
 }
 
+TEST(CauseOfALateTick, is_an_interrupt_that_nothing_masks) {
+  const auto nmi = [](const std::string& who, const char* stamp, int lasted_us) {
+    return "   " + who + "      [001] d.Z1.   100." + stamp +
+           ": nmi_handler: perf_event_nmi_handler() delta_ns: " + std::to_string(1000 * lasted_us) +
+           " handled: 1\n";
+  };
+  const std::string woken =
+      "          <idle>-0       [001] d.h3.   100.000480: sched_waking: "
+      "comm=punctum-core pid=70 prio=19 target_cpu=001\n" +
+      runs_from("000485");
+  const Verdict before_it_woke = cause_of(late(490, 495), kAsleep + nmi("  <idle>-0 ", "000200", 190) +
+                                                              nmi("  <idle>-0 ", "000470", 260) + woken);
+  EXPECT_EQ(before_it_woke.cause, Cause::interrupt);
+  EXPECT_EQ(before_it_woke.what, "NMI perf_event_nmi_handler");
+  EXPECT_NEAR(before_it_woke.us, 450, 1);
+  const std::string begun = kAsleep + kWoken + runs_from("000008");
+  EXPECT_EQ(cause_of(late(10, 900), begun + nmi("punctum-core-70", "000700", 600)).what,
+            "NMI perf_event_nmi_handler");
+  EXPECT_EQ(cause_of(late(10, 900), begun + nmi("punctum-core-70", "000700", 300)).cause,
+            Cause::own_computing);
+  EXPECT_EQ(cause_of(late(10, 900),
+                     begun + "   punctum-core-70      [001] d.Z1.   100.000700: nmi_handler: of no length\n")
+                .cause,
+            Cause::own_computing);
+}
+
 TEST(CauseOfALateTick, is_silence_that_only_a_counter_names) {
   const std::string trace = kAsleep +
                             "          <idle>-0       [001] d.h3.   100.000480: sched_waking: "

@@ -237,9 +237,10 @@ int SeenCell::fit_undeformed_membrane(const ClearedPicture& picture, const Touch
     certain = {*mouth, result.holder.sd};
   }
   const bool learns = clear && !touched_before;
-  const Point shift = undeformed_.update(*now, touched, learns, certain);
+  const LearntUndeformed::Moved moved = undeformed_.update(*now, touched, learns, certain, contour, weights);
   for (FollowedMembrane* m : {&outer_, &inner_}) {
-    m->rest.centre += shift;
+    m->rest.centre += moved.shift;
+    m->rest.turn(moved.turn);
   }
   if (learns) {
     outer_.rest.learn(outer_.centre, outer_.r);

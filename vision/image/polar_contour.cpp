@@ -113,4 +113,17 @@ double angle_between(double a, double b) {
   return std::abs(std::remainder(apart, 2 * std::numbers::pi));
 }
 
+Vector<cv::Vec3d> effects_of_motion(std::span<const double> radii) {
+  const std::size_t n = radii.size();
+  const std::span<const Point> ray = unit_rays(static_cast<int>(n));
+  Vector<cv::Vec3d> effect(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const Point& d = ray[i];
+    const double slope = (radii[(i + 1) % n] - radii[(i + n - 1) % n]) * static_cast<double>(n) /
+                         (4 * std::numbers::pi * std::max(radii[i], 1.0));
+    effect[i] = cv::Vec3d(d.x + slope * d.y, d.y - slope * d.x, -slope);
+  }
+  return effect;
+}
+
 }  // namespace punctum::vision

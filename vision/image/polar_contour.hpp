@@ -21,4 +21,8 @@ namespace punctum::vision {
 [[nodiscard]] Point on_ray(const Point& centre, int i, int angles, double r);
 [[nodiscard]] double angle_between(double a, double b);  // 0 .. pi
 
+// By how much each radius grows for a px of drift to the right, of drift down, and of turn at that place
+// towards larger angles.
+[[nodiscard]] Vector<cv::Vec3d> effects_of_motion(std::span<const double> radii);
+
 }  // namespace punctum::vision

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <numbers>
 #include <opencv2/core.hpp>
 #include <utility>
 
@@ -90,15 +89,9 @@ void CarriedOutline::move_with_cell(const Vector<double>& now, const SeenOutline
   const std::size_t n = now.size();
   cv::Vec3d motion = cv::Vec3d::all(0);
   cv::Matx33d a;
-  // Of a px of drift to the right, of drift down, and of turn.
-  const std::span<const Point> ray = unit_rays(static_cast<int>(n));
-  Vector<cv::Vec3d> effect(n);
+  const Vector<cv::Vec3d> effect = effects_of_motion(r_);
   Vector<double> variance(n), twice_sd(n);
   for (std::size_t i = 0; i < n; ++i) {
-    const Point& d = ray[i];
-    const double slope = (r_[(i + 1) % n] - r_[(i + n - 1) % n]) * static_cast<double>(n) /
-                         (4 * std::numbers::pi * std::max(r_[i], 1.0));
-    effect[i] = cv::Vec3d(d.x + slope * d.y, d.y - slope * d.x, -slope);
     variance[i] = variance_[i] + seen.variance[i] - seen.lasting[i];
     twice_sd[i] = 2 * std::sqrt(variance[i]);
   }

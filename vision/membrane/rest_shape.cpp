@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "hal/math/elementary.hpp"
 #include "vision/image/median.hpp"
@@ -20,6 +21,35 @@ constexpr double kHolderHalf = 0.6;      // rad to either side of the holding pi
 constexpr double kMotion_sd = 2.5;       // less is no motion of the holding pipette
 constexpr double kLeastMotion_px = 0.1;  // likewise, however certain its place is
 constexpr double kLeastDrift_px = 0.02;  // per frame: less may be noise
+constexpr double kTurnless =
+    0.1;  // sum of squared effects of a turn below which the outline is hardly less than round
+
+// Of a straight line through the last frames: by how much its end and its slope follow the newest.
+struct Gain {
+  double of_place = 0, of_drift = 0;
+};
+Gain gain_of(int frames) {
+  const double n = std::clamp(frames, kReliable, kDriftMemory);
+  return {2 * (2 * n - 1) / (n * (n + 1)), 6 / (n * (n + 1))};
+}
+
+double mean_of(std::span<const double> r) {
+  return std::accumulate(r.begin(), r.end(), 0.0) / static_cast<double>(r.size());
+}
+
+// Drift and turn, px, from one to the other, by least squares. A turn shows as far as the outline is not
+// round; of a round one none is told.
+cv::Vec3d motion_between(std::span<const double> r, std::span<const double> now,
+                         std::span<const double> weight) {
+  cv::Matx33d a = cv::Matx33d::diag({kTurnless, kTurnless, kTurnless});
+  cv::Vec3d b = cv::Vec3d::all(0);
+  const Vector<cv::Vec3d> effect = effects_of_motion(r);
+  for (std::size_t i = 0; i < r.size(); ++i) {
+    a += weight[i] * effect[i] * effect[i].t();
+    b += weight[i] * (now[i] - r[i]) * effect[i];
+  }
+  return a.solve(b, cv::DECOMP_CHOLESKY);
+}
 
 // The angle between them has a larger cosine.
 bool within(const Point& d, const Point& e, double cosine) {
@@ -41,23 +71,53 @@ void RestOutline::learn(const Point& now_centre, const Vector<double>& now_r) {
     *this = {.centre = now_centre, .r = now_r, .frames = 1};
     return;
   }
+  // The cell drifts and turns: its motion is what explains most of how the frame differs, followed by least
+  // squares over the last frames. Its form is their mean.
+  turn(spin);
   const int angles = static_cast<int>(r.size());
   const auto rays = unit_rays(angles);
   const Vector<double> now = polar_radii(from_polar(now_centre, now_r), centre, angles);
-  // The cell drifts: what differs as the cosine of the angle is its motion, followed by least squares over
-  // the last frames. Its form is their mean.
-  const double n = std::clamp(++frames, kReliable, kDriftMemory), of_place = 2 * (2 * n - 1) / (n * (n + 1)),
-               of_drift = 6 / (n * (n + 1));
-  Point beyond = -drift;  // of what was expected
-  for (std::size_t i = 0; i < now.size(); ++i) {
-    beyond += 2.0 / angles * (now[i] - r[i]) * rays[i];
-  }
-  const Point shift = drift + of_place * beyond;
+  const Gain gain = gain_of(++frames);
+  const cv::Vec3d beyond =
+      motion_between(r, now, Vector<double>(now.size(), 1.0)) - cv::Vec3d(drift.x, drift.y, 0);
+  const Point off(beyond[0], beyond[1]), shift = drift + gain.of_place * off;
   centre += shift;
-  drift += of_drift * beyond;
+  drift += gain.of_drift * off;
+  const double mean_r = mean_of(r);
+  turn(gain.of_place * beyond[2] / mean_r);
+  spin += gain.of_drift * beyond[2] / mean_r;
   for (std::size_t i = 0; i < now.size(); ++i) {
     r[i] += (now[i] - shift.dot(rays[i]) - r[i]) / std::min(frames, kOutlineMemory);
   }
+}
+
+void RestOutline::turn(double rad) {
+  if (rad == 0 || r.empty()) {
+    return;
+  }
+  const Vector<cv::Vec3d> effect = effects_of_motion(r);
+  for (std::size_t i = 0; i < r.size(); ++i) {
+    r[i] += rad * r[i] * effect[i][2];
+  }
+}
+
+double RestOutline::turn_with(const Contour& contour, std::span<const double> weight) {
+  turn(spin);
+  const int angles = static_cast<int>(r.size());
+  const Vector<double> now =
+      contour.size() == r.size() ? polar_radii(contour, centre, angles) : Vector<double>();
+  if (now.empty()) {
+    return spin;
+  }
+  Vector<double> of_angle(r.size(), 0.0);
+  for (std::size_t i = 0; i < contour.size(); ++i) {
+    of_angle[static_cast<std::size_t>(polar_index(contour[i] - centre, angles))] = weight[i];
+  }
+  const Gain gain = gain_of(frames);
+  const double off = motion_between(r, now, of_angle)[2] / mean_of(r), turned = spin + gain.of_place * off;
+  turn(gain.of_place * off);
+  spin += gain.of_drift * off;
+  return turned;
 }
 
 RestOutline outline_within(const RestOutline& around, const Point& centre, const Vector<double>& r,
@@ -86,8 +146,9 @@ RestOutline outline_within(const RestOutline& around, const Point& centre, const
   return out;
 }
 
-Point LearntUndeformed::update(const Undeformed& now, bool touched, bool learns,
-                               const std::optional<Mouth>& mouth) {
+LearntUndeformed::Moved LearntUndeformed::update(const Undeformed& now, bool touched, bool learns,
+                                                 const std::optional<Mouth>& mouth, const Contour& contour,
+                                                 std::span<const double> weight) {
   if (!shape_ || (!touched && now.round)) {
     if (shape_ && shape_->round && now.round &&
         cv::norm(now.circle.centre - shape_->circle.centre) < 0.05 * shape_->circle.r) {
@@ -114,7 +175,7 @@ Point LearntUndeformed::update(const Undeformed& now, bool touched, bool learns,
       return {};
     }
     face_.centre += shift;
-    return shift;
+    return {shift, face_.reliable() ? face_.turn_with(contour, weight) : 0.0};
   }
   mouth_ = mouth ? std::optional(mouth->at) : std::nullopt;
   return {};

@@ -15,10 +15,15 @@ struct RestOutline {
   Vector<double> r;  // px per angle; empty: not known
   int frames = 0;    // that it was learnt from
   Point drift = {};  // px per frame, while it was learnt
+  double spin = 0;   // rad per frame
 
   [[nodiscard]] bool reliable() const noexcept;                             // learnt from enough frames
   [[nodiscard]] Vector<double> seen_from(const Point& other_centre) const;  // empty: not known
   void learn(const Point& now_centre, const Vector<double>& now_r);
+  void turn(double rad);
+  // Goes on turning as it did, and as what is seen of the contour where weight > 0 shows. Returns by how
+  // much, rad.
+  double turn_with(const Contour& contour, std::span<const double> weight);
 };
 
 // Of a membrane that was never seen without the needle: what is seen of it away from the needle, and near the
@@ -34,13 +39,19 @@ class LearntUndeformed {
  public:
   // now: fitted to this frame. touched: the needle is near. learns: the outline of this frame is learnt, too.
   // mouth: of the holding pipette, where it is seen. Returns by how much an outline that is not learnt has
-  // moved: with the holding pipette, or else as it drifted before.
+  // moved: with the holding pipette, or else as it drifted before; and turned, as the contour does where
+  // weight > 0.
   struct Mouth {
     Point at;
     double sd = 0;  // px
   };
-  [[nodiscard]] Point update(const Undeformed& now, bool touched, bool learns,
-                             const std::optional<Mouth>& mouth);
+  struct Moved {
+    Point shift;
+    double turn = 0;  // rad
+  };
+  [[nodiscard]] Moved update(const Undeformed& now, bool touched, bool learns,
+                             const std::optional<Mouth>& mouth, const Contour& contour,
+                             std::span<const double> weight);
   // The contour of a frame in which nothing touches it, seen from `centre`.
   void learn_outline(const Contour& contour, const Point& centre);
   void forget();

@@ -9,6 +9,7 @@
 
 #include "vision/image/polar_contour.hpp"
 #include "vision/membrane/carried_outline.hpp"
+#include "vision/membrane/rest_shape.hpp"
 
 namespace {
 
@@ -245,6 +246,66 @@ TEST(CarriedOutline, of_another_number_of_points_begins_anew) {
   ASSERT_EQ(outline.contour().size(), 128U);
   EXPECT_NEAR(cv::norm(outline.contour().front() - Point(80, 60)), 0, 0.05);
   EXPECT_NEAR(outline.sd().front(), 0.2, 1e-12);
+}
+
+// By how much the outline at rest is off where the needle enters: rms over 20 frames in contact, px. The cell
+// turns by so many px of its rim in a frame, before and in contact.
+double off_at_entry(double before_px, double in_contact_px, unsigned seed) {
+  constexpr double kEntry = 0.4, kHidden = 0.9;  // rad
+  const int at = polar_index(Point(std::cos(kEntry), std::sin(kEntry)), kRays);
+  std::vector<double> weight;
+  for (int i = 0; i < kRays; ++i) {
+    weight.push_back(angle_between(polar_angle(i, kRays), kEntry) > kHidden ? 1 : 0);
+  }
+  std::mt19937 random(seed);
+  Cell cell;
+  RestOutline rest;
+  double square = 0;
+  for (int frame = -30; frame < 20; ++frame) {
+    cell.turn += (frame < 0 ? before_px : in_contact_px) / 74;
+    cell.dent = std::max(0, frame);
+    const Contour now = seen(cell, errors(0.08, random), 0, 0).contour;
+    if (frame < 0) {
+      rest.learn(cell.centre, polar_radii(now, cell.centre, kRays));
+      continue;
+    }
+    (void)rest.turn_with(now, weight);
+    Cell untouched = cell;
+    untouched.dent = 0;
+    square += std::pow(rest.r[static_cast<std::size_t>(at)] - untouched.r(polar_angle(at, kRays)), 2);
+  }
+  return std::sqrt(square / 20);
+}
+
+TEST(RestOutline, turns_with_the_cell_also_while_the_needle_hides_a_part_of_it) {
+  double still = 0, turning = 0, stopped = 0;
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    still = std::max(still, off_at_entry(0, 0, seed));
+    turning = std::max({turning, off_at_entry(0.3, 0.3, seed), off_at_entry(-0.3, -0.3, seed)});
+    stopped = std::max({stopped, off_at_entry(0.3, 0, seed), off_at_entry(0, -0.3, seed)});
+  }
+  // The outline itself turns by 6 px of its rim in contact, which is 0.5 px where the needle enters.
+  EXPECT_LT(still, 0.08);
+  EXPECT_LT(turning, 0.1);
+  EXPECT_LT(stopped, 0.13) << "the needle may hold it";
+}
+
+TEST(RestOutline, of_a_round_cell_is_what_it_was) {
+  RestOutline rest;
+  const Point centre(120, 118);
+  for (int frame = 0; frame < 30; ++frame) {
+    rest.learn(centre, Vector<double>(kRays, 74.0));
+  }
+  Contour dented;
+  for (int i = 0; i < kRays; ++i) {
+    dented.push_back(on_ray(centre, i, kRays, i < 40 ? 74.0 - i : 74.0));
+  }
+  std::vector<double> weight(kRays, 1.0);
+  std::fill(weight.begin(), weight.begin() + 40, 0.0);
+  EXPECT_NEAR(rest.turn_with(dented, weight), 0, 1e-6);
+  for (const double r : rest.r) {
+    EXPECT_NEAR(r, 74, 0.05);
+  }
 }
 
 }  // namespace

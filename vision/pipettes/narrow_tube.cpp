@@ -213,9 +213,17 @@ double NarrowTubeTrace::half_width_near_end(const GradientField& field, const Tu
 }
 
 std::optional<TubeTrace> NarrowTubeTrace::tube(const GradientField& field) {
-  if (last_ < 3 || last_ + 1 >= similarity_.size()) {
+  // A cell behind its end may look a little like it.
+  constexpr std::ptrdiff_t kGap = 4;
+  const auto gap = std::search_n(similarity_.begin(), similarity_.end(), kGap, kContinued,
+                                 [](double similarity, double least) { return similarity < least; });
+  const auto before_gap = static_cast<std::size_t>(gap - similarity_.begin());
+  // What looks like it up to where the trace ends is a pipette behind the cell.
+  const std::size_t stations = last_ + 1 < similarity_.size() ? last_ + 1 : before_gap;
+  if (stations < 4 || stations == similarity_.size()) {
     return std::nullopt;
   }
+  last_ = stations - 1;
   TubeTrace t = at_border_;
   double sum = 0;
   for (std::size_t i = 0; i <= last_; ++i) {
@@ -236,13 +244,7 @@ std::optional<TubeTrace> NarrowTubeTrace::tube(const GradientField& field) {
   t.axis = t.axis + middle.line.slope * across_;
   t.axis *= 1 / cv::norm(t.axis);
   t.length = along_[last_] + kWindow_px;
-  // A cell behind its end may look a little like it.
-  constexpr std::ptrdiff_t kGap = 4;
-  const auto gap = std::search_n(similarity_.begin(), similarity_.end(), kGap, kContinued,
-                                 [](double similarity, double least) { return similarity < least; });
-  t.sure_length = gap == similarity_.end()
-                      ? t.length
-                      : along_[static_cast<std::size_t>(gap - similarity_.begin())] + kWindow_px;
+  t.sure_length = before_gap > last_ ? t.length : along_[before_gap] + kWindow_px;
   t.end_half_width = half_width_near_end(field, t);
   return t;
 }

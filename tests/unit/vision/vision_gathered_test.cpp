@@ -158,5 +158,32 @@ TEST(NarrowTube, is_not_wider_for_a_dark_speck_beside_it) {
   }
 }
 
+// Behind the cell lies the holding pipette, whose bore may look like a needle out of focus.
+TEST(NarrowTube, ends_where_it_is_not_seen_though_a_pipette_like_it_goes_on_behind) {
+  constexpr double kTip_px = 230, kGoesOn_px = 216, kAxis_y = 100, kHalf_px = 9;
+  constexpr int kWide = 400, kHigh = 200;
+  for (const bool pipette : {false, true}) {
+    cv::Mat picture(kHigh, kWide, CV_8U);
+    for (int y = 0; y < kHigh; ++y) {
+      for (int x = 0; x < kWide; ++x) {
+        const bool glass = x > kTip_px || (pipette && x < kGoesOn_px);
+        const double off = std::abs(y - kAxis_y) - kHalf_px;
+        picture.at<std::uint8_t>(y, x) =
+            static_cast<std::uint8_t>(150 - (glass ? 40 * std::exp(-off * off / 8) : 0));
+      }
+    }
+    GradientField field;
+    field.compute(picture, {0, 0, kWide, kHigh}, kSigma_px);
+    const auto section = narrow_tube_at_border(field, Border::right, 3, 60, 1, false);
+    ASSERT_TRUE(section);
+    NarrowTubeTrace trace(*section);
+    for (int part = 0; part < 50 && !trace.advance(field); ++part) {
+    }
+    const auto tube = trace.tube(field);
+    ASSERT_TRUE(tube) << pipette;
+    EXPECT_NEAR(tube->root.x - tube->length, kTip_px, 12) << pipette;
+  }
+}
+
 }  // namespace
 }  // namespace gathered

@@ -102,6 +102,25 @@ TEST_F(Programs, vision_that_cannot_read_its_frames_ends_the_run_as_bad_input) {
   EXPECT_FALSE(fs::exists(report())) << "nothing has begun";
 }
 
+TEST_F(Programs, stopped_while_vision_opens_its_camera_starts_no_core) {
+  const fs::path bin = folder_ / "bin", programs = PUNCTUM_BIN_DIR;
+  fs::create_directory(bin);
+  fs::copy_file(programs / "punctum", bin / "punctum");
+  fs::create_symlink(programs / "punctum-core", bin / "punctum-core");
+  std::ofstream(bin / "punctum-vision") << "#!/bin/sh\nexec sleep 60\n";
+  fs::permissions(bin / "punctum-vision", fs::perms::owner_all);
+  Running run({"run", "icsi", "--report", report()}, words(),
+              fs::relative(bin / "punctum", programs).c_str());
+  for (int i = 0; i < 1000 && run.output().find("station: ") == std::string::npos; ++i) {
+    std::this_thread::sleep_for(10ms);
+  }
+  std::this_thread::sleep_for(200ms);
+  run.send(SIGINT);
+  EXPECT_EQ(run.wait(), 1) << run.output();
+  EXPECT_NE(run.output().find("stopped before the core had started"), std::string::npos) << run.output();
+  EXPECT_FALSE(fs::exists(report()));
+}
+
 // The segments that a process maps for writing, by their last names.
 std::set<std::string> written_segments(pid_t pid) {
   std::set<std::string> names;

@@ -416,6 +416,11 @@ int Run::run() {
     if (!vision_has_its_camera()) {
       return leave_nothing();
     }
+    if (stop_signal::count() > 0) {
+      terminal_.complain("stopped before the core had started");
+      (void)leave_nothing();
+      return exit_not_done;
+    }
   }
   const HandedSegments handed = for_core(segments_);
   if (auto started = core_.start(core_arguments(scene_, resolved_, handed), folder_ + "/core.log",

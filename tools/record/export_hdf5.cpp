@@ -55,16 +55,16 @@ herr_t find_system_error(unsigned, const H5E_error2_t* level, void* found) {
   const std::string_view text = level->desc == nullptr ? "" : level->desc;
   if (const auto at = text.find(kBefore); at != std::string_view::npos) {
     const std::string_view words = text.substr(at + kBefore.size());
-    static_cast<H5Failed*>(found)->why = fmt::format(": {}", words.substr(0, words.find('\'')));
+    *static_cast<std::string*>(found) = fmt::format(": {}", words.substr(0, words.find('\'')));
   }
   return 0;
 }
 template <class Result>
 Result must_be(Result result) {
   if (result < 0) {
-    H5Failed failed;
-    (void)H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, find_system_error, &failed);
-    throw failed;
+    std::string why;
+    (void)H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, find_system_error, &why);
+    throw H5Failed{why};
   }
   return result;
 }

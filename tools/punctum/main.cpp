@@ -42,25 +42,18 @@ int bad(const std::string& text) {
 }
 
 // Programs of their own, which need libraries that a station does not.
-constexpr std::pair<const char*, const char*> kOtherPrograms[] = {
-    {"export", "make tables, pictures and surfaces of a recording"},
-    {"replay", "give the inputs of a recording to this build's servo again, or show it once more"}};
+constexpr const char* kOtherPrograms[] = {"export", "replay"};
 
-// Returns where the command line names none of them, or one that is not there: then why, unless help is asked
-// for.
+// Returns only where the command line names none of them, or one that is not there: then why.
 std::string become_another(int argc, char** argv) {
-  for (const auto& [command, what] : kOtherPrograms) {
+  for (const char* command : kOtherPrograms) {
     if (argc > 1 && std::string_view(argv[1]) == command) {
       const std::string name = std::string("punctum-") + command;
       if (const std::string program = find_program(name); !program.empty()) {
         execv(program.c_str(), argv + 1);
       }
-      const bool asks_for_help = argc > 2 && std::string_view(argv[2]) == "--help";
-      return asks_for_help ? std::string()
-                           : fmt::format(
-                                 "{} is not there, neither beside this program nor in PATH (Debian package "
-                                 "punctum-tools)",
-                                 name);
+      return fmt::format(
+          "{} is not there, neither beside this program nor in PATH (Debian package punctum-tools)", name);
     }
   }
   return {};
@@ -156,8 +149,8 @@ int main_or_throw(int argc, char** argv) {
   reporting
       ->add_option("--out", comparison, "where the comparison goes (default: reports/comparison-DATE.html)")
       ->type_name("FILE");
-  for (const auto& [command, what] : kOtherPrograms) {
-    (void)app.add_subcommand(command, what);
+  for (const char* command : kOtherPrograms) {  // their help is their own
+    (void)app.add_subcommand(command)->group("");
   }
   run->footer(
       help_footer({{"punctum run icsi --report reports/mine", "the report goes to that folder"},

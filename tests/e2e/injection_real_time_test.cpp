@@ -109,8 +109,10 @@ TEST_F(Programs, stopped_while_vision_opens_its_camera_starts_no_core) {
   fs::create_symlink(programs / "punctum-core", bin / "punctum-core");
   std::ofstream(bin / "punctum-vision") << "#!/bin/sh\nexec sleep 60\n";
   fs::permissions(bin / "punctum-vision", fs::perms::owner_all);
-  Running run({"run", "icsi", "--report", report()}, words(),
-              fs::relative(bin / "punctum", programs).c_str());
+  // Nor is the machine's watchdog armed, which nobody would feed meanwhile.
+  Running run(
+      {"run", "icsi", "--report", report(), "--set", "watchdog=on", "--set", "watchdog.path=/dev/none"},
+      words(), fs::relative(bin / "punctum", programs).c_str());
   for (int i = 0; i < 1000 && run.output().find("station: ") == std::string::npos; ++i) {
     std::this_thread::sleep_for(10ms);
   }

@@ -399,11 +399,6 @@ int Run::run() {
   }
   (void)write_begun(folder_, begun_facts_);
 
-  if (scene_.watchdog) {
-    if (auto armed = watchdog_.arm(*scene_.watchdog); !armed) {
-      return refuse(armed.error());
-    }
-  }
   if (settings_.record) {
     if (auto started = start_recording(); !started) {
       return refuse(started.error());
@@ -420,6 +415,11 @@ int Run::run() {
       terminal_.complain("stopped before the core had started");
       (void)leave_nothing();
       return exit_not_done;
+    }
+  }
+  if (scene_.watchdog) {  // not before: nobody feeds it while a camera is opened, which takes its time
+    if (auto armed = watchdog_.arm(*scene_.watchdog); !armed) {
+      return refuse(armed.error());
     }
   }
   const HandedSegments handed = for_core(segments_);

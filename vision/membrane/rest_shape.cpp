@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <numbers>
 #include <numeric>
+#include <utility>
 
 #include "hal/math/elementary.hpp"
 #include "vision/image/median.hpp"
@@ -21,8 +24,9 @@ constexpr double kHolderHalf = 0.6;      // rad to either side of the holding pi
 constexpr double kMotion_sd = 2.5;       // less is no motion of the holding pipette
 constexpr double kLeastMotion_px = 0.1;  // likewise, however certain its place is
 constexpr double kLeastDrift_px = 0.02;  // per frame: less may be noise
-constexpr double kTurnless =
-    0.1;  // sum of squared effects of a turn below which the outline is hardly less than round
+constexpr double kSpin_px = 0.15;        // of the outline per frame, at its rim: sd, at first
+constexpr double kUnevenSpin_px = 0.01;  // by which that changes in a frame
+constexpr double kJoined = 10;           // angles that tell the same: a contour is smooth
 
 // Of a straight line through the last frames: by how much its end and its slope follow the newest.
 struct Gain {
@@ -37,18 +41,30 @@ double mean_of(std::span<const double> r) {
   return std::accumulate(r.begin(), r.end(), 0.0) / static_cast<double>(r.size());
 }
 
-// Drift and turn, px, from one to the other, by least squares. A turn shows as far as the outline is not
-// round; of a round one none is told.
-cv::Vec3d motion_between(std::span<const double> r, std::span<const double> now,
-                         std::span<const double> weight) {
-  cv::Matx33d a = cv::Matx33d::diag({kTurnless, kTurnless, kTurnless});
+// Drift and turn from one to the other, px at the rim, by least squares. A turn shows as far as the outline
+// is not round.
+struct Motion {
+  Point drift;
+  double turn = 0, turn_variance = 0;
+};
+Motion motion_between(std::span<const double> r, std::span<const double> now,
+                      std::span<const double> weight) {
+  constexpr double kLeast = 0.01;  // sum of squared effects: solvable for a circle, too
+  cv::Matx33d a = cv::Matx33d::diag({kLeast, kLeast, kLeast});
   cv::Vec3d b = cv::Vec3d::all(0);
   const Vector<cv::Vec3d> effect = effects_of_motion(r);
+  double square = 0, weights = 0;
   for (std::size_t i = 0; i < r.size(); ++i) {
+    const double off = now[i] - r[i];
     a += weight[i] * effect[i] * effect[i].t();
-    b += weight[i] * (now[i] - r[i]) * effect[i];
+    b += weight[i] * off * effect[i];
+    square += weight[i] * off * off;
+    weights += weight[i];
   }
-  return a.solve(b, cv::DECOMP_CHOLESKY);
+  const cv::Matx33d covariance = a.inv(cv::DECOMP_CHOLESKY);
+  const cv::Vec3d motion = covariance * b;
+  const double unexplained = std::max(0.0, square - motion.dot(b)) / std::max(weights, 1.0);
+  return {{motion[0], motion[1]}, motion[2], kJoined * unexplained * covariance(2, 2)};
 }
 
 // The angle between them has a larger cosine.
@@ -67,57 +83,80 @@ Vector<double> RestOutline::seen_from(const Point& other_centre) const {
 }
 
 void RestOutline::learn(const Point& now_centre, const Vector<double>& now_r) {
-  if (r.empty() || cv::norm(centre - now_centre) > 0.1 * median_of(now_r)) {
-    *this = {.centre = now_centre, .r = now_r, .frames = 1};
+  const int angles = static_cast<int>(now_r.size());
+  const bool anew = r.size() != now_r.size() || cv::norm(centre - now_centre) > 0.1 * median_of(now_r);
+  const Vector<double> now =
+      anew ? Vector<double>() : polar_radii(from_polar(now_centre, now_r), centre, angles);
+  if (now.empty()) {
+    const double sd = kSpin_px / mean_of(now_r);
+    *this = {.centre = now_centre, .r = now_r, .frames = 1, .turned = {.drift = sd * sd}};
     return;
   }
   // The cell drifts and turns: its motion is what explains most of how the frame differs, followed by least
   // squares over the last frames. Its form is their mean.
-  turn(spin);
-  const int angles = static_cast<int>(r.size());
+  turn_on();
   const auto rays = unit_rays(angles);
-  const Vector<double> now = polar_radii(from_polar(now_centre, now_r), centre, angles);
   const Gain gain = gain_of(++frames);
-  const cv::Vec3d beyond =
-      motion_between(r, now, Vector<double>(now.size(), 1.0)) - cv::Vec3d(drift.x, drift.y, 0);
-  const Point off(beyond[0], beyond[1]), shift = drift + gain.of_place * off;
+  const Motion motion = motion_between(r, now, Vector<double>(now.size(), 1.0));
+  const Point off = motion.drift - drift, shift = drift + gain.of_place * off;
   centre += shift;
   drift += gain.of_drift * off;
-  const double mean_r = mean_of(r);
-  turn(gain.of_place * beyond[2] / mean_r);
-  spin += gain.of_drift * beyond[2] / mean_r;
+  (void)turn_as_seen(motion.turn, motion.turn_variance);
   for (std::size_t i = 0; i < now.size(); ++i) {
     r[i] += (now[i] - shift.dot(rays[i]) - r[i]) / std::min(frames, kOutlineMemory);
   }
 }
 
+// Cubic between the angles: however often it is turned, it neither grows nor loses its form.
 void RestOutline::turn(double rad) {
-  if (rad == 0 || r.empty()) {
+  const std::size_t n = r.size();
+  if (rad == 0 || n == 0) {
     return;
   }
-  const Vector<cv::Vec3d> effect = effects_of_motion(r);
-  for (std::size_t i = 0; i < r.size(); ++i) {
-    r[i] += rad * r[i] * effect[i][2];
+  const double back = -rad * static_cast<double>(n) / (2 * std::numbers::pi), whole = std::floor(back),
+               f = back - whole;
+  const double w[4] = {f * (f - 1) * (2 - f) / 6, (f + 1) * (f - 1) * (f - 2) / 2, (f + 1) * f * (2 - f) / 2,
+                       (f + 1) * f * (f - 1) / 6};
+  const auto size = static_cast<std::int64_t>(n);
+  const auto first = static_cast<std::size_t>(((static_cast<std::int64_t>(whole) - 1) % size + size) % size);
+  Vector<double> turned_r(n, 0.0);
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t k = 0; k < 4; ++k) {
+      turned_r[i] += w[k] * r[(first + i + k) % n];
+    }
   }
+  r = std::move(turned_r);
+}
+
+void RestOutline::turn_on() {
+  turn(spin);
+  turned.go_on(kUnevenSpin_px / mean_of(r));
+}
+
+double RestOutline::turn_as_seen(double rim_px, double variance) {
+  const double mean_r = mean_of(r);
+  const DriftCovariance::Gain gain = turned.see(variance / (mean_r * mean_r));
+  const double by = gain.of_place * rim_px / mean_r;
+  turn(by);
+  spin += gain.of_drift * rim_px / mean_r;
+  return by;
 }
 
 double RestOutline::turn_with(const Contour& contour, std::span<const double> weight) {
-  turn(spin);
+  const double expected = spin;
+  turn_on();
   const int angles = static_cast<int>(r.size());
   const Vector<double> now =
       contour.size() == r.size() ? polar_radii(contour, centre, angles) : Vector<double>();
   if (now.empty()) {
-    return spin;
+    return expected;
   }
   Vector<double> of_angle(r.size(), 0.0);
   for (std::size_t i = 0; i < contour.size(); ++i) {
     of_angle[static_cast<std::size_t>(polar_index(contour[i] - centre, angles))] = weight[i];
   }
-  const Gain gain = gain_of(frames);
-  const double off = motion_between(r, now, of_angle)[2] / mean_of(r), turned = spin + gain.of_place * off;
-  turn(gain.of_place * off);
-  spin += gain.of_drift * off;
-  return turned;
+  const Motion motion = motion_between(r, now, of_angle);
+  return expected + turn_as_seen(motion.turn, motion.turn_variance);
 }
 
 RestOutline outline_within(const RestOutline& around, const Point& centre, const Vector<double>& r,

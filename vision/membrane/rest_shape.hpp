@@ -3,6 +3,7 @@
 
 #include <optional>
 
+#include "vision/image/drift_covariance.hpp"
 #include "vision/image/kept_vector.hpp"
 #include "vision/membrane/cleared_picture.hpp"
 #include "vision/membrane/undeformed.hpp"
@@ -16,6 +17,7 @@ struct RestOutline {
   int frames = 0;    // that it was learnt from
   Point drift = {};  // px per frame, while it was learnt
   double spin = 0;   // rad per frame
+  DriftCovariance turned = {};
 
   [[nodiscard]] bool reliable() const noexcept;                             // learnt from enough frames
   [[nodiscard]] Vector<double> seen_from(const Point& other_centre) const;  // empty: not known
@@ -24,6 +26,11 @@ struct RestOutline {
   // Goes on turning as it did, and as what is seen of the contour where weight > 0 shows. Returns by how
   // much, rad.
   double turn_with(const Contour& contour, std::span<const double> weight);
+
+ private:
+  void turn_on();
+  // px at the rim, and its variance; returns what of it is believed, rad.
+  double turn_as_seen(double rim_px, double variance);
 };
 
 // Of a membrane that was never seen without the needle: what is seen of it away from the needle, and near the

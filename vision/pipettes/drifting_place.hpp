@@ -4,6 +4,7 @@
 #pragma once
 
 #include "vision/image/contour.hpp"
+#include "vision/image/drift_covariance.hpp"
 
 namespace punctum::vision {
 
@@ -19,11 +20,9 @@ class DriftingPlace {
   void unseen();
 
  private:
-  void predict();
-
   bool known_ = false;
-  Point at_, drift_;                 // px, px per frame
-  double pp_ = 0, pv_ = 0, vv_ = 0;  // their covariances
+  Point at_, drift_;  // px, px per frame
+  DriftCovariance covariance_;
 };
 
 }  // namespace punctum::vision

@@ -290,6 +290,52 @@ TEST(RestOutline, turns_with_the_cell_also_while_the_needle_hides_a_part_of_it) 
   EXPECT_LT(stopped, 0.13) << "the needle may hold it";
 }
 
+// Turned by a fraction of an angle a thousand times, it is still the cell, elsewhere.
+TEST(RestOutline, keeps_its_form_however_often_it_is_turned) {
+  constexpr double kBy = 0.3 / 74;  // rad
+  for (const double sign : {1.0, -1.0}) {
+    Cell cell;
+    RestOutline rest;
+    rest.learn(cell.centre,
+               polar_radii(seen(cell, Vector<double>(kRays, 0.0), 0, 0).contour, cell.centre, kRays));
+    for (int i = 0; i < 1000; ++i) {
+      rest.turn(sign * kBy);
+      cell.turn += sign * kBy;
+    }
+    for (int i = 0; i < kRays; ++i) {
+      EXPECT_NEAR(rest.r[static_cast<std::size_t>(i)], cell.r(polar_angle(i, kRays)), 0.05) << i;
+    }
+  }
+}
+
+// Noise alone looks like any turn of what is hardly less than round.
+TEST(RestOutline, of_a_cell_that_is_almost_round_does_not_turn_with_noise) {
+  constexpr double kNoise = 0.4;  // px, each angle by itself
+  const Point centre(120, 118);
+  for (unsigned seed = 1; seed <= 8; ++seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> off(0, kNoise);
+    RestOutline rest;
+    const auto radii = [&] {
+      Vector<double> r;
+      for (int i = 0; i < kRays; ++i) {
+        r.push_back(74 + 0.3 * std::cos(2 * polar_angle(i, kRays)) + off(random));
+      }
+      return r;
+    };
+    for (int frame = 0; frame < 25; ++frame) {
+      rest.learn(centre, radii());
+    }
+    for (int frame = 0; frame < 200; ++frame) {
+      (void)rest.turn_with(from_polar(centre, radii()), Vector<double>(kRays, 1.0));
+      ASSERT_LT(std::abs(rest.spin) * 74, 0.3) << "px per frame, seed " << seed << ", frame " << frame;
+    }
+    for (const double r : rest.r) {
+      EXPECT_NEAR(r, 74, 1) << seed;
+    }
+  }
+}
+
 TEST(RestOutline, of_a_round_cell_is_what_it_was) {
   RestOutline rest;
   const Point centre(120, 118);

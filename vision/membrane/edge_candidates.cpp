@@ -543,8 +543,9 @@ SecondEdge find_in_relief(const Vector<double>& r1, const Point& centre, const R
 }
 
 bool clear_enough(const SecondEdge& edge, double first_level, const ClearedPicture& picture) {
-  // A path that is not nearly an oval has followed something else.
-  return edge.quality >= kContrast && edge.path.level >= kPathClear_noise * picture.gradient_noise &&
+  // A path that is not nearly an oval has followed something else, as has one that is not round the centre.
+  return !edge.path.r.empty() && edge.quality >= kContrast &&
+         edge.path.level >= kPathClear_noise * picture.gradient_noise &&
          edge.path.level >= 0.12 * first_level && off_an_oval(edge.path.r) < kOvalDeviation;
 }
 

@@ -22,8 +22,10 @@ class CarriedOutline {
   void move_with_cell(const Vector<double>& now, const SeenOutline& seen, const Vector<double>& pushed_sd);
 
   Point centre_;
-  double drift_ = 0;   // variance of its drift in a frame in either direction, px^2
-  double change_ = 0;  // variance by which the shape changes in a frame where no needle pushes, px^2
+  double drift_ = 0;       // variance of its drift in a frame in either direction, px^2
+  double change_ = 0;      // variance by which the shape changes in a frame where no needle pushes, px^2
+  double true_share_ = 1;  // of the variances, by how frames differ
+  int frames_ = 0;         // that followed the first
   Vector<double> r_, variance_, lasting_;  // per angle
 };
 

@@ -102,6 +102,24 @@ TEST(CarriedOutline, is_better_than_its_frames_while_the_cell_drifts_and_turns) 
   }
 }
 
+// Of errors that are smooth along the contour some are large by chance somewhere in every frame: those are no
+// new shape.
+TEST(CarriedOutline, of_a_cell_at_rest_is_the_mean_of_its_frames) {
+  constexpr double kSd = 0.2;
+  Judged judged;
+  for (unsigned seed = 1; seed <= 12; ++seed) {
+    std::mt19937 random(seed);
+    CarriedOutline outline;
+    for (int frame = 0; frame < 40; ++frame) {
+      outline.update(seen({}, errors(kSd, random), kSd * kSd, 0), kStill);
+      if (frame >= 20) {
+        judged.take(outline, {});
+      }
+    }
+  }
+  EXPECT_LT(judged.rms(), 0.47 * kSd);
+}
+
 // Granules beside the membrane move with it, and shift every frame alike: they do not average out.
 TEST(CarriedOutline, does_not_take_what_every_frame_repeats_for_new) {
   Judged judged;

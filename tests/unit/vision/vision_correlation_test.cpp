@@ -1,6 +1,7 @@
 // Eq. 1 against its definition, summed by hand.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <random>
@@ -82,7 +83,7 @@ TEST(Peak, is_sub_pixel_on_a_parabola) {
 // Smooth blobs of known place under light that changes across the picture: drawn anew for every shift.
 cv::Mat blobs(const Point& shift, double gain, double slope, unsigned seed, double noise) {
   std::mt19937 random(seed);
-  std::normal_distribution<double> normal(0, noise);
+  std::normal_distribution<double> normal(0, std::max(noise, 1e-9));
   const Point places[] = {{40, 35}, {52, 61}, {70, 40}, {61, 52}, {44, 70}};
   cv::Mat m(110, 120, CV_8U);
   for (int y = 0; y < m.rows; ++y) {

@@ -79,7 +79,7 @@ cv::Mat yolk(double granules) {
 // With noise, in whole grey levels.
 GradientField photographed(const cv::Mat& m, unsigned seed, double noise_grey) {
   std::mt19937 random(seed);
-  std::normal_distribution<float> noise(0, static_cast<float>(noise_grey));
+  std::normal_distribution<float> noise(0, static_cast<float>(std::max(noise_grey, 1e-6)));
   cv::Mat grey(kH, kW, CV_8U);
   for (int y = 0; y < kH; ++y) {
     for (int x = 0; x < kW; ++x) {

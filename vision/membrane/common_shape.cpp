@@ -34,8 +34,8 @@ constexpr double kSampledNoise = 0.5;
 constexpr double kClip = 1.3;        // times the spread: Huber's limit
 constexpr double kBesideLine = 0.1;  // weight of a place beside a line that is not its own
 constexpr double kCommon_px = 0.03;  // sd of what is wrong alike all round: the steps are no perfect model
-constexpr double kMostLasting_px = 0.7;  // sd per point that granules are taken for where noise hides them
-constexpr double kSoft = 0.02;           // of the stiffness, where the membrane may have any shape
+constexpr double kMostLasting_px = 0.45;  // sd per point that granules have where noise does not hide them
+constexpr double kSoft = 0.02;            // of the stiffness, where the membrane may have any shape
 
 // Mean of the middle half: as robust as is needed against impurities, and less noisy than the median.
 double middle_mean(Vector<double>& v) {

@@ -13,11 +13,11 @@ namespace punctum::vision {
 // Contour of one membrane.
 struct RestOutline {
   Point centre;
-  Vector<double> r;  // px per angle; empty: not known
-  int frames = 0;    // that it was learnt from
-  Point drift = {};  // px per frame, while it was learnt
-  double spin = 0;   // rad per frame
-  DriftCovariance turned = {};
+  Vector<double> r;             // px per angle; empty: not known
+  int frames = 0;               // that it was learnt from
+  Point drift = {};             // px per frame, while it was learnt
+  double spin = 0;              // rad per frame
+  DriftCovariance turned = {};  // of the angle, and of spin
 
   [[nodiscard]] bool reliable() const noexcept;                             // learnt from enough frames
   [[nodiscard]] Vector<double> seen_from(const Point& other_centre) const;  // empty: not known

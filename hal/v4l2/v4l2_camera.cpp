@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <optional>
 #include <utility>
 
 namespace punctum::v4l2 {
@@ -91,9 +92,10 @@ V4l2Camera::Done V4l2Camera::open() {
     return wrong(params_.path + ": " + reason(opened.error));
   }
   fd_ = opened.value;
-  for (const auto step : {&V4l2Camera::check_capability, &V4l2Camera::set_format, &V4l2Camera::set_interval,
-                          &V4l2Camera::lock_exposure, &V4l2Camera::lock_gain, &V4l2Camera::map_buffers,
-                          &V4l2Camera::start_streaming}) {
+  for (const auto step :
+       {&V4l2Camera::check_capability, &V4l2Camera::set_format, &V4l2Camera::set_interval,
+        &V4l2Camera::lock_exposure, &V4l2Camera::lock_gain, &V4l2Camera::leave_pictures_plain,
+        &V4l2Camera::map_buffers, &V4l2Camera::start_streaming}) {
     if (const Done done = (this->*step)(); !done) {
       close();
       return wrong(params_.path + ": " + done.error());
@@ -133,6 +135,8 @@ V4l2Camera::Done V4l2Camera::check_capability() {
   // Of a driver that ends it by no zero, as much as there is room for.
   const auto* card = reinterpret_cast<const char*>(about.card);
   name_.assign(card, strnlen(card, sizeof about.card));
+  has_usb_units_ =
+      std::strncmp(reinterpret_cast<const char*>(about.driver), "uvcvideo", sizeof about.driver) == 0;
   const std::uint32_t can =
       (about.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? about.device_caps : about.capabilities;
   if ((can & V4L2_CAP_VIDEO_CAPTURE) == 0) {
@@ -318,6 +322,36 @@ V4l2Camera::Done V4l2Camera::lock_gain() {
   }
   if (!automatic && !find_control(V4L2_CID_GAIN, about)) {
     notes_.push_back(params_.path + ": it has no gain to lock");
+  }
+  return {};
+}
+
+// What a camera does to its pictures moves edges, and the standard deviations do not know of it.
+V4l2Camera::Done V4l2Camera::leave_pictures_plain() {
+  const auto set = [this](std::uint32_t id, const char* name, std::optional<int> plain) {
+    v4l2_queryctrl about{};
+    v4l2_control now{id, 0};
+    if (!find_control(id, about) || call(VIDIOC_G_CTRL, &now).value < 0) {
+      return;
+    }
+    const int wanted = plain.value_or(about.minimum);
+    if (now.value == wanted) {
+      return;
+    }
+    if (wanted < about.minimum || wanted > about.maximum || !set_control(id, wanted, name)) {
+      notes_.push_back(params_.path + ": its " + name + " stays " + std::to_string(now.value) + ", not " +
+                       std::to_string(wanted) +
+                       "; membranes and needle may be told off by more than they say");
+      return;
+    }
+    notes_.push_back(params_.path + ": its " + name + " is set from " + std::to_string(now.value) + " to " +
+                     std::to_string(wanted) + ", so that edges stay where the lens shows them");
+  };
+  set(V4L2_CID_SHARPNESS, "sharpness", std::nullopt);
+  set(V4L2_CID_BACKLIGHT_COMPENSATION, "backlight compensation", std::nullopt);
+  if (has_usb_units_) {
+    constexpr int kLinear = 100;  // hundredths (USB Video Class 1.5, gamma control)
+    set(V4L2_CID_GAMMA, "gamma", kLinear);
   }
   return {};
 }

@@ -61,6 +61,7 @@ class V4l2Camera final : public hal::LiveCamera {
   [[nodiscard]] Done set_interval();
   [[nodiscard]] Done lock_exposure();
   [[nodiscard]] Done lock_gain();
+  [[nodiscard]] Done leave_pictures_plain();
   [[nodiscard]] Done map_buffers();
   [[nodiscard]] Done check_stamps(std::uint32_t flags);
   [[nodiscard]] Done start_streaming();
@@ -82,6 +83,7 @@ class V4l2Camera final : public hal::LiveCamera {
 
   int fd_ = -1;
   std::string name_;
+  bool has_usb_units_ = false;  // uvcvideo passes on what the camera understands
   Layout layout_;
   std::vector<Buffer> buffers_;
   std::vector<std::uint8_t> grey_;  // of formats that must be converted

@@ -28,6 +28,7 @@ class FakeVideo final : public v4l2::Kernel {
 
   // What the camera is.
   std::uint32_t capabilities = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
+  std::string driver = "uvcvideo";
   std::vector<std::uint32_t> formats = {V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_GREY, V4L2_PIX_FMT_Y16};
   std::uint32_t width = 4, height = 3;
   std::uint32_t padding = 0;   // bytes behind each row
@@ -120,6 +121,7 @@ class FakeVideo final : public v4l2::Kernel {
         static_cast<v4l2_capability*>(argument)->capabilities = capabilities | V4L2_CAP_DEVICE_CAPS;
         static_cast<v4l2_capability*>(argument)->device_caps = capabilities;
         std::memcpy(static_cast<v4l2_capability*>(argument)->card, "a microscope camera", 20);
+        driver.copy(reinterpret_cast<char*>(static_cast<v4l2_capability*>(argument)->driver), 15);
         return 0;
       case VIDIOC_ENUM_FMT: {
         auto& format = *static_cast<v4l2_fmtdesc*>(argument);

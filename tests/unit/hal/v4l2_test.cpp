@@ -403,6 +403,35 @@ TEST_F(V4l2Test, a_control_that_does_not_keep_its_value_is_noticed) {
   EXPECT_TRUE(notes_say("its exposure stays automatic"));
 }
 
+TEST_F(V4l2Test, a_camera_does_not_sharpen_or_bend_its_pictures) {
+  const auto as_bought = [&] {
+    video.controls[V4L2_CID_SHARPNESS] = {1, 7, 1, 3};
+    video.controls[V4L2_CID_GAMMA] = {72, 500, 1, 220};
+    video.controls[V4L2_CID_BACKLIGHT_COMPENSATION] = {0, 2, 1, 1};
+  };
+  as_bought();
+  ASSERT_EQ(opened(), "");
+  EXPECT_EQ(video.controls[V4L2_CID_SHARPNESS].value, 1);
+  EXPECT_EQ(video.controls[V4L2_CID_GAMMA].value, 100);
+  EXPECT_EQ(video.controls[V4L2_CID_BACKLIGHT_COMPENSATION].value, 0);
+  EXPECT_TRUE(notes_say("its sharpness is set from 3 to 1"));
+  EXPECT_TRUE(notes_say("its gamma is set from 220 to 100"));
+  ASSERT_EQ(opened(), "");
+  EXPECT_FALSE(notes_say("sharpness")) << "nothing to do";
+
+  as_bought();
+  video.driver = "another";
+  video.controls[V4L2_CID_SHARPNESS].keeps = false;
+  ASSERT_EQ(opened(), "");
+  EXPECT_EQ(video.controls[V4L2_CID_GAMMA].value, 220) << "in a unit that is not known";
+  EXPECT_TRUE(notes_say("its sharpness stays 3, not 1"));
+
+  video.driver = "uvcvideo";
+  video.controls[V4L2_CID_GAMMA] = {110, 500, 1, 220};
+  ASSERT_EQ(opened(), "");
+  EXPECT_TRUE(notes_say("its gamma stays 220, not 100"));
+}
+
 TEST_F(V4l2Test, what_it_cannot_do_is_one_line) {
   video.formats = {V4L2_PIX_FMT_MJPEG, V4L2_PIX_FMT_YUYV};
   EXPECT_EQ(opened(), "/dev/video0: v4l2.format: it does not give GREY, it offers: MJPG, YUYV");

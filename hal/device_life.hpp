@@ -55,6 +55,8 @@ class Device {
   // From here on readings arrive and commands act; the device's own threads begin here, after memory was
   // locked. The first tick is due at first_tick_ns of the station's clock. The error is one line.
   [[nodiscard]] virtual tl::expected<void, std::string> start(std::int64_t first_tick_ns) = 0;
+  // What start() may wait for the hardware.
+  [[nodiscard]] virtual std::int64_t longest_start_ns() const noexcept { return 0; }
 
   // After the last tick, however it came about; also without start(), and more than once. What can move or
   // push is stopped at once; the holding vacuum stays.

@@ -111,7 +111,7 @@ class AravisCamera final : public hal::LiveCamera {
   [[nodiscard]] Done lock_gain();
   [[nodiscard]] Done start_streaming();
   [[nodiscard]] Taken judged(Object<ArvBuffer> buffer);
-  [[nodiscard]] std::int64_t arrival_ns(ArvBuffer* buffer) const;
+  [[nodiscard]] std::int64_t arrival_ns(ArvBuffer* buffer);
   [[nodiscard]] hal::Status lost(const std::string& why);
   void give_back(Object<ArvBuffer> buffer) {
     if (buffer && stream_) {
@@ -132,6 +132,7 @@ class AravisCamera final : public hal::LiveCamera {
   std::vector<std::uint8_t> grey_;
   double exposure_s_ = 0;  // as it is locked; 0: not known
 
+  WallClock wall_clock_;
   CameraClock camera_clock_;
   bool counted_ = false;
   std::uint64_t last_id_ = 0, sequence_ = 0;
@@ -391,11 +392,10 @@ hal::Status AravisCamera::lost(const std::string& why) {
 }
 
 // On the station's clock. The library notes it on the wall clock.
-std::int64_t AravisCamera::arrival_ns(ArvBuffer* buffer) const {
-  const std::int64_t wall_ns = g_get_real_time() * 1000;
-  const std::int64_t ago_ns =
-      std::max<std::int64_t>(wall_ns - static_cast<std::int64_t>(arv_buffer_get_system_timestamp(buffer)), 0);
-  return clock_.now_ns() - ago_ns;
+std::int64_t AravisCamera::arrival_ns(ArvBuffer* buffer) {
+  const auto then_ns = static_cast<std::int64_t>(arv_buffer_get_system_timestamp(buffer));
+  const std::int64_t now_ns = clock_.now_ns();
+  return now_ns - wall_clock_.ago_ns(then_ns, g_get_real_time() * 1000, now_ns);
 }
 
 AravisCamera::Taken AravisCamera::judged(Object<ArvBuffer> owned) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
+#include <limits>
 
 namespace punctum::aravis {
 
@@ -35,6 +36,28 @@ class CameraClock {
   bool begun_ = false;
   std::int64_t least_ns_ = 0, before_ns_ = 0;  // of this window, and of the one before
   std::int64_t window_began_ns_ = 0;
+};
+
+// How long ago something was that the library noted on the wall clock. For a while after the wall clock was
+// set nobody can tell: then what arrives counts as of now, which is late, but never early.
+class WallClock {
+ public:
+  static constexpr std::int64_t kSet_ns = 1'000'000, kDoubt_ns = 1'000'000'000;
+
+  [[nodiscard]] std::int64_t ago_ns(std::int64_t then_wall_ns, std::int64_t now_wall_ns,
+                                    std::int64_t now_station_ns) {
+    const std::int64_t apart_ns = now_wall_ns - now_station_ns;
+    if (begun_ && std::abs(apart_ns - apart_ns_) > kSet_ns) {
+      doubted_until_ns_ = now_station_ns + kDoubt_ns;
+    }
+    begun_ = true;
+    apart_ns_ = apart_ns;
+    return now_station_ns < doubted_until_ns_ ? 0 : std::max<std::int64_t>(now_wall_ns - then_wall_ns, 0);
+  }
+
+ private:
+  bool begun_ = false;
+  std::int64_t apart_ns_ = 0, doubted_until_ns_ = std::numeric_limits<std::int64_t>::min();
 };
 
 // Frames that lie between two of these numbers. GigE Vision 1 counts 1 .. 65535 and leaves out 0; others do

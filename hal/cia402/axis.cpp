@@ -150,7 +150,7 @@ void Axis::walk(std::int64_t now_ns) NONBLOCKING {
   }
   controlword_ = step_to_operation(state_);
   if (state_ == PowerState::operation_enabled) {
-    next(to_home_ ? Step::start_homing : Step::follow);
+    next(!to_home_ ? Step::follow : attained_ ? Step::to_position_mode : Step::start_homing);
     given_ = reached_ = target_;
   }
 }
@@ -176,6 +176,7 @@ void Axis::home() NONBLOCKING {
     next(Step::dropped);
     controlword_ = kQuickStop;
   } else if ((statusword_ & kHomingAttained) != 0 && (statusword_ & kTargetReached) != 0) {
+    attained_ = true;
     next(Step::to_position_mode);
     controlword_ = kEnableOperation;
   }

@@ -81,7 +81,7 @@ class Axis {
   void next(Step step) NONBLOCKING;
 
   AxisParams params_;
-  bool to_home_ = false;
+  bool to_home_ = false, attained_ = false;  // attained: it has homed, and may still be in that mode
   std::int64_t heartbeat_timeout_ns_ = 0;
 
   std::uint16_t statusword_ = 0;

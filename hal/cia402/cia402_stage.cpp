@@ -290,6 +290,10 @@ hal::Served Cia402Stage::served() noexcept {
   return served;
 }
 
+std::int64_t Cia402Stage::longest_start_ns() const noexcept {
+  return std::llround(1e9 * (params_.heartbeat_timeout_s + 2 * params_.heartbeat_s));
+}
+
 Done Cia402Stage::start(std::int64_t) {
   std::array<bool, kMaxAxes> operational{};
   SdoClient listener(*bus_, clock_, [&](const CanFrame& frame) {
@@ -305,7 +309,7 @@ Done Cia402Stage::start(std::int64_t) {
   if (params_.force_node != 0) {
     (void)bus_->send(nmt(Nmt::start, params_.force_node));
   }
-  const auto longest_ns = std::llround(1e9 * (params_.heartbeat_timeout_s + 2 * params_.heartbeat_s));
+  const std::int64_t longest_ns = longest_start_ns();
   const auto all = [&] {
     return std::all_of(operational.begin(), operational.begin() + static_cast<std::ptrdiff_t>(count_),
                        [](bool one) { return one; });

@@ -43,6 +43,7 @@ class Cia402Stage final : public hal::Device, public hal::Stage, public hal::For
   [[nodiscard]] tl::expected<void, std::string> open() override;
   [[nodiscard]] hal::Served served() noexcept override;
   [[nodiscard]] tl::expected<void, std::string> start(std::int64_t first_tick_ns) override;
+  [[nodiscard]] std::int64_t longest_start_ns() const noexcept override;
   void safe_state() noexcept override;
   void close() noexcept override;
 

@@ -390,13 +390,17 @@ Fault DeviceInputs::read_injector(const TickTime& time, const LastOutput& last) 
       status == hal::Status::ok ? injector_clock_.take(injector.sample_ns, time.now_ns) : SampleIs::untimely;
   if (sample == SampleIs::fresh) {
     readings_.injector_open = injector.open;
+    opened_unseen_ = false;
   }
-  if (sample == SampleIs::untimely || injector_clock_.timed_out()) {
+  opened_unseen_ = opened_unseen_ || last.gate_open;
+  readings_.injector_known = !injector_clock_.timed_out();
+  if (sample == SampleIs::untimely || !readings_.injector_known) {
     readings_.alarms |= alarm_sensor;
   } else {
     readings_.injected = readings_.injector_open && last.gate_open;
   }
-  const bool unasked = readings_.injector_open && !last.gate_open;
+  const bool may_be_open = readings_.injector_open || (opened_unseen_ && !readings_.injector_known);
+  const bool unasked = may_be_open && !last.gate_open;
   open_unasked_s_ = unasked ? std::min(open_unasked_s_ + time.elapsed_s, kLongest_s) : 0;
   return open_unasked_s_ > config_.injector->shut_within_s ? Fault::injector_open : Fault::none;
 }

@@ -48,6 +48,7 @@ struct Readings {
   bool estop_discrepancy = false;  // an open contact, and the two have disagreed for too long before
 
   bool injector_open = false;  // as the injector reports
+  bool injector_known = true;  // it reported within its time limit, or there is none
   bool injected = false;       // it was open on this tick while its gate was
   double vacuum_Pa = 0;
   double sensor_N = 0;  // force sensor
@@ -132,7 +133,8 @@ class DeviceInputs {
   double vacuum_low_s_ = 0;
   double vacuum_same_s_ = 0;  // the gauge has shown the same digits
   SampleClock injector_clock_;
-  double open_unasked_s_ = 0;  // the injector is open although its gate is shut
+  bool opened_unseen_ = false;  // its gate was open since it reported that it is shut
+  double open_unasked_s_ = 0;   // the injector is, or may be, open although its gate is shut
   SampleClock sensor_clock_;
   bool sensor_seen_ = false;
   std::int64_t sensor_ns_ = 0;

@@ -11,7 +11,7 @@ bool InjectionGate::step(const Readings& readings, const GateInput& in, double e
   // A hand that sends less often than the tick still presses between two of its samples.
   const bool hand_known = readings.hand_seen && readings.hand_age_s <= hand_timeout_s_;
   const bool pressed = readings.button(hal::kButtonInject);
-  const bool allowed = !in.stopped && in.vision_fresh;
+  const bool allowed = !in.stopped && in.vision_fresh && readings.injector_known;
   const bool may_stay = allowed && in.injection_phase;
   armed_ = allowed && in.may_inject && hand_known && (armed_ || !(pressed || readings.inject_down));
   const bool wanted = !in.ending && armed_ && pressed;

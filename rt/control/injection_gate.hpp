@@ -22,8 +22,8 @@ struct GateInput {
 class InjectionGate {
  public:
   // A pneumatic valve and its line answer within some 10 ms: of a shorter pulse nobody can tell what came
-  // out. The button and the end of a run wait for it; a stop, lost sight and the end of the injection phase
-  // shut the gate at once, for the needle may be on its way out.
+  // out. The button and the end of a run wait for it; a stop, lost sight, an injector that does
+  // not answer and the end of the injection phase shut the gate at once.
   static constexpr double kShortest_s = 0.02;
 
   explicit InjectionGate(const ServoConfig& config) NONBLOCKING : params_(config.injector),

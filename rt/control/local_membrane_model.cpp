@@ -103,9 +103,9 @@ bool LocalMembraneModel::observe(const Observation& seen, bool inside) NONBLOCKI
   const bool shows_needle = seen.has(Observation::tip_ok) && plausible(seen.tip_m);
   const bool shows_cell = shows_needle && seen.has(Observation::outer_ok) && plausible(seen.centre_m) &&
                           seen.R_m > c_m_ && seen.R_m < kLargestCell_m &&
-                          std::abs(seen.gap_m) < kFarthest_m && seen.noise_m >= 0 && seen.R_sd_m >= 0 &&
-                          std::isfinite(seen.R_sd_m) && seen.a_sd_m >= 0 && std::isfinite(seen.a_sd_m) &&
-                          std::isfinite(seen.a_m);
+                          std::abs(seen.gap_m) < kFarthest_m && seen.noise_m >= 0 &&
+                          std::isfinite(seen.noise_m) && seen.R_sd_m >= 0 && std::isfinite(seen.R_sd_m) &&
+                          seen.a_sd_m >= 0 && std::isfinite(seen.a_sd_m) && std::isfinite(seen.a_m);
   if (!shows_cell && !(inside && shows_needle && membrane_.known)) {
     return false;
   }

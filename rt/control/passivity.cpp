@@ -36,8 +36,6 @@ constexpr double kLower_s = 0.5;
 // The mean period holds some tens of lost ticks, so that each of them moves the stiffness by a percent at
 // most.
 constexpr double kMeanPeriod_s = 5;
-// A device that samples more slowly renders no wall.
-constexpr double kSlowest_s = 1.0 / 250;
 // Samples' periods. A position of this age misses one sample at most and is believed; the force is gone when
 // it is twice as old. 3 N for 2 ms, then down by 300 N/s, the limit behind the guard, give a free handle of
 // 75 g 0.28 m/s: 3 mJ.
@@ -120,6 +118,10 @@ void approach(T& x, const T& to, double dt_s, double tau_s) NONBLOCKING {
 
 }  // namespace
 
+double left_of_force(double age_s, double sample_s) NONBLOCKING {
+  return std::clamp((kBlind - age_s / sample_s) / (kBlind - kSeen), 0.0, 1.0);
+}
+
 PassivityGuard::Period::Period(double nominal_s) NONBLOCKING : nominal_s_(nominal_s),
                                                                mean_s_(nominal_s),
                                                                reserved_s_(nominal_s),
@@ -179,7 +181,7 @@ PassivityGuard::Input PassivityGuard::input(const ForceParts& parts, const HandM
 }
 
 // The time between two samples of a device that keeps its period.
-double PassivityGuard::regular_s() const NONBLOCKING { return std::min(sample_.kept_s(), kSlowest_s); }
+double PassivityGuard::regular_s() const NONBLOCKING { return std::min(sample_.kept_s(), kSlowestSample_s); }
 
 // What a few encoder steps come to.
 double PassivityGuard::real_J(const Input& in) const NONBLOCKING {
@@ -384,9 +386,7 @@ hal::Vec3 PassivityGuard::step(const ForceParts& parts, const HandMotion& hand) 
     forget_interval();
   }
 
-  // A hand that is silent may be anywhere by now.
-  const double age = hand.age_s / regular_s();
-  const double seen = std::clamp((kBlind - age) / (kBlind - kSeen), 0.0, 1.0);
+  const double seen = left_of_force(hand.age_s, regular_s());
   const double rendered_gain = seen * gain_;
   // A velocity over a gap is the mean of it, and says little of now. After it, or after a false position, it
   // may be wrong for a while: a handle that has got too much is not pushed the way it goes.

@@ -67,6 +67,11 @@ struct HandMotion {
 // What the effects of one tick ask for, at the hand.
 struct GuardInput : ForceParts, HandMotion {};
 
+// What is left of a force that a position of this age asks for, 1 .. 0.
+[[nodiscard]] double left_of_force(double age_s, double sample_s) NONBLOCKING;
+// A device that samples more slowly renders no wall.
+inline constexpr double kSlowestSample_s = 1.0 / 250;
+
 class PassivityGuard {
  public:
   static constexpr double kAllowed_J = 2e-3;  // 0.2 N over 10 mm; a handle of 75 g gets 0.23 m/s at most

@@ -78,7 +78,7 @@ const EffectSum& Rendering::sum_effects(const RenderInput& in, const Readings& r
 hal::Vec3 Rendering::keep_passive(const EffectSum& sum, const Readings& readings, double elapsed_s)
     NONBLOCKING {
   if (!guard_) {
-    return sum.force_N;
+    return left_of_force(readings.hand_age_s, kSlowestSample_s) * sum.force_N;
   }
   hal::Vec3 force_N = guard_->step(
       sum.parts, {world_from_hand(readings.hand.position_m), elapsed_s, readings.hand_fresh,

@@ -34,7 +34,8 @@ class Rendering {
   // World axes.
   const EffectSum& sum_effects(const RenderInput& in, const Readings& readings, const CellFacts& cell,
                                const TaskFacts& task) NONBLOCKING;
-  // The force that gives the hand no more energy than the effects store.
+  // The force that gives the hand no more energy than the effects store; without a guard, all of it as long
+  // as the hand tells where it is.
   [[nodiscard]] hal::Vec3 keep_passive(const EffectSum& sum, const Readings& readings, double elapsed_s)
       NONBLOCKING;
   // What was written to the hand, device frame.

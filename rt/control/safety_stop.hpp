@@ -31,6 +31,7 @@ class SafetyStop {
 
   [[nodiscard]] Fault cause() const NONBLOCKING { return latch_.cause(); }
   [[nodiscard]] StopStage stage() const NONBLOCKING { return latch_.stage(); }
+  [[nodiscard]] bool reset_needed() const NONBLOCKING { return latch_.state().reset_needed; }
 
  private:
   void remember(Fault fault) NONBLOCKING { faults_latched_ |= 1ULL << static_cast<unsigned>(fault); }

@@ -57,9 +57,9 @@ RunEnd Servo::outcome() const NONBLOCKING {
   const Requested& requested = requests_.requested();
   const Readings& readings = inputs_.readings();
   if (safety_.stage() == StopStage::stopped) {
-    const ClearedBy cleared_by = safety_rule(safety_.cause()).cleared_by;
-    const bool no_button = cleared_by == ClearedBy::release_and_reset && !readings.has_estop;
-    const bool for_good = requested.stop || no_button || cleared_by == ClearedBy::never;
+    const bool no_button = safety_.reset_needed() && !readings.has_estop;
+    const bool for_good =
+        requested.stop || no_button || safety_rule(safety_.cause()).cleared_by == ClearedBy::never;
     return for_good ? RunEnd::fault : RunEnd::running;
   }
   const bool at_rest =
@@ -82,7 +82,8 @@ std::uint32_t Servo::follow_hand(const TickTime& time, const Readings& readings,
        .vision_fresh = last_cell.vision_fresh,
        .clutched = readings.button(hal::kButtonClutch) || task_.ending(requested),
        .may_tilt = last_task.phase == Phase::free && !last_task.inside_cell,  // there may be no phases
-       .constraint = constraint(last_cell, last_task, requested, force_limits_.last_tip_force_soft()),
+       .constraint =
+           constraint(readings, last_cell, last_task, requested, force_limits_.last_tip_force_soft()),
        .elapsed_s = time.elapsed_s,
        .position_scale = requested.position_scale,
        .nothing_felt = rendering_.needle_faded()});
@@ -160,7 +161,8 @@ std::uint32_t Servo::choose_stage_set_point(const TickTime& time, const Readings
   if (!readings.has_stage || !readings.stage_ready() || !safety.running) {
     return 0;
   }
-  return stage_set_point_.step(constraint(cell, task, requested, limited.tip_force_soft), time.dt_s);
+  return stage_set_point_.step(constraint(readings, cell, task, requested, limited.tip_force_soft),
+                               time.dt_s);
 }
 
 bool Servo::choose_gate(const TickTime& time, const Readings& readings, const Requested& requested,
@@ -176,12 +178,13 @@ bool Servo::choose_gate(const TickTime& time, const Readings& readings, const Re
                     time.elapsed_s);
 }
 
-StageConstraint Servo::constraint(const CellFacts& cell, const TaskFacts& task, const Requested& requested,
-                                  bool tip_force_soft) NONBLOCKING {
+StageConstraint Servo::constraint(const Readings& readings, const CellFacts& cell, const TaskFacts& task,
+                                  const Requested& requested, bool tip_force_soft) NONBLOCKING {
   StageConstraint c;
   c.membrane = cell.membrane;
   c.membrane.axis = cell.approach_axis;
-  c.withdrawal_only = !cell.vision_fresh || requested.end;
+  // A cell that cannot be injected is not pierced.
+  c.withdrawal_only = !cell.vision_fresh || requested.end || !readings.injector_known;
   c.no_deeper = tip_force_soft;
   c.inward_limit_m = std::min(cell.inward_limit_m, cell.contact_inward_m + requested.depth_limit_m);
   c.depth_limit_m = requested.depth_limit_m;

@@ -82,9 +82,9 @@ class Servo {
       NONBLOCKING;
   void remember(const SafetyOutput& safety, const TaskFacts& task, bool gate_open, const Written& written)
       NONBLOCKING;
-  [[nodiscard]] static StageConstraint constraint(const CellFacts& cell, const TaskFacts& task,
-                                                  const Requested& requested, bool tip_force_soft)
-      NONBLOCKING;
+  [[nodiscard]] static StageConstraint constraint(const Readings& readings, const CellFacts& cell,
+                                                  const TaskFacts& task, const Requested& requested,
+                                                  bool tip_force_soft) NONBLOCKING;
 
   // What the last tick leaves to this one, besides what each part remembers for itself.
   struct LastTick {

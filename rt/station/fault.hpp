@@ -23,7 +23,7 @@ enum class Fault : std::uint8_t {
   not_finite,          // a force or set-point was not finite
   command_stop,        // a stop was commanded
   vacuum_lost,         // holding vacuum below its limit while a cell is held
-  injector_open,       // the injector stays open although its gate is shut
+  injector_open,       // the injector stays open although its gate is shut, or fell silent when it was open
   stage_not_stopping,  // the drive moves, keeps its power or cannot be read although it was told to stop
   stage_not_enabled,   // the drive was told to take up operation and does not
   enabling_released,   // the enabling device was let go or squeezed

@@ -63,9 +63,20 @@ TEST_F(Programs, a_force_sensor_tells_the_modulus_of_the_cell) {
   }
 }
 
-TEST_F(Programs, an_injection_of_nothing_is_not_done) {
+TEST_F(Programs, a_cell_that_cannot_be_injected_is_not_pierced) {
   EXPECT_EQ(punctum({"run", "icsi", "--clock", "virtual", "--set", "vision.method=truth", "--set",
                      "sim.failure=[{device=\"injector\", kind=\"disconnect\", at_s=2}]"}),
+            1)
+      << said_;
+  const auto r = json();
+  EXPECT_EQ(r["outcome"], "time limit");
+  EXPECT_EQ(r["cells"]["without_injection"], 0);
+  EXPECT_EQ(r["phases"].size(), 1U) << "it never touches";
+}
+
+TEST_F(Programs, an_injection_of_nothing_is_not_done) {
+  EXPECT_EQ(punctum({"run", "icsi", "--clock", "virtual", "--set", "vision.method=truth", "--set",
+                     "sim.failure=[{device=\"injector\", kind=\"disconnect\", at_s=10.7}]"}),
             1)
       << said_;
   const auto r = json();

@@ -220,6 +220,7 @@ struct FakeInjector final : hal::Injector {
   bool open = false;
   int open_ticks = 0;
   bool jammed = false;
+  Status status = Status::ok;
   std::int64_t now_ns = 0;
   void gate(bool o) noexcept override {
     if (!jammed) {
@@ -230,9 +231,11 @@ struct FakeInjector final : hal::Injector {
     }
   }
   Status read(hal::InjectorState& out) noexcept override {
-    out.open = open;
-    out.sample_ns = now_ns;
-    return Status::ok;
+    if (status == Status::ok) {
+      out.open = open;
+      out.sample_ns = now_ns;
+    }
+    return status;
   }
 };
 

@@ -55,6 +55,7 @@ enum class Invariant : std::uint8_t {
   gate_seen,
   gate_time,
   gate_shut_in_stop,
+  gate_answered,
   relay_inputs_fresh,
   relay_stage_obeys,
   relay_off_when_distrusted,
@@ -112,6 +113,7 @@ inline constexpr std::array<InvariantName, kInvariants> kInvariantNames{{
     {"G5", "gate_seen"},
     {"G6", "gate_time"},
     {"G7", "gate_shut_in_stop"},
+    {"G8", "gate_answered"},
     {"H1", "relay_inputs_fresh"},
     {"H2", "relay_stage_obeys"},
     {"H3", "relay_off_when_distrusted"},
@@ -188,6 +190,7 @@ struct Bounds {
   double truth_m = 3e-6;        // the core knows the membrane's place to this
   double lateral_m = c.limits.lateral_m + 2e-6;  // the tip follows the set-point late
   double shortest_opening_s = 0.02;
+  double injector_silent_s = 0.1;
   double ramp_s = 0.6;        // of a command
   double brake_s = 0.03;      // v/a, and two periods of the slowest check
   double relay_s = 0.02;      // beyond the stop's own time
@@ -241,6 +244,8 @@ struct Seen {
   int punctured_frames = 0, inner_punctured_frames = 0;  // delivered with this tick
   bool gate = false;
   bool injector_stuck = false;
+  hal::Status injector_status = hal::Status::ok;
+  hal::InjectorState injector;
   bool stop_commanded = false;
   double position_scale = 0;  // commanded on this tick, within the scene's bounds
   double depth_limit_m = 0;   // likewise
@@ -369,6 +374,13 @@ class Invariants {
       reset_ = s.estop.reset_pressed;
     }
     reset_edge_ = reset_edge_ && !was_running_ && !(s.estop_status == hal::Status::ok && open(s.estop));
+    injector_silent_s_ += told_s_;
+    if (s.injector_status == hal::Status::ok && s.injector.sample_ns > injector_sample_ns_ &&
+        s.injector.sample_ns <= s.now_ns + 1'000'000) {
+      injector_sample_ns_ = s.injector.sample_ns;
+      injector_silent_s_ = std::min(
+          injector_silent_s_, std::max(0.0, 1e-9 * static_cast<double>(s.now_ns - s.injector.sample_ns)));
+    }
     unseen_s_ = 1e-9 * static_cast<double>(s.now_ns - s.seen_ns);
     blind_s_ = s.seen_ns > 0 && unseen_s_ > b_.stale_s + 2 * b_.nominal_s ? blind_s_ + dt : 0;
   }
@@ -802,6 +814,9 @@ class Invariants {
       if (s.seen_ns > 0) {
         must(I::gate_seen, unseen_s_ <= b_.stale_s + 2 * b_.nominal_s + 1e-9, unseen_s_);
       }
+      if (b_.c.injector) {
+        at_most(I::gate_answered, injector_silent_s_, b_.injector_silent_s + 2 * b_.nominal_s);
+      }
       if (!gate_) {
         must(I::gate_own_press, own_press_);
         ++openings_;
@@ -818,7 +833,7 @@ class Invariants {
     } else if (gate_ && open_s_ < b_.shortest_opening_s - 0.5 * b_.nominal_s) {
       const bool cause =
           !s.clock_true || !running || t.phase != Phase::injection || s.ending ||
-          (t.alarms & alarm_vision_stale) != 0 ||
+          (t.alarms & alarm_vision_stale) != 0 || injector_silent_s_ > b_.injector_silent_s - b_.nominal_s ||
           (b_.c.injector && open_in_cell_s_ + s.elapsed_s + b_.nominal_s >= b_.c.injector->max_open_s);
       must(I::gate_not_cut_short, cause, open_s_);
     }
@@ -937,6 +952,8 @@ class Invariants {
   bool reset_ = true, reset_edge_ = false;
   bool press_edge_ = false;  // of the enabling device, in this stop
   double unseen_s_ = 0, blind_s_ = 0;
+  std::int64_t injector_sample_ns_ = 0;
+  double injector_silent_s_ = 0;
 
   double stop_s_ = 0, work_J_ = 0, credit_J_ = 0, stored_J_ = 0;
   bool stop_clock_true_ = true;

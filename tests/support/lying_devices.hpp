@@ -683,7 +683,8 @@ class LyingStation {
     seen_.inner_punctured_frames = std::exchange(inner_punctured_frames_, 0);
     seen_.hand_hidden = on(Lie::hand_stuck);
     seen_.hand_false_m = on(Lie::hand_absurd) ? 1 : w.told_false_m;
-    seen_.hand_status = seen_.stage_status = seen_.estop_status = seen_.switch_status = hal::Status::no_data;
+    seen_.hand_status = seen_.stage_status = seen_.estop_status = seen_.switch_status =
+        seen_.injector_status = hal::Status::no_data;
     seen_.has_switch = with_switch_;
   }
 
@@ -881,7 +882,9 @@ class LyingStation {
     hal::Status read(hal::InjectorState& out) noexcept override {
       out.open = (at.truth.gate || at.on(Lie::injector_stuck_open)) && !at.on(Lie::injector_stuck_shut);
       out.sample_ns = at.at_false_time(Lie::injector_time);
-      return at.tell_injector ? at.tell_injector(out) : hal::Status::ok;
+      at.seen_.injector_status = at.tell_injector ? at.tell_injector(out) : hal::Status::ok;
+      at.seen_.injector = out;
+      return at.seen_.injector_status;
     }
   };
   struct Vacuum final : hal::HoldingVacuum {

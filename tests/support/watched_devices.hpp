@@ -79,7 +79,11 @@ class WatchedDevices {
       at.gate = open;
       at.real_.injector->gate(open);
     }
-    hal::Status read(hal::InjectorState& out) noexcept override { return at.real_.injector->read(out); }
+    hal::Status read(hal::InjectorState& out) noexcept override {
+      at.seen.injector_status = at.real_.injector->read(out);
+      at.seen.injector = out;
+      return at.seen.injector_status;
+    }
   };
 
   const rt::Devices real_;

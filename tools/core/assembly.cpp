@@ -261,6 +261,14 @@ Assembly::~Assembly() {
   }
 }
 
+std::int64_t Assembly::longest_start_ns() const noexcept {
+  std::int64_t all_ns = 0;
+  for (const Part& part : parts_) {
+    all_ns += part.device->longest_start_ns();
+  }
+  return all_ns;
+}
+
 tl::expected<void, std::string> Assembly::start(std::int64_t first_tick_ns) {
   for (const Part& part : parts_) {
     if (const auto started = part.device->start(first_tick_ns); !started) {

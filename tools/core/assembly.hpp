@@ -83,6 +83,8 @@ class Assembly {
   Assembly(const Assembly&) = delete;
   Assembly& operator=(const Assembly&) = delete;
 
+  // What start() may wait for the hardware.
+  [[nodiscard]] std::int64_t longest_start_ns() const noexcept;
   // In order, up to the first that fails. The first tick is due at first_tick_ns.
   [[nodiscard]] tl::expected<void, std::string> start(std::int64_t first_tick_ns);
 

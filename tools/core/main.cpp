@@ -40,9 +40,10 @@ namespace {
 using namespace punctum;
 namespace stop_signal = tools::stop_signal;
 
-constexpr double kTimeToWithdraw_s = 10;         // after the time limit, to draw a needle out of the cell
-constexpr double kTimeToRest_s = 2;              // after that, for the forces to fade and the stage to rest
-constexpr std::int64_t kSetUp_ns = 200'000'000;  // from the start of the devices to the first tick
+constexpr double kTimeToWithdraw_s = 10;  // after the time limit, to draw a needle out of the cell
+constexpr double kTimeToRest_s = 2;       // after that, for the forces to fade and the stage to rest
+constexpr std::int64_t kSetUp_ns =
+    200'000'000;                     // from the devices' start to the first tick, beside their own
 constexpr int kSignalsToInsist = 3;  // this many end the loop at once; the first is a commanded stop
 
 constexpr const char* kHelp =
@@ -374,8 +375,7 @@ rt::ExecutiveConfig executive_config(const tools::Scene& scene, std::int64_t per
   config.period_ns = period_ns;
   config.start_ns = start_ns;
   config.overrun_window_ticks =
-      static_cast<std::uint32_t>(std::clamp(scene.servo.overrun_window_s * scene.servo.rate_Hz, 1.0,
-                                            static_cast<double>(rt::MissedWindow::kMaxTicks)));
+      static_cast<std::uint32_t>(std::lround(scene.servo.overrun_window_s * scene.servo.rate_Hz));
   return config;
 }
 
@@ -410,7 +410,8 @@ int control(const tools::Scene& scene, StationSegments& segments, StationClock& 
     rights.emplace(become_real_time(scene, segments));
   }
   clock.await_others(scene.vision.has_value());
-  const std::int64_t start_ns = clock.now().now_ns() + (in_real_time(scene) ? kSetUp_ns : period_ns);
+  const std::int64_t set_up_ns = in_real_time(scene) ? kSetUp_ns + assembly.longest_start_ns() : period_ns;
+  const std::int64_t start_ns = clock.now().now_ns() + set_up_ns;
   // From here on every way out of this function, an exception too, goes through it.
   tools::ShutDown shut_down(assembly.devices(), clock.now(), period_ns,
                             std::llround(scene.servo.estop.power_off_after_s * 1e9));

@@ -338,6 +338,9 @@ std::string progress_line(const Scene& scene, const Measures& measures, const rt
   if (scene.vision) {
     parts.push_back(vision_part(scene, newest));
   }
+  if ((newest.alarms & rt::alarm_sensor) != 0) {
+    parts.push_back(part("a device gives no usable data", 8, Colour::warning));
+  }
   if (core.missed.load() > 0) {
     parts.push_back(part(fmt::format("missed {}", core.missed.load()), 1, Colour::warning));
   }

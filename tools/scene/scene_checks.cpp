@@ -10,6 +10,7 @@
 #include "hal/cia402/calibration.hpp"
 #include "hal/sim/failures.hpp"
 #include "rt/control/renderable.hpp"
+#include "rt/executive/missed_window.hpp"
 #include "tools/scene/messages.hpp"
 #include "tools/scene/scene_keys.hpp"
 #include "tools/shared/udp_address.hpp"
@@ -816,6 +817,24 @@ Found check_workspace(const rt::MappingParams& m, const sim::StageParams* stage)
   return std::nullopt;
 }
 
+// A window that is not kept whole, or a limit that it hardly reaches, would be no limit.
+Found check_overrun(const rt::ServoConfig& servo) {
+  constexpr double kMost = rt::MissedWindow::kMaxTicks;
+  const double ticks = servo.overrun_window_s * servo.rate_Hz;
+  if (ticks > kMost) {
+    return Problem{"servo.overrun_window_s",
+                   fmt::format("holds more ticks than are counted, allowed: at most {:g} / rate_hz = {:g}",
+                               kMost, rounded_down(kMost / servo.rate_Hz))};
+  }
+  if (2 * servo.overrun_limit > ticks) {
+    return Problem{"servo.overrun_limit",
+                   fmt::format("is more than half of the ticks in the window, allowed: at most "
+                               "overrun_window_s * rate_hz / 2 = {:g}",
+                               std::floor(ticks / 2))};
+  }
+  return std::nullopt;
+}
+
 Found check_core(const Scene& s) {
   const auto& servo = s.servo;
   const sim::StageParams* stage = s.sim && s.devices.stage == kSimulated ? &s.sim->stage : nullptr;
@@ -823,6 +842,9 @@ Found check_core(const Scene& s) {
     return p;
   }
   if (auto p = check_limits(servo)) {
+    return p;
+  }
+  if (auto p = check_overrun(servo)) {
     return p;
   }
   if (stage != nullptr) {

@@ -44,7 +44,7 @@ inline constexpr auto kFaultAdvice = [] {
       {command_stop, "a stop was asked for", "start a new run when the station is ready"},
       {vacuum_lost, "the holding pipette has lost its vacuum while a cell was held",
        "look whether the cell is still held; check the tubing before the next approach"},
-      {injector_open, "the injector stays open although it was told to shut",
+      {injector_open, "the injector stays open although it was told to shut, or does not answer",
        "shut the pressure off by hand; do not approach a cell before it shuts again"},
       {stage_not_stopping, "the drive moves or keeps its power although it was told to stop",
        "cut the drive's power by the emergency stop, and have the drive checked"},

@@ -48,6 +48,24 @@ TEST(AravisStamps, a_clock_that_is_set_anew_is_followed_at_once) {
   EXPECT_EQ(clock.on_station_ns(40'000'000, 50'130'000'000), 50'120'000'000);
 }
 
+// Set ahead by 200 ms while a frame waits for 3 ms, which would else count as 203 ms old: then for a second
+// every frame counts as of now, and after it by the wall clock again.
+TEST(AravisStamps, a_wall_clock_that_is_set_makes_no_frame_older) {
+  WallClock wall;
+  constexpr std::int64_t kMs = 1'000'000, kApart = 5'000'000 * kMs;
+  const auto ago_ms = [&](std::int64_t now_ms, std::int64_t waited_ms, std::int64_t before_ms,
+                          std::int64_t ahead_ms) {
+    return wall.ago_ns((now_ms - waited_ms + before_ms) * kMs + kApart, (now_ms + ahead_ms) * kMs + kApart,
+                       now_ms * kMs) /
+           kMs;
+  };
+  EXPECT_EQ(ago_ms(1000, 3, 0, 0), 3);
+  EXPECT_EQ(ago_ms(1040, 3, 0, 200), 0);
+  EXPECT_EQ(ago_ms(1080, 3, 200, 200), 0) << "one that waited longer may be from before";
+  EXPECT_EQ(ago_ms(2100, 3, 200, 200), 3);
+  EXPECT_EQ(ago_ms(2140, 3, 200, -500), 0) << "set back";
+}
+
 TEST(AravisStamps, what_is_missing_is_counted_over_the_wrap_of_16_bits_which_leaves_out_zero) {
   EXPECT_EQ(frames_between(1, 2), 0U);
   EXPECT_EQ(frames_between(10, 14), 3U);

@@ -1133,6 +1133,46 @@ TEST_F(Cia402StageTest, a_drive_that_does_not_change_its_mode_after_homing_is_a_
   EXPECT_EQ(status, Status::fault);
 }
 
+// The drive has homed, and is in position mode: what is missing is that it said so.
+TEST_F(Cia402StageTest, a_lost_answer_after_homing_costs_one_reset) {
+  CanStageParams params = three_axes();
+  params.homing = true;
+  begin(params);
+  int lost = 0;
+  can.lose_of_drives = [&](const can_frame& frame) {
+    const bool to_mode =
+        frame.can_id == 0x582 && frame.data[0] == 0x60 && frame.data[1] == 0x60 && frame.data[2] == 0x60;
+    lost += to_mode ? 1 : 0;
+    return to_mode && lost == 1;
+  };
+  Status status = Status::ok;
+  for (int i = 0; i < 1000 && status != Status::fault; ++i) {
+    status = tick([this] { stage->enable(true); });
+  }
+  ASSERT_EQ(status, Status::fault);
+  ASSERT_EQ(can.drive(1).value(0x6061), 8);
+  stage->quick_stop();
+  ticks(200);
+  stage->enable(false);
+  ticks(200);
+  state.enabled = false;
+  enable();
+  EXPECT_TRUE(state.enabled);
+  EXPECT_GT(lost, 1) << "its mode was asked for again";
+}
+
+TEST_F(Cia402StageTest, says_how_long_its_start_may_take) {
+  CanStageParams params = three_axes();
+  params.heartbeat_s = 1;
+  params.heartbeat_timeout_s = 2.5;
+  Cia402Stage& it = made(params);
+  ASSERT_TRUE(it.open());
+  const std::int64_t began_ns = can.now_ns();
+  ASSERT_TRUE(it.start(began_ns));
+  EXPECT_GT(can.now_ns() - began_ns, 200'000'000) << "the heartbeat comes once per second";
+  EXPECT_LE(can.now_ns() - began_ns, it.longest_start_ns());
+}
+
 // ---- the force sensor ----
 
 // The sensor, node 30, is played by hand: it confirms every download and answers each SYNC with -1500 counts.

@@ -651,6 +651,37 @@ TEST(DeviceInputs, counts_an_injection_only_while_gate_and_injector_are_both_ope
   EXPECT_EQ(fault, Fault::injector_open);
 }
 
+// The valve follows its gate late: what it said last, that it is shut, is from before it opened.
+TEST(DeviceInputs, an_injector_that_fell_silent_with_its_gate_open_counts_as_open) {
+  Inputs in;
+  in.last.gate_open = true;
+  (void)in.read();
+  in.injector.status = hal::Status::fault;
+  Fault fault = Fault::none;
+  int ticks = 0;
+  for (; fault == Fault::none && ticks < 1000; ++ticks) {
+    const Readings& r = in.read();
+    fault = r.device_faults.first;
+    EXPECT_EQ(r.injector_known, ticks < 100);
+    in.last.gate_open = in.last.gate_open && r.injector_known;
+  }
+  EXPECT_EQ(fault, Fault::injector_open);
+  EXPECT_NEAR(ticks, 100 + 250, 3);
+}
+
+TEST(DeviceInputs, an_injector_that_fell_silent_after_it_was_shut_is_no_fault) {
+  Inputs in;
+  in.last.gate_open = true;
+  (void)in.read();
+  in.last.gate_open = false;
+  (void)in.read();
+  in.injector.status = hal::Status::disconnected;
+  for (int k = 0; k < 1000; ++k) {
+    EXPECT_EQ(in.read().device_faults.first, Fault::none);
+  }
+  EXPECT_FALSE(in.inputs.readings().injector_known);
+}
+
 TEST(DeviceInputs, forgets_a_force_sensor_that_gives_no_number_for_longer_than_its_limit) {
   Inputs in;
   in.sensor.force = 5e-6;

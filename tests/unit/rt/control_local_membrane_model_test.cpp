@@ -169,7 +169,9 @@ TEST(LocalMembraneModel, refuses_a_deviation_that_is_none) {
     b.step();
   }
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kInfinite = std::numeric_limits<double>::infinity();
   for (const auto& [noise_m, R_sd_m, a_sd_m] : {std::array{kNaN, 0.0, 0.0},
+                                                {kInfinite, 0.0, 0.0},
                                                 {-1e-7, 0.0, 0.0},
                                                 {0.0, kNaN, 0.0},
                                                 {0.0, -1e-7, 0.0},

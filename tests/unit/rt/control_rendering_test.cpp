@@ -138,5 +138,29 @@ TEST(Rendering, the_guard_lowers_a_stiffness_that_the_device_cannot_keep_passive
   EXPECT_NE(r.rendering.alarms() & alarm_stiffness_reduced, 0U);
 }
 
+// Where the handle is now, nobody knows: what a damper holds against it would push it on.
+TEST(Rendering, lets_the_force_of_a_silent_hand_go_with_a_guard_and_without) {
+  for (const bool guarded : {false, true}) {
+    ServoConfig config = damped();
+    if (guarded) {
+      config.guard.emplace();
+    }
+    Rendered r(config);
+    const EffectSum& sum = r.step_for(1);
+    ASSERT_GT(sum.force_N.norm(), 0);
+    const auto at_age = [&](double age_s) {
+      r.readings.hand_age_s = age_s;
+      return r.rendering.keep_passive(sum, r.readings, 1e-3).norm();
+    };
+    if (!guarded) {
+      EXPECT_EQ(at_age(0.001), sum.force_N.norm());
+      EXPECT_EQ(at_age(0.008), sum.force_N.norm())
+          << "the slowest hand that renders forces misses one sample";
+    }
+    EXPECT_EQ(at_age(0.016), 0);
+    EXPECT_EQ(at_age(0.9), 0);
+  }
+}
+
 }  // namespace
 }  // namespace punctum::rt

@@ -320,6 +320,24 @@ TEST(Servo, stops_when_the_drive_is_never_enabled) {
   EXPECT_EQ(b.servo->fault(), Fault::none);
 }
 
+// The way back is free, the way on is not.
+TEST(Servo, pierces_no_cell_that_it_cannot_inject) {
+  Bench b(icsi());
+  b.to_indentation();
+  b.injector.status = hal::Status::disconnected;
+  b.run(0.2);
+  const double at_m = b.stage.tip.x();
+  b.move(-10e-6, 15e-6);
+  b.run(0.5);
+  EXPECT_FALSE(b.punctured);
+  EXPECT_NEAR(b.stage.tip.x(), at_m, 1e-6);
+  EXPECT_EQ(b.servo->fault(), Fault::none);
+  EXPECT_NE(b.sample().alarms & alarm_sensor, 0U);
+  b.move(30e-6, 15e-6);
+  b.run(0.5);
+  EXPECT_GT(b.stage.tip.x(), at_m + 5e-6);
+}
+
 TEST(Servo, stops_when_the_injector_stays_open_although_its_gate_is_shut) {
   Bench b(icsi());
   b.to_inside();
@@ -361,6 +379,24 @@ TEST(Servo, a_commanded_stop_ends_a_run_that_has_stopped_already) {
   b.tick();
   EXPECT_EQ(b.servo->outcome(), RunEnd::fault);
   EXPECT_EQ(b.servo->fault(), Fault::hand_lost);  // the first cause
+}
+
+// The stop begins with what a new press would clear; the handle that falls silent in it asks for a reset.
+TEST(Servo, a_run_without_a_reset_button_ends_where_only_that_would_clear_the_stop) {
+  ServoConfig config = icsi();
+  config.enabling.emplace();
+  Bench b(config, false);
+  b.run(0.2);
+  b.hold(hal::kButtonEnable, 0.5);
+  ASSERT_TRUE(b.stage.on);
+  b.hold(0, 0.8);
+  ASSERT_EQ(b.servo->fault(), Fault::enabling_released);
+  EXPECT_EQ(b.servo->outcome(), RunEnd::running);
+  b.hand.status = Status::no_data;
+  b.run(0.05);
+  b.hand.status = Status::ok;
+  b.run(0.2);
+  EXPECT_EQ(b.servo->outcome(), RunEnd::fault);
 }
 
 TEST(Servo, is_finished_only_where_no_force_acts) {

@@ -384,6 +384,12 @@ const std::vector<Broken>& broken() {
       {"a highest scale below the scale", kLeast + "[mapping]\nposition_scale_max = 400\n",
        "b.toml:6:22: mapping.position_scale_max: 400 is no upper bound, allowed: 0 (no more), or from "
        "position_scale = 500 on"},
+      {"more ticks than are counted", kLeast + "[servo]\noverrun_window_s = 17\n",
+       "b.toml:6:20: servo.overrun_window_s: holds more ticks than are counted, allowed: at most 16384 / "
+       "rate_hz = 16.38"},
+      {"a limit that is none", kLeast + "[servo]\noverrun_limit = 501\n",
+       "b.toml:6:17: servo.overrun_limit: is more than half of the ticks in the window, allowed: at most "
+       "overrun_window_s * rate_hz / 2 = 500"},
       {"soft above hard", kLeast + "[limits]\ntip_force_soft_uN = 70\n",
        "b.toml:6:21: limits.tip_force_soft_uN: is not below the hard limit, allowed: below tip_force_hard_uN "
        "= 60"},

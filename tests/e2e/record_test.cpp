@@ -178,6 +178,27 @@ TEST_F(Recordings, a_recorder_that_somebody_asks_to_end_has_not_kept_the_run) {
   EXPECT_EQ(json()["not_kept"][0]["file"], "recording.mcap");
 }
 
+// The core stops by itself then, and how it does so is recorded.
+TEST_F(Recordings, a_recorder_whose_parent_is_killed_records_how_the_core_stops) {
+  Running running({"run", "free", "--seconds", "30", "--quiet", "--no-figure", "--record", "--report",
+                   report(), "--set", kPatientRelay},
+                  words());
+  const std::string recording = report() + "/recording.mcap";
+  for (int i = 0; i < 1000 && (!fs::exists(recording) || fs::file_size(recording) < 100'000);
+       ++i, std::this_thread::sleep_for(5ms)) {
+  }
+  const pid_t recorder = child_named(running.pid(), "punctum-record");
+  ASSERT_NE(recorder, 0);
+  kill(running.pid(), SIGKILL);
+  (void)running.wait();
+  for (int i = 0; i < 2000 && kill(recorder, 0) == 0; ++i, std::this_thread::sleep_for(5ms)) {
+  }
+  EXPECT_EQ(run("punctum-export", {recording, "--csv", file("orphan")}), 0) << said_;
+  std::ifstream events(file("orphan") + "/events.csv");
+  const std::string text{std::istreambuf_iterator<char>(events), {}};
+  EXPECT_NE(text.find(",ended,"), std::string::npos) << text;
+}
+
 TEST_F(Recordings, virtual_time_waits_for_a_recorder_that_stands_still) {
   Running running({"run", "icsi", "--clock", "virtual", "--seconds", "6", "--quiet", "--no-figure",
                    "--record", "--report", report()},

@@ -6,7 +6,9 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
 #include <exception>
 #include <filesystem>
 #include <memory>
@@ -114,7 +116,8 @@ struct Files {
   [[nodiscard]] bool are_none() const {
     return histogram.empty() && json.empty() && trace.empty() && picture.empty();
   }
-  // The first of them that has no folder: a measurement takes its time, and would be lost. Empty: none.
+  // The first of them that could not be written: a measurement takes its time, and would be lost. Empty:
+  // none.
   [[nodiscard]] std::string without_folder() const {
     for (const auto& [option, file] : {std::pair("--histogram", histogram),
                                        {"--json", json},
@@ -124,6 +127,9 @@ struct Files {
       std::error_code error;
       if (!folder.empty() && !std::filesystem::is_directory(folder, error)) {
         return fmt::format("{}: {}: there is no folder {}", option, file, folder.string());
+      }
+      if (!file.empty() && ::access(folder.empty() ? "." : folder.c_str(), W_OK | X_OK) != 0) {
+        return fmt::format("{}: {}: cannot be written: {}", option, file, std::strerror(errno));
       }
     }
     return {};
@@ -143,6 +149,7 @@ int measure(const jitter::Wanted& wanted, const std::string& load, const Files& 
   }
   result->load = load;
   say(jitter::summary(*result, columns()));
+  bool all_written = true;
   for (const auto& [path, text] :
        {std::pair(files.histogram, jitter::histogram_text(result->wake)),
         std::pair(files.json, jitter::json_of(*result)), std::pair(files.trace, result->trace)}) {
@@ -151,14 +158,17 @@ int measure(const jitter::Wanted& wanted, const std::string& load, const Files& 
     }
     if (const auto written = tools::write_whole(path, text); !written) {
       complain(written.error());
-      return kNotReady;
+      all_written = false;
     }
   }
   if (!files.picture.empty()) {
     if (const auto drawn = tools::draw(jitter::picture_of(*result), files.picture); !drawn) {
       complain("--picture: " + drawn.error());
-      return kNotReady;
+      all_written = false;
     }
+  }
+  if (!all_written) {
+    return kNotReady;
   }
   if (!files.trace.empty() && result->trace.empty()) {
     complain(fmt::format("--trace: {} is not written: {}", files.trace,

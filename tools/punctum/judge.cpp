@@ -56,10 +56,10 @@ RunEnd judge(const RunFacts& facts, const rt::CoreStatus& core, const Measures& 
     return RunEnd::time_limit;
   }
   // The core knows that it opened the gate; the simulated world, whether anything came out, and how much.
-  if (measures.cells_without_injection > 0) {
+  if (!facts.samples_lost && measures.cells_without_injection > 0) {
     return RunEnd::not_injected;
   }
-  if (measures.cells_underdosed > 0) {
+  if (!facts.samples_lost && measures.cells_underdosed > 0) {
     return RunEnd::underdosed;
   }
   if (core.task_finished.load() != 0) {

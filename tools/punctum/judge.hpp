@@ -14,6 +14,7 @@ struct RunFacts {
   bool has_task = false;        // of the scene
   bool has_vision = false;      // of the scene
   bool found_nothing = false;   // in more than half of the pictures
+  bool samples_lost = false;    // a dose that was given may lie in them
 };
 
 [[nodiscard]] rt::RunEnd judge(const RunFacts& facts, const rt::CoreStatus& core, const Measures& measures);

@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "rt/station/core_status.hpp"
+#include "rt/station/run_end.hpp"
 #include "rt/station/telemetry.hpp"
 #include "tools/punctum/event_log.hpp"
 #include "tools/punctum/facts.hpp"
@@ -95,8 +96,9 @@ struct Truth {
       ++compared;
     }
   }
-  [[nodiscard]] Whereabouts needle(const Whereabouts& believed) const {
-    if (!any || !gap_m) {
+  // inner: the cell has two membranes, and the rows tell when the inner one gave way.
+  [[nodiscard]] Whereabouts needle(const Whereabouts& believed, bool inner) const {
+    if (!any || !gap_m || (inner && contact && !punctured)) {
       return believed;
     }
     const bool inside = punctured && *gap_m < 0;
@@ -153,6 +155,83 @@ struct Delays {
 constexpr double kApart_s =
     1;  // by which either table may be behind the other, both being written now and then
 
+// Rows that are missing between others, s.
+struct Hole {
+  double from_s = 0, to_s = 0;
+};
+
+// The longest distance of two rows, where it is far more than the usual one.
+class Holes {
+ public:
+  void take(std::uint64_t tick, double t_s) {
+    if (any_) {
+      const std::uint64_t apart = tick - last_tick_;
+      least_ = std::min(least_, apart);
+      if (apart > most_) {
+        most_ = apart;
+        longest_ = {last_s_, t_s};
+      }
+    }
+    any_ = true;
+    last_tick_ = tick;
+    last_s_ = t_s;
+  }
+  [[nodiscard]] std::optional<Hole> longest() const {
+    constexpr std::uint64_t kUsual = 20;
+    constexpr double kLeast_s = 0.1;
+    const bool is_one = most_ > kUsual * least_ && longest_.to_s - longest_.from_s > kLeast_s;
+    return is_one ? std::optional(longest_) : std::nullopt;
+  }
+
+ private:
+  bool any_ = false;
+  std::uint64_t last_tick_ = 0, least_ = UINT64_MAX / 100, most_ = 0;
+  double last_s_ = 0;
+  Hole longest_;
+};
+
+std::optional<rt::RunEnd> run_end_named(const std::string& name) {
+  for (int i = 0; i < rt::kRunEnds; ++i) {
+    if (name == rt::name(static_cast<rt::RunEnd>(i))) {
+      return static_cast<rt::RunEnd>(i);
+    }
+  }
+  return std::nullopt;
+}
+
+bool is_fault(const Json& event) {
+  const std::string what = text_in(event, "what");
+  return text_in(event, "event") == "fault" && what != rt::name(rt::Fault::command_stop);
+}
+
+// What the run came to, as judge() has it: the core's word, and what rows and events tell beside it.
+rt::RunEnd judged(rt::RunEnd said, const Scene& scene, const Measures& measures, bool lost,
+                  bool dose_is_known, const Json& events) {
+  using rt::RunEnd;
+  if (said != RunEnd::done && said != RunEnd::stopped && said != RunEnd::time_limit) {
+    return said;
+  }
+  const RunEnd well =
+      std::any_of(events.begin(), events.end(), is_fault) ? RunEnd::after_fault : RunEnd::done;
+  const rt::Phase phase = measures.last.phase;
+  if (!scene.has_task()) {
+    return phase == rt::Phase::free || phase == rt::Phase::clear ? well : said;
+  }
+  if (said == RunEnd::stopped) {
+    return said;
+  }
+  if (lost) {
+    return RunEnd::cell_lost;
+  }
+  if (said == RunEnd::done && dose_is_known && measures.cells_without_injection > 0) {
+    return RunEnd::not_injected;
+  }
+  if (said == RunEnd::done && dose_is_known && measures.cells_underdosed > 0) {
+    return RunEnd::underdosed;
+  }
+  return said == RunEnd::done ? well : said;
+}
+
 double last_time(const Json& events) {
   double last_s = 0;
   for (const Json& e : events) {
@@ -191,6 +270,7 @@ Json rebuilt_facts(const std::string& folder) {
   Truth truth;
   Delays delays;
   CsvReader row(folder + "/samples.csv");
+  Holes holes;
   std::uint64_t rows = 0, cut_off = 0;
   double apart_s = 0;  // at most, of two rows while the injector may have been open
   while (row.next()) {
@@ -198,6 +278,7 @@ Json rebuilt_facts(const std::string& folder) {
       if (rows > 0 && (may_inject(*sample) || may_inject(measures.last))) {
         apart_s = std::max(apart_s, sample->t_s - measures.last.t_s);
       }
+      holes.take(sample->tick, sample->t_s);
       measures.tick(*sample, nullptr);
       truth.take(row, *sample);
       if (truth.any) {
@@ -212,13 +293,20 @@ Json rebuilt_facts(const std::string& folder) {
   const auto events = read_events(folder + "/events.csv");
   const double told_s = last_time(events);
   const bool cut = told_s > measures.last_s + kApart_s;
+  const bool inner = scene.sim && scene.sim->cell && scene.sim->cell->inner;
   RunResult result;
   result.rows = rows;
   if (cut) {
     result.not_kept.push_back(
         {"samples.csv", measures.last_s, fmt::format("its rows end here, the events at {:.3f} s", told_s)});
   } else {
-    result.needle = truth.needle(measures.whereabouts());
+    result.needle = truth.needle(measures.whereabouts(), inner);
+  }
+  const auto hole = holes.longest();
+  if (hole) {
+    result.not_kept.push_back(
+        {"samples.csv", hole->from_s,
+         fmt::format("its rows go on at {:.3f} s: the longest of its holes", hole->to_s)});
   }
   const auto no_core = std::make_unique<rt::CoreStatus>();
   Json j = report_facts(scene, result, measures, EventList{}, *no_core, read_pictures(folder + "/obs.csv"));
@@ -228,9 +316,13 @@ Json rebuilt_facts(const std::string& folder) {
                             ? fmt::format("the recording ends in phase {}", rt::name(measures.last.phase))
                             : "nothing was recorded";
   j["events"] = events;
-  for (const Json& e : j["events"]) {
+  const bool dose_is_known = rows > 0 && row.has("injector_open") && row.has("buttons") && !cut && !hole &&
+                             apart_s < CellMeasures::kDoseTolerance_s;
+  for (const Json& e : events) {
     if (text_in(e, "event") == "ended") {
-      j["outcome"] = text_in(e, "what");
+      const auto said = run_end_named(text_in(e, "what"));
+      j["outcome"] = said ? rt::name(judged(*said, scene, measures, truth.lost, dose_is_known, events))
+                          : text_in(e, "what");
       j["outcome_detail"] = measures.faults.empty() ? "" : rt::name(measures.faults.back().fault);
     }
   }
@@ -263,11 +355,9 @@ Json rebuilt_facts(const std::string& folder) {
   }
   j["cell_list"] = Json::array();
   if (scene.servo.injector) {
-    j["dose"] = told_dose(measures, rows > 0 && row.has("injector_open") && row.has("buttons") &&
-                                        apart_s < CellMeasures::kDoseTolerance_s);
+    j["dose"] = told_dose(measures, dose_is_known);
   }
   // Of two membranes the rows tell when the inner one gave way.
-  const bool inner = scene.sim && scene.sim->cell && scene.sim->cell->inner;
   j["contact_delay_ms"] = mean_ms(delays.contact_s);
   j["puncture_delay_ms"] = inner ? Json(nullptr) : mean_ms(delays.inner_s);
   j["puncture_inner_delay_ms"] = mean_ms(delays.inner_s);
@@ -276,19 +366,18 @@ Json rebuilt_facts(const std::string& folder) {
   if (truth.any) {
     j["peak_force_N"] = truth.peak_force_N;
     j["max_depth_um"] = truth.max_depth_m * 1e6;
-    if (truth.compared > 0) {
+    if (truth.compared > 0 && !inner) {
       const auto n = static_cast<double>(truth.compared);
       j["force_error_rms_N"] = std::sqrt(truth.error2 / n);
       j["true_force_rms_N"] = std::sqrt(truth.true2 / n);
     }
     j["cells"] = {{"tried", measures.last.cell + 1}, {"lost", truth.lost ? Json(1) : Json(nullptr)}};
   }
-  if (cut) {
+  if (cut || hole) {
     forget_what_needs_every_sample(j);
+  }
+  if (cut) {
     j["seconds"] = told_s;
-    if (j["dose"].is_object()) {
-      j["dose"]["asked_s"] = nullptr;
-    }
   }
   return j;
 }

@@ -41,6 +41,11 @@ std::uint64_t RecordProcess::taken() const noexcept {
   return progress_ ? (*progress_)->taken.load(std::memory_order_acquire) : 0;
 }
 
+std::uint64_t RecordProcess::whole_until() const noexcept {
+  const std::uint64_t lost_from = progress_ ? (*progress_)->lost_from.load(std::memory_order_acquire) : 0;
+  return lost_from > 0 ? lost_from - 1 : taken();
+}
+
 tl::expected<void, std::string> RecordProcess::start(const std::string& station, const hal::Descriptor& scene,
                                                      const std::string& folder) {
   handed_.add(kSceneText, scene.number());

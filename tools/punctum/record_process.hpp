@@ -28,6 +28,8 @@ class RecordProcess {
   [[nodiscard]] bool is_running() const noexcept { return child_.running(); }
   // Ticks that it has taken; also of one that has ended.
   [[nodiscard]] std::uint64_t taken() const noexcept;
+  [[nodiscard]] std::uint64_t whole_until()
+      const noexcept;  // ticks before the first that was lost, or all taken
   // Both say why the recording is not whole, once; empty if it is, or if there is none.
   [[nodiscard]] std::string watch();  // once per round of the parent
   [[nodiscard]] std::string end();  // the core has ended: it takes the rest, ends its file, and is waited for

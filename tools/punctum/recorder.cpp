@@ -6,6 +6,9 @@
 #include <chrono>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <fstream>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <utility>
@@ -173,6 +176,16 @@ void Recorder::flush(Table& table, double t_s) {
   if (!table.file.failure().empty()) {
     note_failure(table, table.file.failure(), t_s);
   }
+}
+
+// Of a table that could not be written to its end some rows were given to the file and are not in it.
+std::uint64_t Recorder::rows() const {
+  if (!samples_.failed) {
+    return rows_;
+  }
+  std::ifstream file(folder_ + "/" + samples_.name);
+  const auto lines = std::count(std::istreambuf_iterator<char>(file), {}, '\n');
+  return static_cast<std::uint64_t>(std::max<std::int64_t>(lines - 1, 0));
 }
 
 void Recorder::note_failure(Table& table, const std::string& why, double t_s) {

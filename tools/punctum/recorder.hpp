@@ -39,7 +39,7 @@ class Recorder {
 
   [[nodiscard]] const Measures& measures() const noexcept { return measures_; }
   [[nodiscard]] const EventList& events() const noexcept { return events_; }
-  [[nodiscard]] std::uint64_t rows() const noexcept { return rows_; }
+  [[nodiscard]] std::uint64_t rows() const;  // of samples.csv, after finish()
   // Samples that were overwritten before they were read.
   [[nodiscard]] std::uint64_t lost() const noexcept;
   // Samples that named what does not exist; they are in no file.

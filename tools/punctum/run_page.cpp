@@ -121,7 +121,7 @@ std::string outcome_html(const Json& facts) {
   }
   for (const Json& n : list_in(facts, "not_kept")) {
     s +=
-        fmt::format("<div class=\"outcome fair\"><b>not kept</b>{} from {:.3f} s on: {}</div>\n",
+        fmt::format("<div class=\"outcome fair\"><b>not kept</b>{} from about {:.3f} s on: {}</div>\n",
                     escaped(text_in(n, "file")), number_in(n, "t_s").value_or(0), escaped(text_in(n, "why")));
   }
   return s;
@@ -412,7 +412,12 @@ std::string alarms_html(const Json& facts) {
       f.row(name.c_str(), seconds.is_number() ? fmt::format("{:.3f} s in all", seconds.get<double>()) : "");
     }
   }
-  s += f.html().empty() ? "<p class=\"about\">No alarm was raised.</p>\n" : f.html();
+  if (f.html().empty()) {
+    s += alarms.is_object() ? "<p class=\"about\">No alarm was raised.</p>\n"
+                            : "<p class=\"about\">For how long alarms were raised is not known.</p>\n";
+  } else {
+    s += f.html();
+  }
   const auto events = list_in(facts, "events");
   if (events.empty()) {
     return s;

@@ -65,20 +65,41 @@ std::vector<const rt::Right*> rights(const rt::CoreStatus& core) {
   return list;
 }
 
-// How long so many ticks last.
+// How long so many ticks of those that were told last.
 double seconds_of(const Measures& m, std::uint64_t ticks) {
   return m.ticks > 0 ? static_cast<double>(ticks) * m.last_s / static_cast<double>(m.ticks) : 0;
+}
+
+// The core counts its own ticks, told or not.
+double stale_s(const Measures& m, const rt::CoreStatus& core) {
+  const std::uint64_t ticks = core.ticks.load();
+  return ticks > 0 ? static_cast<double>(m.stale_ticks) * m.last_s / static_cast<double>(ticks) : 0;
 }
 
 // Peaks, sums and what single cells came to may lie in the samples that are missing.
 }  // namespace
 
 void forget_what_needs_every_sample(Json& j) {
-  for (const char* measure :
-       {"contact_delay_ms", "puncture_delay_ms", "puncture_inner_delay_ms", "force_error_rms_N",
-        "force_error_mean_N", "true_force_rms_N", "E_fit_kPa", "E_fit_sd_kPa", "lateral_error_um",
-        "lateral_error_contact_um", "peak_force_N", "peak_hand_force_N", "max_depth_um",
-        "depth_beyond_puncture_um", "withdrawal_s", "tremor_ratio", "tremor_hand_um", "tremor_tip_um"}) {
+  for (const char* measure : {"contact_delay_ms",
+                              "puncture_delay_ms",
+                              "puncture_inner_delay_ms",
+                              "force_error_rms_N",
+                              "force_error_mean_N",
+                              "true_force_rms_N",
+                              "E_fit_kPa",
+                              "E_fit_sd_kPa",
+                              "lateral_error_um",
+                              "lateral_error_contact_um",
+                              "peak_force_N",
+                              "peak_hand_force_N",
+                              "max_depth_um",
+                              "depth_beyond_puncture_um",
+                              "withdrawal_s",
+                              "tremor_ratio",
+                              "tremor_hand_um",
+                              "tremor_tip_um",
+                              "without_vision_s",
+                              "alarms_s"}) {
     j[measure] = nullptr;
   }
   for (Json* group : {&j["cells"], &j["least_clearance_um"]}) {
@@ -88,8 +109,10 @@ void forget_what_needs_every_sample(Json& j) {
   }
   if (!j["dose"].is_null()) {
     j["dose"]["given_s"] = nullptr;
+    j["dose"]["asked_s"] = nullptr;
   }
   j["cell_list"] = Json::array();
+  j["phases"] = Json::array();
 }
 
 std::string in_words(const Whereabouts& needle) {
@@ -304,7 +327,7 @@ nlohmann::ordered_json report_facts(const Scene& scene, const RunResult& result,
 
   j["observations"] = m.observations;
   j["stale_observations"] = m.stale_spells;  // times an observation became too old
-  j["stale_s"] = seconds_of(m, m.stale_ticks);
+  j["stale_s"] = stale_s(m, core);
   j["without_vision_s"] = seconds_of(m, m.blind_ticks);
   j["pictures_unusable"] = pictures.unusable;
   j["vision_restarts"] = Json::array();
@@ -374,7 +397,8 @@ std::string summary(const Scene& scene, const RunResult& result, const Measures&
                                   ? fmt::format(" of virtual time, {:.1f} s real", result.wall_s)
                                   : ""));
   line("needle now", in_words(result.needle));
-  if (scene.servo.phases) {
+  const bool all_read = result.samples_lost == 0;
+  if (scene.servo.phases && all_read) {
     std::string text;
     const std::size_t shown = std::min<std::size_t>(m.phases.size(), 14);
     for (std::size_t i = 0; i < shown; ++i) {
@@ -394,7 +418,7 @@ std::string summary(const Scene& scene, const RunResult& result, const Measures&
                                             : "") +
                  (m.cells_underdosed > 0 ? fmt::format("{} got too little, ", m.cells_underdosed) : ""),
              m.cell_count));
-    if (scene.servo.injector) {
+    if (scene.servo.injector && all_read) {
       line("dose", fmt::format("{:.2f} s of {:.2f} s asked", m.injected_s, m.asked_s));
     }
     const auto value = [](const Spread& v, double scale, const char* unit) {
@@ -443,7 +467,7 @@ std::string summary(const Scene& scene, const RunResult& result, const Measures&
   }
   if (scene.vision) {
     line("vision", fmt::format("{} observations, {} times stale ({:.2f} s), {} restarts{}{}", m.observations,
-                               m.stale_spells, seconds_of(m, m.stale_ticks), result.vision_restarts.size(),
+                               m.stale_spells, stale_s(m, core), result.vision_restarts.size(),
                                pictures.unusable > 0 ? fmt::format(", {} of {} pictures unusable",
                                                                    pictures.unusable, pictures.all)
                                                      : "",
@@ -474,7 +498,7 @@ std::string summary(const Scene& scene, const RunResult& result, const Measures&
                             seconds_of(m, m.alarm_ticks[i]));
     }
   }
-  if (!alarms.empty()) {
+  if (!alarms.empty() && all_read) {
     line("alarms", alarms);
   }
   for (std::size_t i = 0; i < std::min<std::size_t>(m.faults.size(), 5); ++i) {
@@ -486,7 +510,7 @@ std::string summary(const Scene& scene, const RunResult& result, const Measures&
     line("what to do", kFaultAdvice[static_cast<std::size_t>(m.faults.back().fault)].next);
   }
   for (const NotKept& n : result.not_kept) {
-    line("not kept", fmt::format("{} from {:.3f} s on: {}", n.file, n.t_s, n.why));
+    line("not kept", fmt::format("{} from about {:.3f} s on: {}", n.file, n.t_s, n.why));
   }
   if (result.samples_lost > 0) {
     line("not whole", fmt::format("{} samples of {} were overwritten before they were read: what the run "

@@ -551,7 +551,7 @@ std::uint64_t Run::may_take() const {
 void Run::note_recording(const std::string& why) {
   if (!why.empty()) {
     terminal_.complain(fmt::format("{} is not whole: {}", RecordProcess::kFile, why));
-    const double told_s = static_cast<double>(record_.taken()) / scene_.servo.rate_Hz;
+    const double told_s = static_cast<double>(record_.whole_until()) / scene_.servo.rate_Hz;
     result_.not_kept.push_back({RecordProcess::kFile, std::min(told_s, recorder_.measures().last_s), why});
   }
 }
@@ -666,7 +666,8 @@ void Run::judge_end(const Ended& core) {
       .vision_over = vision_.over(),
       .has_task = scene_.has_task(),
       .has_vision = scene_.vision.has_value(),
-      .found_nothing = !scene_.has_task() && read_pictures(folder_ + "/obs.csv").show_nothing()};
+      .found_nothing = !scene_.has_task() && read_pictures(folder_ + "/obs.csv").show_nothing(),
+      .samples_lost = recorder_.lost() > 0};
   result_.end = judge(facts, status(), recorder_.measures());
   result_.wall_s = now_s();
   if (result_.end == rt::RunEnd::fault) {

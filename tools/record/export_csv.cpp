@@ -120,18 +120,29 @@ class Tables {
     for (Table* table : {&samples_, &events_, &observations_}) {
       table->file.flush();
       if (!table->file.failure().empty()) {
-        return tl::unexpected(fmt::format("{}/{}: {}", folder_, table->name, table->file.failure()));
+        return tl::unexpected(
+            given_up(fmt::format("{}/{}: {}", folder_, table->name, table->file.failure())));
       }
     }
     if (!scene_.empty()) {
       if (auto written = write_whole(folder_ + "/scene.toml", scene_); !written) {
-        return tl::unexpected(written.error());
+        return tl::unexpected(given_up(written.error()));
       }
     }
     return exported_;
   }
 
  private:
+  // A table that is cut off looks like a whole one, and nothing would replace it.
+  std::string given_up(const std::string& why) {
+    for (Table* table : {&samples_, &events_, &observations_}) {
+      table->file = {};
+      std::error_code ignored;
+      std::filesystem::remove(folder_ + "/" + table->name, ignored);
+    }
+    return why;
+  }
+
   struct Table {
     const char* name;
     RowFile file;

@@ -1,8 +1,11 @@
 // punctum-record: writes what a station tells into an MCAP file.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <signal.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cstddef>
@@ -13,6 +16,7 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "hal/ipc/rendezvous.hpp"
 #include "hal/ipc/segment.hpp"
@@ -118,15 +122,44 @@ bool is_gone(std::uint64_t pid) {
   return pid != 0 && pid < (1U << 30U) && ::kill(static_cast<pid_t>(pid), 0) != 0 && errno == ESRCH;
 }
 
+// Whether to go on: a core whose parent has died, as this program's has, stops by itself, and how it does so
+// is a part of the run. Its parent's death is told as a signal to stop.
+class GoOn {
+ public:
+  explicit GoOn(bool has_parent) : parent_(has_parent ? ::getppid() : 0) {}
+
+  [[nodiscard]] bool operator()() {
+    constexpr std::chrono::seconds kStops{5};
+    const int asked = stop_signal::count();
+    if (asked == 0) {
+      return true;
+    }
+    if (parent_ == 0 || ::getppid() == parent_ || asked > 1) {
+      return false;
+    }
+    const auto now = std::chrono::steady_clock::now();
+    until_ = std::min(until_, now + kStops);
+    return now < until_;
+  }
+
+ private:
+  pid_t parent_;
+  std::chrono::steady_clock::time_point until_ = std::chrono::steady_clock::time_point::max();
+};
+
 // Until the core has ended or died, somebody says stop, or nothing can be written any more.
 void record(StationRecorder& recorder, const rt::CoreStatus& core, ClockKind clock,
             RecordProgress* progress) {
   constexpr std::chrono::milliseconds kBetweenRounds{2}, kBetweenLooks{200};
   constexpr std::uint64_t kBusyRound = 64;
-  for (auto next_look = std::chrono::steady_clock::now();
-       stop_signal::count() == 0 && !recorder.core_has_ended();) {
+  GoOn go_on(progress != nullptr);
+  for (auto next_look = std::chrono::steady_clock::now(); go_on() && !recorder.core_has_ended();) {
+    const std::uint64_t from = recorder.position();
     const std::uint64_t taken = recorder.drain();
     if (progress != nullptr) {
+      if (recorder.loss().telemetry() > 0 && progress->lost_from.load(std::memory_order_relaxed) == 0) {
+        progress->lost_from.store(from + 1, std::memory_order_release);
+      }
       progress->taken.store(recorder.position(), std::memory_order_release);
     }
     if (!recorder.failure().empty()) {
@@ -150,15 +183,23 @@ std::string summary(const std::string& file, const StationRecorder& r) {
                                  r.count(Stream::telemetry), r.count(Stream::observation),
                                  r.count(Stream::event), static_cast<double>(r.bytes()) * 1e-6);
   const v1::Loss lost = r.loss();
-  for (const auto& [n, what] : {std::pair{lost.telemetry(), "ticks were overwritten before they were read"},
-                                {lost.truth(), "states of the simulated world likewise"},
-                                {lost.observations(), "observations likewise"},
-                                {lost.surfaces(), "surfaces likewise"},
-                                {lost.events(), "events likewise"},
-                                {lost.inputs(), "inputs of ticks likewise"},
-                                {lost.pictures(), "pictures likewise"},
-                                {lost.unusable(), "samples named what does not exist"}}) {
-    text += n > 0 ? fmt::format("  lost: {} {}\n", n, what) : "";
+  std::vector<std::string> overwritten;
+  for (const auto& [n, what] : {std::pair{lost.telemetry(), "ticks"},
+                                {lost.truth(), "states of the simulated world"},
+                                {lost.observations(), "observations"},
+                                {lost.surfaces(), "surfaces"},
+                                {lost.events(), "events"},
+                                {lost.inputs(), "inputs of ticks"},
+                                {lost.pictures(), "pictures"}}) {
+    if (n > 0) {
+      overwritten.push_back(fmt::format("{} {}", n, what));
+    }
+  }
+  if (lost.unusable() > 0) {
+    text += fmt::format("lost: {} samples named what does not exist\n", lost.unusable());
+  }
+  if (!overwritten.empty()) {
+    text += fmt::format("lost, overwritten before they were read: {}\n", fmt::join(overwritten, ", "));
   }
   return text;
 }

@@ -23,6 +23,8 @@ constexpr const char* kPicture = "runs.svg";
 
 double length(const v1::Vector& v) { return std::hypot(v.x(), v.y(), v.z()); }
 
+bool pushes(v1::Phase phase) { return phase == v1::PHASE_CONTACT || phase == v1::PHASE_INDENTATION; }
+
 // Reads a run's facts off its messages.
 class Reading {
  public:
@@ -43,15 +45,17 @@ class Reading {
     facts_.seconds = t.t_s();
     facts_.hand_force_N = std::max(facts_.hand_force_N, length(t.force_n()));
     cells_.insert(t.cell());
-    if (t.phase() == v1::PHASE_CONTACT && before_ != v1::PHASE_CONTACT && before_ != v1::PHASE_INDENTATION) {
-      touched_s_ = t.t_s();
+    constexpr double kNoneMissing_s = 0.05;
+    if (pushes(t.phase()) && !pushes(before_)) {
+      const bool seen = t.phase() == v1::PHASE_CONTACT && ticks_ > 1 && t.t_s() - before_s_ < kNoneMissing_s;
+      touched_s_ = seen ? std::optional(t.t_s()) : std::nullopt;
     }
     if (t.phase() == v1::PHASE_PUNCTURE && before_ == v1::PHASE_INDENTATION) {
       facts_.punctures.push_back(last_);
     }
     if (t.phase() == v1::PHASE_INDENTATION) {
       last_ = {.t_s = t.t_s(),
-               .pressed_s = t.t_s() - touched_s_,
+               .pressed_s = touched_s_ ? std::optional(t.t_s() - *touched_s_) : std::nullopt,
                .depth_m = t.wd_m(),
                .needle_force_N = t.tip_force_n()};
     }
@@ -59,6 +63,7 @@ class Reading {
       injected_.insert(t.cell());
     }
     before_ = t.phase();
+    before_s_ = t.t_s();
   }
   void operator()(const v1::Truth& t) {
     if (!facts_.lost_cells) {
@@ -100,17 +105,22 @@ class Reading {
   RunFacts::Puncture last_;
   std::set<std::uint32_t> cells_, injected_;
   std::uint64_t ticks_ = 0;
-  double touched_s_ = 0;
+  double before_s_ = 0;
+  std::optional<double> touched_s_;  // nothing: no tick tells
   v1::Phase before_ = v1::PHASE_FREE;
   bool was_lost_ = false;
 };
 
-double mean(const std::vector<RunFacts::Puncture>& all, double RunFacts::Puncture::* what) {
-  double sum = 0;
+// Of those that are known.
+template <typename Value>
+std::optional<double> mean(const std::vector<RunFacts::Puncture>& all, Value RunFacts::Puncture::* what) {
+  double sum = 0, known = 0;
   for (const auto& one : all) {
-    sum += one.*what;
+    const std::optional<double> value = one.*what;
+    sum += value.value_or(0);
+    known += value ? 1 : 0;
   }
-  return sum / static_cast<double>(all.size());
+  return known > 0 ? std::optional(sum / known) : std::nullopt;
 }
 
 // Its cells in the order of kColumns; an empty one is not known.
@@ -123,8 +133,9 @@ Cells cells_of(const RunFacts& r) {
   const auto known = [](const auto& value) {
     return value ? fmt::format("{:.10g}", static_cast<double>(*value)) : std::string();
   };
-  const auto of_punctures = [&r](double RunFacts::Puncture::* what, double unit) {
-    return r.punctures.empty() ? std::string() : fmt::format("{:.4g}", mean(r.punctures, what) / unit);
+  const auto of_punctures = [&r](auto what, double unit) {
+    const auto value = mean(r.punctures, what);
+    return value ? fmt::format("{:.4g}", *value / unit) : std::string();
   };
   return {r.recording,
           r.scene,
@@ -267,8 +278,9 @@ tl::expected<void, std::string> write_overview(const std::vector<RunFacts>& runs
     std::transform(row.begin(), row.end(), row.begin(), quoted);
     fmt::format_to(std::back_inserter(lines), "{}\n", fmt::join(row, ","));
     for (const auto& p : r.punctures) {
-      fmt::format_to(std::back_inserter(each), "{},{:.9g},{:.9g},{:.9g},{:.9g}\n", quoted(r.recording), p.t_s,
-                     p.pressed_s, p.depth_m * 1e6, p.needle_force_N * 1e6);
+      fmt::format_to(std::back_inserter(each), "{},{:.9g},{},{:.9g},{:.9g}\n", quoted(r.recording), p.t_s,
+                     p.pressed_s ? fmt::format("{:.9g}", *p.pressed_s) : "", p.depth_m * 1e6,
+                     p.needle_force_N * 1e6);
     }
   }
   if (auto written = write_whole(table, lines); !written) {

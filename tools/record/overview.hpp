@@ -13,7 +13,9 @@ namespace punctum::tools {
 struct RunFacts {
   // Of a cell whose membrane was punctured: the last tick before.
   struct Puncture {
-    double t_s = 0, pressed_s = 0, depth_m = 0, needle_force_N = 0;  // pressed: since the needle touched
+    double t_s = 0;
+    std::optional<double> pressed_s{};  // since the needle touched; nothing: that is not recorded
+    double depth_m = 0, needle_force_N = 0;
   };
   std::string recording, scene;
   std::optional<std::uint64_t> seed;

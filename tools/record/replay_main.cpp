@@ -6,8 +6,11 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
+#include <cstring>
 #include <exception>
 #include <filesystem>
 #include <sstream>
@@ -156,13 +159,23 @@ int show(const std::string& recording, const Showing& how) {
     complain("punctum-replay: " + player.ends());
   }
   Child console;
-  const std::string log =
-      fmt::format("{}/punctum-{}.log", std::filesystem::temp_directory_path().string(), station);
+  // Nobody else may lay a file where the log is to be, or read the token in it.
+  std::string private_folder = (std::filesystem::temp_directory_path() / "punctum-replay-XXXXXX").string();
+  if (how.console && ::mkdtemp(private_folder.data()) == nullptr) {
+    complain(fmt::format("punctum-replay: {}: cannot be made: {}", private_folder, std::strerror(errno)));
+    return exit_bad_input;
+  }
+  const std::string log = private_folder + "/console.log";
+  const auto remove_log = [&] {
+    std::error_code ignored;
+    std::filesystem::remove_all(private_folder, ignored);
+  };
   bool address_told = !how.console;
   if (how.console) {
     auto started = Child::start("punctum-console", {"--station", station}, log);
     if (!started) {
       complain("punctum-replay: " + started.error());
+      remove_log();
       return exit_bad_input;
     }
     console = std::move(*started);
@@ -221,8 +234,7 @@ int show(const std::string& recording, const Showing& how) {
     std::this_thread::sleep_for(kRound);
   }
   console.send(SIGTERM);
-  std::error_code ignored;
-  std::filesystem::remove(log, ignored);
+  remove_log();
   return player.ends().empty() ? exit_done : exit_not_done;
 }
 

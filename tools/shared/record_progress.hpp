@@ -14,15 +14,16 @@ namespace punctum::tools {
 struct RecordProgress {
   static constexpr bool kOneWriter = true;
   static constexpr std::uint64_t kMagic = 0x0064726f63655250ULL;  // "PRecord"
-  static constexpr std::uint64_t kVersion = 2;
+  static constexpr std::uint64_t kVersion = 3;
   static const std::uint64_t kLayout;
 
   hal::SegmentHeader header;
-  std::atomic<std::uint64_t> taken{0};  // ticks, from the first on
-  std::atomic<std::uint64_t> ended{0};  // 1: the core was over, and all that it had told was taken
+  std::atomic<std::uint64_t> taken{0};      // ticks, from the first on
+  std::atomic<std::uint64_t> lost_from{0};  // 1 more than the ticks before the first that was lost; 0: none
+  std::atomic<std::uint64_t> ended{0};      // 1: the core was over, and all that it had told was taken
 };
 inline constexpr std::uint64_t RecordProgress::kLayout =
     hal::fingerprint(RecordProgress::kVersion, sizeof(RecordProgress), offsetof(RecordProgress, taken),
-                     offsetof(RecordProgress, ended));
+                     offsetof(RecordProgress, lost_from), offsetof(RecordProgress, ended));
 
 }  // namespace punctum::tools

@@ -255,6 +255,7 @@ TEST_F(ExportTest, a_full_disk_is_told) {
   has_room_again();
   ASSERT_FALSE(exported);
   EXPECT_EQ(exported.error(), (folder_ / "t").string() + "/samples.csv: File too large");
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "t" / "samples.csv")) << "a table that is cut off";
 }
 
 // A run of two cells. In the first the membrane gives way at 12 um and 3 uN, in the second it never does.
@@ -336,6 +337,41 @@ TEST_F(ExportTest, a_full_disk_is_told_by_an_export_to_hdf5_and_crashes_nothing)
       testing::ExitedWithCode(3), "run.nwb: cannot be written: File too large");
   EXPECT_FALSE(std::filesystem::exists(out));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "run.part.nwb"));
+}
+
+TEST_F(ExportTest, how_long_a_cell_was_pressed_is_unknown_where_the_contact_is_not_recorded) {
+  const std::string path = (folder_ / "late.mcap").string();
+  auto file = mcap::Writer::create(path, "punctum test");
+  ASSERT_TRUE(file) << file.error();
+  const std::uint16_t telemetry = add(*file, Stream::telemetry);
+  const auto tick = [&](std::uint64_t number, v1::Phase phase) {
+    v1::Telemetry t;
+    t.set_tick(number);
+    t.set_t_s(1e-3 * static_cast<double>(number));
+    t.set_phase(phase);
+    file->message(telemetry, static_cast<std::int64_t>(number), static_cast<std::int64_t>(number),
+                  t.SerializeAsString());
+  };
+  const auto cell = [&](std::uint64_t first, std::uint64_t contact, std::uint64_t indentation) {
+    for (std::uint64_t k = first; k < first + 300; ++k) {
+      tick(k, k < contact       ? v1::PHASE_FREE
+              : k < indentation ? v1::PHASE_CONTACT
+              : k < first + 200 ? v1::PHASE_INDENTATION
+                                : v1::PHASE_PUNCTURE);
+    }
+  };
+  cell(5000, 5000, 5100);     // the recording begins in contact
+  cell(6000, 6050, 6100);     // all of it
+  cell(9000, 9000, 9100);     // the contact lies in a hole
+  cell(10000, 10000, 10000);  // likewise, and the phase, too
+  file->finish();
+  const auto facts = facts_of(path);
+  ASSERT_TRUE(facts) << facts.error();
+  ASSERT_EQ(facts->punctures.size(), 4U);
+  EXPECT_FALSE(facts->punctures[0].pressed_s);
+  EXPECT_NEAR(facts->punctures[1].pressed_s.value_or(0), 0.149, 1e-9);
+  EXPECT_FALSE(facts->punctures[2].pressed_s);
+  EXPECT_FALSE(facts->punctures[3].pressed_s);
 }
 
 TEST_F(ExportTest, many_runs_stand_side_by_side) {

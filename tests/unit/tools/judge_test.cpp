@@ -55,6 +55,15 @@ TEST_F(JudgeTest, a_cell_that_got_less_than_was_asked_is_not_done_whatever_the_c
   EXPECT_EQ(judged(), RunEnd::underdosed);
 }
 
+TEST_F(JudgeTest, what_a_cell_got_is_not_judged_by_samples_of_which_some_were_lost) {
+  core_says(rt::Phase::clear, RunEnd::done);
+  facts.samples_lost = true;
+  measures->cells_without_injection = measures->cells_underdosed = 1;
+  EXPECT_EQ(judged(), RunEnd::done);
+  measures->cells_lost = 1;
+  EXPECT_EQ(judged(), RunEnd::cell_lost);
+}
+
 TEST_F(JudgeTest, a_limit_before_the_injection_is_a_time_limit_although_the_cell_is_clear_and_got_nothing) {
   core_says(rt::Phase::clear, RunEnd::time_limit);
   measures->cells_without_injection = 1;

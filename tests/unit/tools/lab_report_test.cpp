@@ -349,6 +349,87 @@ TEST(Rebuilt, dose_and_delays_are_what_the_rows_tell) {
   }
 }
 
+std::string ended_as(rt::RunEnd end, std::string before = "") {
+  rt::Event last;
+  last.t_s = 1.39;
+  last.kind = rt::Event::ended;
+  last.what = static_cast<std::uint64_t>(end);
+  return kEventColumns + before + event_line(last);
+}
+
+// As the run itself would have been judged: the core knows neither the truth nor what came out.
+TEST(Rebuilt, the_outcome_is_not_the_cores_word_alone) {
+  using R = RecordedInjection;
+  const Folder folder;
+  const auto outcome = [&](const char* scene, const std::string& rows, const std::string& events) {
+    folder.put("scene.toml", to_toml(*load_scene(scene)));
+    folder.put("samples.csv", rows);
+    folder.put("events.csv", events);
+    return rebuilt_facts(folder.path())["outcome"].get<std::string>();
+  };
+  const auto with = [](std::string rows, const std::string& old, const std::string& now) {
+    for (std::size_t at = rows.find(old); at != std::string::npos; at = rows.find(old, at + now.size())) {
+      rows.replace(at, old.size(), now);
+    }
+    return rows;
+  };
+  const std::string done = ended_as(rt::RunEnd::done), given = R::rows(1);
+  // The dose that R has given is a part of what it was asked.
+  EXPECT_EQ(outcome("icsi", given, done), "injected in part");
+  const std::string open = fmt::format(",{},1,", hal::kButtonInject),
+                    shut = fmt::format(",{},0,", hal::kButtonInject);
+  EXPECT_EQ(outcome("icsi", with(given, open, shut), done), "not injected");
+  const std::string all = with(given, shut, open);
+  EXPECT_EQ(outcome("icsi", all, done), "done");
+  rt::Event fault;
+  fault.t_s = 0.5;
+  fault.kind = rt::Event::fault;
+  fault.what = static_cast<std::uint64_t>(rt::Fault::estop);
+  EXPECT_EQ(outcome("icsi", all, ended_as(rt::RunEnd::done, event_line(fault))), "done after a fault");
+  fault.what = static_cast<std::uint64_t>(rt::Fault::command_stop);
+  EXPECT_EQ(outcome("icsi", all, ended_as(rt::RunEnd::stopped, event_line(fault))), "stopped");
+  EXPECT_EQ(outcome("icsi", all, ended_as(rt::RunEnd::time_limit)), "time limit");
+  EXPECT_EQ(outcome("icsi", with(all, ",1,0\n", ",1,1\n"), done), "cell lost");
+  EXPECT_EQ(outcome("free", all, ended_as(rt::RunEnd::time_limit)), "done") << "it has no task";
+}
+
+// The rows tell when the inner membrane gave way; between that and the outer one the needle is in the cell.
+TEST(Rebuilt, between_two_membranes_the_needle_is_where_the_core_has_it) {
+  const Folder folder;
+  const std::string rows =
+      "t_s,phase,fz_N,fault,wd_m,obs_gap_m,obs_age_s,tip_force_N,true_force_N,true_gap_m,true_contact,"
+      "true_punctured,true_lost\n"
+      "0.000,indentation,0,none,5e-06,-5e-06,0.1,1e-6,1e-6,-9e-06,1,0,0\n"
+      "0.001,puncture,0,none,0,-5e-06,0.1,0,1e-6,-5e-05,1,0,0\n";
+  folder.put("samples.csv", rows);
+  folder.put("scene.toml", to_toml(*load_scene("icsi")));
+  Json facts = rebuilt_facts(folder.path());
+  EXPECT_EQ(facts["needle_at_end"]["where"], "inside");
+  EXPECT_EQ(facts["needle_at_end"]["known_from"], "core");
+  EXPECT_TRUE(facts["force_error_rms_N"].is_null()) << "of the outer membrane the rows do not tell";
+  folder.put("scene.toml", to_toml(*load_scene("outer-only")));
+  facts = rebuilt_facts(folder.path());
+  EXPECT_EQ(facts["needle_at_end"]["where"], "touching") << "in truth it has not given way";
+  EXPECT_NEAR(facts["force_error_rms_N"].get<double>(), 0, 1e-12);
+}
+
+TEST(Rebuilt, rows_that_are_missing_between_others_are_told) {
+  const Folder folder;
+  folder.put("scene.toml", to_toml(*load_scene("icsi")));
+  const std::string rows = RecordedInjection::rows(1);
+  const std::size_t from = rows.find("\n0.300000,") + 1, to = rows.find("\n0.900000,") + 1;
+  folder.put("samples.csv", rows.substr(0, from) + rows.substr(to));
+  folder.put("events.csv", ended_as(rt::RunEnd::done));
+  const Json facts = rebuilt_facts(folder.path());
+  ASSERT_EQ(facts["not_kept"].size(), 1U);
+  EXPECT_NEAR(facts["not_kept"][0]["t_s"].get<double>(), 0.299, 1e-9);
+  EXPECT_TRUE(contains(facts["not_kept"][0]["why"].get<std::string>(), "0.900 s"));
+  EXPECT_TRUE(facts["alarms_s"].is_null() && facts["dose"]["asked_s"].is_null() && facts["phases"].empty());
+  EXPECT_EQ(facts["outcome"], "done") << "what the cell got is not known";
+  folder.put("samples.csv", RecordedInjection::rows(7));
+  EXPECT_TRUE(rebuilt_facts(folder.path())["not_kept"].empty()) << "every seventh row, and changes of phase";
+}
+
 TEST(Rebuilt, what_came_about_between_two_rows_came_at_a_time_that_is_not_known) {
   using R = RecordedInjection;
   const Folder folder;

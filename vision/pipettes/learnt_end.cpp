@@ -9,6 +9,7 @@
 #include "vision/pipettes/glass.hpp"
 #include "vision/pipettes/needle_walls.hpp"
 #include "vision/pipettes/shaft_blur.hpp"
+#include "vision/pipettes/sharp_point.hpp"
 
 namespace punctum::vision {
 
@@ -34,6 +35,7 @@ constexpr int kFurther = 8;
 constexpr double kFarBehind_px = 30;
 constexpr double kSteep = 0.8;  // px along per px across: of a steeper cut the two walls end far apart
 constexpr double kUsualBlur_px = 1.5;
+constexpr double kExplained = 0.9;  // by its glass, of what is seen of a sharp point in relief
 
 // Of the outermost glass, px.
 double sd_of(const CutGlass& cut, double half_width) {
@@ -46,7 +48,8 @@ double radius_at_end(const Bevel& bevel, const NeedlePose& needle, double blur_p
 
 // By which the outermost glass lies ahead of the middle of the end, px.
 double ahead_of_middle(const Bevel& bevel, const NeedlePose& needle, double blur_px) {
-  return std::abs(bevel.tangent) * radius_at_end(bevel, needle, blur_px);
+  return bevel.point_ahead > 0 ? bevel.point_ahead
+                               : std::abs(bevel.tangent) * radius_at_end(bevel, needle, blur_px);
 }
 
 // The glass and its cut about the middle of its end, with the blur of the shaft, or in relief with a usual
@@ -165,13 +168,64 @@ std::optional<CutGlass> LearntEnd::go_to_cut(const GradientField& field, double 
     cut = cut_seen(field, noise, needle);
     further = true;
   }
+  if (cut && cut->bevel.radius > 0) {
+    go_to_point(field, noise, needle, *cut);
+  }
   if (cut && further) {
     last.tip = needle.tip;
     learn_shape_anew(field, last);
     walls_agree_ = false;
-    cut->end.ahead += (needle.tip - last.tip).dot(last.axis);
+    const double moved = (needle.tip - last.tip).dot(last.axis);
+    cut->end.ahead += moved;
+    point_.glass.front() -= moved;
   }
   return cut;
+}
+
+// The point of a sharp needle in relief, by its glass: the walls alone tell how steep its cut is, and so
+// where its foremost glass lies, less surely. As it is where the glass does not explain what is seen.
+void LearntEnd::go_to_point(const GradientField& field, double noise, const NeedlePose& needle,
+                            CutGlass& cut) {
+  constexpr double kReach_px = 4, kKnown_px = 0.9;
+  point_frames_ = 0;
+  const auto point = sharp_point(field, noise, needle, cut);
+  if (!point || point->explained < kExplained || point->sd > kKnown_px) {
+    return;
+  }
+  Bevel bevel{.tangent = point->tangent, .sd = 0, .radius = point->radius};
+  NeedlePose middle = needle;
+  const double to_middle = point->ahead - std::abs(bevel.tangent) * bevel.radius;
+  middle.tip += to_middle * needle.axis;
+  const auto end = end_of_known_cut(field, noise, middle, bevel, cut.end.blur, kReach_px);
+  if (!end) {
+    return;
+  }
+  bevel.point_ahead = point->ahead - to_middle - end->ahead;
+  bevel.point_aside = point->aside;
+  cut.bevel = bevel;
+  cut.end.ahead = point->ahead;
+  cut.end.sd = point->sd;
+  point_ = *point;
+  point_frames_ = 1;
+}
+
+// Noise moves it by a quarter of a pixel in one frame at noise 5. Its cut is followed all the same.
+void LearntEnd::learn_point(const GradientField& field, double noise, const NeedlePose& followed) {
+  constexpr int kFrames = 8;
+  if (point_frames_ == 0 || point_frames_ >= kFrames) {
+    return;
+  }
+  const auto point = sharp_point_again(field, noise, followed, point_);
+  if (!point || point->explained < kExplained) {
+    return;
+  }
+  const double part = 1.0 / ++point_frames_, off = point->ahead - glass_ahead_, further = part * off;
+  glass_frames_ = point_frames_;
+  glass_scatter_ += part * (off * off - glass_scatter_);
+  glass_ahead_ += further;
+  bevel_.point_ahead += further;
+  bevel_.point_aside += part * (point->aside - bevel_.point_aside);
+  point_ = *point;
 }
 
 void LearntEnd::weigh(const GradientField& field, double noise, NeedlePose& needle) const {
@@ -188,8 +242,12 @@ bool LearntEnd::ends_apart() const noexcept { return bevel_.radius > 0 || std::a
 
 NeedlePose LearntEnd::told(NeedlePose needle, double noise) const {
   needle.tip += glass_ahead_ * needle.axis;
-  needle.point_aside =
-      ends_apart() ? std::copysign(radius_at_end(bevel_, needle, glass_blur_), -bevel_.tangent) : 0;
+  if (bevel_.point_ahead > 0) {
+    needle.point_aside = bevel_.point_aside;
+  } else {
+    needle.point_aside =
+        ends_apart() ? std::copysign(radius_at_end(bevel_, needle, glass_blur_), -bevel_.tangent) : 0;
+  }
   // Of a needle whose lumen is not seen only the walls tell the end at first, and its cut is not seen.
   constexpr double kWalls_px = 0.5, kBeyondWalls_px = 0.8, kUnseenCut_px = 0.4,
                    kLine_px = 0.1;  // of the end, where the line that it is stands
@@ -199,9 +257,9 @@ NeedlePose LearntEnd::told(NeedlePose needle, double noise) const {
                                 : kUnseenCut_px;
   // Light from one side shows slopes of glass: where the end lies beside what is seen of them differs from
   // needle to needle by so much.
-  constexpr double kOfRelief_px = 0.6;
+  constexpr double kOfRelief_px = 0.6, kOfPoint_px = 0.25;  // of a point whose glass was fitted
   if (in_relief_) {
-    needle.constant_sd = math::hypot(needle.constant_sd, kOfRelief_px);
+    needle.constant_sd = math::hypot(needle.constant_sd, point_frames_ > 0 ? kOfPoint_px : kOfRelief_px);
   }
   // It is learnt in focus. Out of it the end seems to lie further back; beyond the blurs that are tried, as
   // far as its contrast lasts.
@@ -414,6 +472,9 @@ void LearntEnd::learn_glass(const GlassEnd& end) {
 }
 
 void LearntEnd::learn(const GradientField& field, double noise, const NeedlePose& followed, bool alone) {
+  if (alone && cut_sd_ > 0) {
+    learn_point(field, noise, followed);
+  }
   if ((alone || !walls_tell_) && cut_sd_ == 0 && end_line_ == 0) {
     learn_glass(field, noise, followed);
   }

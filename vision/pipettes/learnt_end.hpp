@@ -13,6 +13,7 @@
 #include "vision/pipettes/needle_end.hpp"
 #include "vision/pipettes/needle_pose.hpp"
 #include "vision/pipettes/needle_shape.hpp"
+#include "vision/pipettes/sharp_point.hpp"
 #include "vision/pipettes/thin_end.hpp"
 
 namespace punctum::vision {
@@ -77,6 +78,8 @@ class LearntEnd {
                                     double motion_sd);
   [[nodiscard]] std::optional<CutGlass> go_to_cut(const GradientField& field, double noise,
                                                   NeedlePose& needle);
+  void go_to_point(const GradientField& field, double noise, const NeedlePose& needle, CutGlass& cut);
+  void learn_point(const GradientField& field, double noise, const NeedlePose& followed);
   void learn_shape_anew(const GradientField& field, NeedlePose& needle);
   void calibrate_walls(const GradientField& field, const NeedlePose& walls, double noise);
   void learn_glass(const GradientField& field, double noise, const NeedlePose& followed);
@@ -108,6 +111,8 @@ class LearntEnd {
   bool walls_agree_ = false;  // with the shape, in the last frame
 
   Bevel bevel_;                     // as it was found
+  SharpPoint point_;                // of a sharp needle in relief, in the last frame that it was learnt from
+  int point_frames_ = 0;            // that bevel_.point_ahead was learnt from
   double half_width_at_start_ = 0;  // px
   double glass_ahead_ = 0;          // of the end that is followed: the outermost glass, px
   int glass_frames_ = 0;            // that it was learnt from

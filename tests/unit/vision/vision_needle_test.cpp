@@ -475,7 +475,24 @@ struct Tube {
   double tip = 150.3, radius = 4.7, widens = 0.012;
   double gain = 9;      // grey levels of slope
   double parallel = 0;  // behind the tip it does not widen, px
+  double turned = 0;    // of the cut about the axis, out of the focal plane, rad
 };
+
+// Along z, of a tube of that radius, at u beside its axis and s behind its tip.
+double chord(const Tube& tube, double radius, double s, double u) {
+  const double half = std::sqrt(std::max(radius * radius - u * u, 0.0));
+  if (tube.turned == 0) {
+    return s > tube.tangent * u + std::abs(tube.tangent) * tube.radius ? 2 * half : 0;
+  }
+  constexpr int kSlices = 40;
+  int within = 0;
+  for (int k = 0; k < kSlices; ++k) {
+    const double z = half * ((2 * k + 1.0) / kSlices - 1);
+    const double towards = u * std::cos(tube.turned) + z * std::sin(tube.turned);
+    within += s > tube.tangent * towards + std::abs(tube.tangent) * tube.radius ? 1 : 0;
+  }
+  return 2 * half * within / kSlices;
+}
 
 GradientField lit(const Tube& tube, unsigned seed = 2300) {
   constexpr int kFine = 3;
@@ -485,12 +502,8 @@ GradientField lit(const Tube& tube, unsigned seed = 2300) {
   for (int y = 0; y < path.rows; ++y) {
     for (int x = 0; x < path.cols; ++x) {
       const double s = (x + 0.5) / kFine - 0.5 - tube.tip, u = (y + 0.5) / kFine - 0.5 - kAxis_y;
-      if (s > tube.tangent * u + std::abs(tube.tangent) * tube.radius) {
-        const double outer = tube.radius + tube.widens * std::max(s - tube.parallel, 0.0),
-                     inner = kBore * outer;
-        path.at<float>(y, x) = static_cast<float>(2 * std::sqrt(std::max(outer * outer - u * u, 0.0)) -
-                                                  2 * std::sqrt(std::max(inner * inner - u * u, 0.0)));
-      }
+      const double outer = tube.radius + tube.widens * std::max(s - tube.parallel, 0.0);
+      path.at<float>(y, x) = static_cast<float>(chord(tube, outer, s, u) - chord(tube, kBore * outer, s, u));
     }
   }
   cv::GaussianBlur(path, path, cv::Size(0, 0), 0.5 * kFine);
@@ -532,6 +545,42 @@ TEST(WideNeedle, that_is_ground_sharp_ends_with_its_point_wherever_light_comes_f
       }
     }
   }
+}
+
+// The point is not where the walls of the cut have it then: it lies nearer to the axis, and further ahead.
+TEST(WideNeedle, that_is_ground_sharp_ends_with_its_point_however_the_cut_is_turned) {
+  constexpr double kPoint_px = 1, kRms_px = 0.4, kAside_px = 0.8;
+  constexpr unsigned kFrames = 6;
+  double squares = 0;
+  int needles = 0;
+  unsigned seed = 2400;
+  for (const double turned : {0.0, 0.25, 0.5}) {
+    for (const double tangent : {-1.2, 1.7}) {
+      for (const double light_deg : {40.0, 90.0, 140.0}) {
+        InjectionPipette needle(Side::right, kWideRadius);
+        Tube tube{tangent, light_deg};
+        tube.gain = 25;
+        tube.turned = turned;
+        ASSERT_TRUE(needle.start(lit(tube, ++seed), kWideNoise, kClear));
+        needle.in_relief(true);
+        NeedlePose pose;
+        for (unsigned frame = 1; frame < kFrames; ++frame) {
+          tube.tip -= 1;
+          const GradientField field = lit(tube, ++seed);
+          pose = needle.find(field, kWideNoise, std::nullopt);
+          needle.learn(field, pose, kWideNoise);
+        }
+        const double error = pose.point().x - tube.tip;
+        EXPECT_NEAR(error, 0, kPoint_px) << turned << ' ' << tangent << ' ' << light_deg;
+        EXPECT_NEAR(pose.point().y, kAxis_y - std::copysign(tube.radius * std::cos(turned), tangent),
+                    kAside_px)
+            << turned << ' ' << tangent << ' ' << light_deg;
+        squares += error * error;
+        ++needles;
+      }
+    }
+  }
+  EXPECT_LT(std::sqrt(squares / needles), kRms_px);
 }
 
 TEST(WideNeedle, that_is_blunt_ends_where_light_from_one_side_shows_a_line_across_it) {

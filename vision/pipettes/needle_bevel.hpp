@@ -17,7 +17,8 @@ struct Bevel {
   double tangent = 0;
   double sd = 0;
   double radius = 0;  // outer, of the glass there, px, where light from one side shows it; else 0
-  // Of a sharp point whose glass was fitted: ahead of the end that the cut tells, and beside the axis, px; else 0.
+  // Of a sharp point whose glass was fitted: ahead of the end that the cut tells, and beside the axis, px;
+  // else 0.
   double point_ahead = 0, point_aside = 0;
 };
 

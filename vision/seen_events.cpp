@@ -15,6 +15,9 @@ constexpr double kTouchesFrom_px = -3;    // further inside, it has touched befo
 constexpr double kTouchesTo_px = 8;       // further outside, it does not touch in the next frame
 constexpr double kLeastDimple_px = 0.7;   // depth from which the width of a dimple can be measured
 constexpr double kContactPoint_px = 0.7;  // standard deviation of a membrane on the needle's side
+// In relief, of the membrane at rest where the needle enters: how far beside what is seen its face lies,
+// differs round a cell.
+constexpr double kFaceAtEntry_px = 0.4;
 
 // Where the inner membrane's contour crosses the lines beside the needle's edges.
 std::optional<InnerOnNeedle> inner_on_needle(const FollowedMembrane& inner, const Result& result) {
@@ -153,8 +156,9 @@ void SeenEvents::measure_depth(const SeenNeedle& needle, const SeenCell& cell, d
   const double depth = result.punctured ? membrane_px : needle.wall_px() - *result.gap_px;
   result.wd_px = result.contact ? std::max(0.0, depth) : 0.0;
   if (result.contact) {
-    result.wd_sd_px =
-        math::hypot(result.punctured ? kContactPoint_px : needle.on_tip_sd_px(), cell.entry_sd_px());
+    const double entry_sd_px =
+        math::hypot(cell.entry_sd_px(), cell.outer().polarity == Polarity::relief ? kFaceAtEntry_px : 0);
+    result.wd_sd_px = math::hypot(result.punctured ? kContactPoint_px : needle.on_tip_sd_px(), entry_sd_px);
   }
   if (*result.wd_px > kLeastDimple_px) {
     const auto half = dimple_half_width(result.outer.contour, cell.at_rest(), *result.entry, *result.wd_px,

@@ -257,19 +257,21 @@ NeedlePose LearntEnd::told(NeedlePose needle, double noise) const {
                                 : kUnseenCut_px;
   // Light from one side shows slopes of glass: where the end lies beside what is seen of them differs from
   // needle to needle by so much.
-  constexpr double kOfRelief_px = 0.6, kOfPoint_px = 0.25;  // of a point whose glass was fitted
-  if (in_relief_) {
-    needle.constant_sd = math::hypot(needle.constant_sd, point_frames_ > 0 ? kOfPoint_px : kOfRelief_px);
+  constexpr double kOfRelief_px = 0.6, kOfPoint_px = 0.2;  // of a point whose glass was fitted
+  if (point_frames_ > 0) {
+    needle.constant_sd = math::hypot(kOfPoint_px, std::sqrt(glass_scatter_ / point_frames_));
+  } else if (in_relief_) {
+    needle.constant_sd = math::hypot(needle.constant_sd, kOfRelief_px);
   }
   // It is learnt in focus. Out of it the end seems to lie further back; beyond the blurs that are tried, as
   // far as its contrast lasts.
   constexpr double kBeyondBlurs_px = 6;
   const double unsharp = NeedleShape::beyond_blurs(view_) ? kBeyondBlurs_px : NeedleShape::blur_px(view_);
-  needle.sd = math::hypot(math::hypot(by_walls                        ? kWalls_px
-                                      : end_line_ != 0 && cut_sd_ > 0 ? math::hypot(cut_sd_, kLine_px)
-                                                                      : std::max(tip_sd(noise), cut_sd_),
-                                      needle.constant_sd),
-                          unsharp);
+  const bool by_one_cue = cut_sd_ > 0 && (end_line_ != 0 || point_frames_ > 0);
+  const double of_frame = by_walls     ? kWalls_px
+                          : by_one_cue ? math::hypot(cut_sd_, end_line_ != 0 ? kLine_px : 0)
+                                       : std::max(tip_sd(noise), cut_sd_);
+  needle.sd = math::hypot(math::hypot(of_frame, needle.constant_sd), unsharp);
   return needle;
 }
 

@@ -362,7 +362,8 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
   std::optional<Tracker> tracker;
   std::map<std::string, Score> outer, inner;
   std::map<std::string, std::vector<double>> tip_px;
-  int covered = 0, needles = 0;
+  std::vector<double> depth_px;
+  int covered = 0, needles = 0, depth_covered = 0;
   Events begun, told;
   for (int k = 0; k < static_cast<int>(truth.size()); ++k) {
     const cv::Mat picture = drawn(folder, k);
@@ -375,6 +376,11 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
     const std::string phase = t["phase"];
     outer[phase].add(contour_of(t["outer"]), seen.outer);
     inner[phase].add(contour_of(t["inner"]), seen.inner);
+    if (phase == "contact" && seen.contact && seen.wd_px) {
+      const double off_px = *seen.wd_px - t["wd_px"].get<double>();
+      depth_px.push_back(off_px);
+      depth_covered += std::abs(off_px) < 1.96 * seen.wd_sd_px ? 1 : 0;
+    }
     const Point tip(t["tip"][0].get<double>(), t["tip"][1].get<double>());
     if (seen.needle.ok) {
       tip_px[phase].push_back((seen.needle.tip - tip).dot(seen.needle.axis));
@@ -407,6 +413,11 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
   expect_near_truth("tip in contact", tip_px["contact"], 1.25 * GetParam().tip_px);
   std::printf("tip within 1.96 of its deviation in %d of %d\n", covered, needles);
   EXPECT_GE(covered, GetParam().covered * needles);
+  std::printf("depth within 1.96 of its deviation in %d of %zu\n", depth_covered, depth_px.size());
+  if (GetParam().light != Light::sheets) {
+    expect_near_truth("depth of the dimple", depth_px, 1.25 * GetParam().tip_px + 0.5);
+    EXPECT_GE(depth_covered, 0.75 * static_cast<double>(depth_px.size()));
+  }
   const int contact = late(begun["contact"], told["contact"]),
             puncture = late(begun["puncture"], told["puncture"]);
   std::printf("contact %+d frames late, puncture %+d\n", contact, puncture);

@@ -189,7 +189,7 @@ void LearntEnd::go_to_point(const GradientField& field, double noise, const Need
   constexpr double kReach_px = 4, kKnown_px = 0.9;
   point_frames_ = 0;
   const auto point = sharp_point(field, noise, needle, cut);
-  if (!point || point->explained < kExplained || point->sd > kKnown_px) {
+  if (!point || point->explained < kExplained || !(point->sd < kKnown_px)) {
     return;
   }
   Bevel bevel{.tangent = point->tangent, .sd = 0, .radius = point->radius};

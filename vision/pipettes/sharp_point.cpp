@@ -189,7 +189,7 @@ class LitGlass {
         for (int k = 1; k <= kReach; ++k) {
           value += blur_[static_cast<std::size_t>(k)] * (sum[j - k] + sum[j + k]);
         }
-        out[static_cast<std::size_t>(r * grid_.lanes() + l)] = value;
+        out[static_cast<std::size_t>(r * grid_.lanes() + l)] = static_cast<double>(value);
       }
     }
   }

@@ -159,15 +159,20 @@ TEST_F(Recordings, a_run_goes_on_when_its_recorder_is_killed_and_the_report_says
   EXPECT_NE(said_.find(replayed_ticks(cut.rows.size())), std::string::npos) << said_;
 }
 
+// Once some of the run is in the file; 0: there is none.
+pid_t recorder_at_work(pid_t parent, const std::string& recording) {
+  for (int i = 0; i < 1000 && (!fs::exists(recording) || fs::file_size(recording) < 100'000);
+       ++i, std::this_thread::sleep_for(5ms)) {
+  }
+  return child_named(parent, "punctum-record");
+}
+
 TEST_F(Recordings, a_recorder_that_somebody_asks_to_end_has_not_kept_the_run) {
   Running running({"run", "free", "--seconds", "2", "--quiet", "--no-figure", "--record", "--report",
                    report(), "--set", kPatientRelay},
                   words());
   const std::string recording = report() + "/recording.mcap";
-  for (int i = 0; i < 1000 && (!fs::exists(recording) || fs::file_size(recording) < 100'000);
-       ++i, std::this_thread::sleep_for(5ms)) {
-  }
-  const pid_t recorder = child_named(running.pid(), "punctum-record");
+  const pid_t recorder = recorder_at_work(running.pid(), recording);
   ASSERT_NE(recorder, 0);
   kill(recorder, SIGTERM);
   EXPECT_EQ(running.wait(), 1);
@@ -184,10 +189,7 @@ TEST_F(Recordings, a_recorder_whose_parent_is_killed_records_how_the_core_stops)
                    report(), "--set", kPatientRelay},
                   words());
   const std::string recording = report() + "/recording.mcap";
-  for (int i = 0; i < 1000 && (!fs::exists(recording) || fs::file_size(recording) < 100'000);
-       ++i, std::this_thread::sleep_for(5ms)) {
-  }
-  const pid_t recorder = child_named(running.pid(), "punctum-record");
+  const pid_t recorder = recorder_at_work(running.pid(), recording);
   ASSERT_NE(recorder, 0);
   kill(running.pid(), SIGKILL);
   (void)running.wait();

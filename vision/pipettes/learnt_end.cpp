@@ -187,7 +187,6 @@ std::optional<CutGlass> LearntEnd::go_to_cut(const GradientField& field, double 
 void LearntEnd::go_to_point(const GradientField& field, double noise, const NeedlePose& needle,
                             CutGlass& cut) {
   constexpr double kReach_px = 4, kKnown_px = 0.9;
-  point_frames_ = 0;
   const auto point = sharp_point(field, noise, needle, cut);
   if (!point || point->explained < kExplained || !(point->sd < kKnown_px)) {
     return;
@@ -212,7 +211,7 @@ void LearntEnd::go_to_point(const GradientField& field, double noise, const Need
 // Noise moves it by a quarter of a pixel in one frame at noise 5. Its cut is followed all the same.
 void LearntEnd::learn_point(const GradientField& field, double noise, const NeedlePose& followed) {
   constexpr int kFrames = 8;
-  if (point_frames_ == 0 || point_frames_ >= kFrames) {
+  if (!by_point() || point_frames_ >= kFrames) {
     return;
   }
   const auto point = sharp_point_again(field, noise, followed, point_);
@@ -242,7 +241,7 @@ bool LearntEnd::ends_apart() const noexcept { return bevel_.radius > 0 || std::a
 
 NeedlePose LearntEnd::told(NeedlePose needle, double noise) const {
   needle.tip += glass_ahead_ * needle.axis;
-  if (bevel_.point_ahead > 0) {
+  if (by_point()) {
     needle.point_aside = bevel_.point_aside;
   } else {
     needle.point_aside =
@@ -258,7 +257,7 @@ NeedlePose LearntEnd::told(NeedlePose needle, double noise) const {
   // Light from one side shows slopes of glass: where the end lies beside what is seen of them differs from
   // needle to needle by so much.
   constexpr double kOfRelief_px = 0.6, kOfPoint_px = 0.2;  // of a point whose glass was fitted
-  if (point_frames_ > 0) {
+  if (by_point()) {
     needle.constant_sd = math::hypot(kOfPoint_px, std::sqrt(glass_scatter_ / point_frames_));
   } else if (in_relief_) {
     needle.constant_sd = math::hypot(needle.constant_sd, kOfRelief_px);
@@ -267,7 +266,7 @@ NeedlePose LearntEnd::told(NeedlePose needle, double noise) const {
   // far as its contrast lasts.
   constexpr double kBeyondBlurs_px = 6;
   const double unsharp = NeedleShape::beyond_blurs(view_) ? kBeyondBlurs_px : NeedleShape::blur_px(view_);
-  const bool by_one_cue = cut_sd_ > 0 && (end_line_ != 0 || point_frames_ > 0);
+  const bool by_one_cue = cut_sd_ > 0 && (end_line_ != 0 || by_point());
   const double of_frame = by_walls     ? kWalls_px
                           : by_one_cue ? math::hypot(cut_sd_, end_line_ != 0 ? kLine_px : 0)
                                        : std::max(tip_sd(noise), cut_sd_);

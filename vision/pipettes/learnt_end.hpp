@@ -91,6 +91,8 @@ class LearntEnd {
   [[nodiscard]] double tip_sd(double noise) const;
   // The two walls, along the needle.
   [[nodiscard]] bool ends_apart() const noexcept;
+  // The glass of its sharp point was fitted.
+  [[nodiscard]] bool by_point() const noexcept { return bevel_.point_ahead > 0; }
 
   double radius_px_;
   bool in_relief_ = false;

@@ -583,6 +583,28 @@ TEST(WideNeedle, that_is_ground_sharp_ends_with_its_point_however_the_cut_is_tur
   EXPECT_LT(std::sqrt(squares / needles), kRms_px);
 }
 
+// Of a sharp one that was there before it nothing is left.
+TEST(WideNeedle, that_is_blunt_is_told_as_if_there_had_been_no_other) {
+  InjectionPipette fresh(Side::right, kWideRadius), used(Side::right, kWideRadius);
+  Tube sharp{1.7, 90.0}, blunt{0, 20.0};
+  sharp.gain = 25;
+  ASSERT_TRUE(used.start(lit(sharp), kWideNoise, kClear));
+  for (InjectionPipette* needle : {&fresh, &used}) {
+    ASSERT_TRUE(needle->start(lit(blunt), kWideNoise, kClear));
+    needle->in_relief(true);
+  }
+  for (unsigned frame = 1; frame < 5; ++frame) {
+    blunt.tip -= 1;
+    const GradientField field = lit(blunt, 2300 + frame);
+    const NeedlePose one = fresh.find(field, kWideNoise, std::nullopt),
+                     other = used.find(field, kWideNoise, std::nullopt);
+    EXPECT_EQ(one.tip, other.tip) << frame;
+    EXPECT_EQ(one.sd, other.sd) << frame;
+    fresh.learn(field, one, kWideNoise);
+    used.learn(field, other, kWideNoise);
+  }
+}
+
 TEST(WideNeedle, that_is_blunt_ends_where_light_from_one_side_shows_a_line_across_it) {
   constexpr double kEnd_px = 0.3, kDeviations = 3;
   for (const double light_deg : {20.0, 45.0, 135.0, 160.0, 200.0, 300.0}) {

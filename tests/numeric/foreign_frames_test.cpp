@@ -324,11 +324,12 @@ enum class Light { hoffman, dic, sheets };
 struct Relief {
   int seed;
   Light light;
-  double outer_um, inner_um, tip_px;  // rms at most, before contact; in contact a quarter more of the tip
-  int astray = 0;                     // frames in contact whose outer membrane is somewhere off by 4 px
-  int early = 3;                      // frames at most, of contact
-  int dented = 0;                     // frames at least in contact whose outer membrane is right
-  double covered = 0.8;               // of the tips, by 1.96 of their deviations, at least
+  double outer_um = 0, inner_um = 0, tip_px = 0;  // rms at most before contact; of the tip in contact 1.25
+  int astray = 0;        // frames in contact whose outer membrane is somewhere off by 4 px
+  int early = 3;         // frames at most, of contact
+  int dented = 0;        // frames at least in contact whose outer membrane is right
+  double covered = 0.8;  // of the tips, by 1.96 of their deviations, at least
+  int frames = 44;
 };
 
 class ReliefFrames : public testing::TestWithParam<Relief> {
@@ -346,6 +347,7 @@ class ReliefFrames : public testing::TestWithParam<Relief> {
     ASSERT_EQ(others ? python({support + "sheets_in_relief.py", renderer().string(), folder.string(), seed,
                                "5", std::to_string(kFrames)})
                      : python({support + "hoffman_renderer.py", folder.string(), seed, "5",
+                               std::to_string(GetParam().frames),
                                GetParam().light == Light::dic ? "dic=1" : "dic=0"}),
               0);
   }
@@ -475,5 +477,43 @@ INSTANTIATE_TEST_SUITE_P(
                     Relief{4, Light::sheets, 0.35, 0.4, 2, 0, 3, 0, 0.65},
                     Relief{213, Light::sheets, 0.25, 0.35, 1.3}, Relief{10, Light::sheets, 0.4, 0.5, 2.1, 3}),
     name_of_film);
+
+// Of 229 the outer membrane once ran along the ooplasm for an eighth of its way, where the light runs along
+// it; of 322 and 345 the sharp needle was taken for one in bright field, and its tip told 4 px off. Into the
+// mouth of the holding pipette the membrane bulges unseen.
+class FirstPictures : public ReliefFrames {};
+
+TEST_P(FirstPictures, in_relief_show_the_cell_and_the_point_of_the_needle) {
+  nlohmann::json truth;
+  std::ifstream(folder / "truth.json") >> truth;
+  const nlohmann::json& t = truth[0];
+  const cv::Mat picture = drawn(folder, 0);
+  ASSERT_FALSE(picture.empty());
+  VisionConfig config;
+  config.pixel_m = kPixel_um * 1e-6;
+  Tracker tracker(config, picture.cols, picture.rows);
+  const Result& seen = tracker.process(frame_of(picture, 0));
+  const Point mouth(t["holder"][0].get<double>(), t["holder"][1].get<double>());
+  for (const auto& [name, membrane] : {std::pair{"outer", &seen.outer}, std::pair{"inner", &seen.inner}}) {
+    ASSERT_TRUE(membrane->ok) << name;
+    double furthest_px = 0;
+    for (const Point& p : contour_of(t[name])) {
+      constexpr double kMouth_px = 20;
+      furthest_px =
+          std::max(furthest_px, cv::norm(p - mouth) < kMouth_px ? 0 : distance(p, membrane->contour));
+    }
+    EXPECT_LT(furthest_px, kRight_px) << name;
+  }
+  ASSERT_TRUE(seen.needle.ok);
+  EXPECT_LT(std::abs((seen.needle.tip - Point(t["tip"][0].get<double>(), t["tip"][1].get<double>()))
+                         .dot(seen.needle.axis)),
+            1);
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, FirstPictures,
+                         testing::Values(Relief{.seed = 229, .light = Light::hoffman, .frames = 1},
+                                         Relief{.seed = 322, .light = Light::hoffman, .frames = 1},
+                                         Relief{.seed = 345, .light = Light::hoffman, .frames = 1}),
+                         name_of_film);
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "vision/image/polar_contour.hpp"
 #include "vision/membrane/edge_candidates.hpp"
 #include "vision/membrane/parallel_edge.hpp"
+#include "vision/membrane/undeformed.hpp"
 
 namespace punctum::vision {
 
@@ -131,6 +132,37 @@ bool same_edge(const ClosedEdge& a, const ClosedEdge& b) {
   return static_cast<double>(near) > kShare * static_cast<double>(a.path.r.size());
 }
 
+// Where light runs along it little is seen of a zona, and its path may run along the flank of the ooplasm
+// there. It is followed again about the oval of its clear parts, at first of those as far from the ooplasm as
+// most, and kept where it is nearly as strong.
+void follow_as_an_oval(EdgePath& zona, const FollowedMembrane& ooplasm, const ClearedPicture& picture) {
+  constexpr double kNear_px = 4, kAsStrong = 0.95;
+  constexpr int kRounds = 3;
+  Vector<double> apart(ooplasm.r.size());
+  std::transform(zona.r.begin(), zona.r.end(), ooplasm.r.begin(), apart.begin(), std::minus<>());
+  const double usual = median_of(apart);
+  Vector<double> oval = ooplasm.r, weights(oval.size());
+  std::for_each(oval.begin(), oval.end(), [usual](double& r) { r += usual; });
+  const Contour followed = from_polar(ooplasm.centre, zona.r);
+  for (int round = 0; round < kRounds; ++round) {
+    for (std::size_t i = 0; i < weights.size(); ++i) {
+      const double clear = std::max(0.0, static_cast<double>(zona.strength[i]));
+      weights[i] = std::abs(zona.r[i] - oval[i]) < kNear_px ? clear * clear : 0;
+    }
+    const auto fitted = fit_undeformed(followed, weights);
+    oval = fitted ? polar_radii(fitted->shape, ooplasm.centre, static_cast<int>(weights.size()))
+                  : Vector<double>{};
+    if (oval.empty()) {
+      return;
+    }
+  }
+  SecondEdge again = find_in_relief(oval, ooplasm.centre, ooplasm.relief, -kNear_px, kNear_px, picture);
+  const auto strength = [](const EdgePath& path) { return path.mean_strength * path.saturation; };
+  if (!again.path.r.empty() && strength(again.path) > kAsStrong * strength(zona)) {
+    zona = std::move(again.path);
+  }
+}
+
 // Round the ooplasm, the outer face of its zona: at both, what the light crosses grows inwards. Where a zona
 // clings to it, the flank of the ooplasm's own edge is near; a chorion is far from its yolk, and faint beside
 // it.
@@ -139,13 +171,14 @@ std::optional<FollowedMembrane> zona_in_relief(const FollowedMembrane& ooplasm, 
   constexpr double kFurthest = 0.35, kContrast = 1;  // of the radius; times the median edge of the band
   constexpr double kNearest_px = 5, kFar_px = 8, kFarContrast = 3.5;  // from the ooplasm; likewise
   const auto look = [&](double from, double contrast, double level) -> std::optional<FollowedMembrane> {
-    const SecondEdge zona = find_in_relief(ooplasm.r, ooplasm.centre, ooplasm.relief, from,
-                                           kFurthest * median_of(ooplasm.r), picture);
-    return zona.quality > contrast &&
-                   parallel_in_relief(zona, ooplasm.r, kZonaApart_px, level * ooplasm.level, picture)
-               ? std::optional(
-                     started(ooplasm.centre, zona.path.r, Polarity::relief, zona.path.level, zona.relief))
-               : std::nullopt;
+    SecondEdge zona = find_in_relief(ooplasm.r, ooplasm.centre, ooplasm.relief, from,
+                                     kFurthest * median_of(ooplasm.r), picture);
+    if (zona.quality <= contrast ||
+        !parallel_in_relief(zona, ooplasm.r, kZonaApart_px, level * ooplasm.level, picture)) {
+      return std::nullopt;
+    }
+    follow_as_an_oval(zona.path, ooplasm, picture);
+    return started(ooplasm.centre, zona.path.r, Polarity::relief, zona.path.level, zona.relief);
   };
   if (auto near = look(std::max(wall, kNearest_px), kContrast, kZonaLevel)) {
     return near;

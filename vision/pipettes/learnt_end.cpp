@@ -61,6 +61,33 @@ std::optional<CutGlass> cut_seen(const GradientField& field, double noise, const
              : std::nullopt;
 }
 
+// Across the needle much of the picture is then its own mirror reversed, and not its own mirror.
+bool lit_from_aside(const GradientField& field, const NeedlePose& needle) {
+  constexpr double kFrom_px = 10, kEvery_px = 2, kBeside_px = 3, kReversed = 0.3;
+  constexpr int kStations = 30;
+  const auto lanes = static_cast<std::size_t>(needle.half_width + kBeside_px);
+  Vector<double> low(lanes, 0.0), high(lanes, 0.0);
+  double mean = 0;
+  for (int i = 0; i < kStations; ++i) {
+    const double s = kFrom_px + kEvery_px * i;
+    for (std::size_t k = 0; k < lanes; ++k) {
+      const double u = static_cast<double>(k) + 0.5;
+      low[k] += field.grey(needle.at(s, -u)) / kStations;
+      high[k] += field.grey(needle.at(s, u)) / kStations;
+    }
+  }
+  for (std::size_t k = 0; k < lanes; ++k) {
+    mean += (low[k] + high[k]) / (2.0 * static_cast<double>(lanes));
+  }
+  double alike = 0, reversed = 0;
+  for (std::size_t k = 0; k < lanes; ++k) {
+    const double sum = low[k] + high[k] - 2 * mean, difference = high[k] - low[k];
+    alike += sum * sum;
+    reversed += difference * difference;
+  }
+  return reversed > kReversed * alike;
+}
+
 }  // namespace
 
 // Its cut is told first: an oblique one is no line across.
@@ -168,7 +195,7 @@ std::optional<CutGlass> LearntEnd::go_to_cut(const GradientField& field, double 
     cut = cut_seen(field, noise, needle);
     further = true;
   }
-  if (cut && cut->bevel.radius > 0) {
+  if (cut) {
     go_to_point(field, noise, needle, *cut);
   }
   if (cut && further) {
@@ -183,10 +210,14 @@ std::optional<CutGlass> LearntEnd::go_to_cut(const GradientField& field, double 
 }
 
 // The point of a sharp needle in relief, by its glass: the walls alone tell how steep its cut is, and so
-// where its foremost glass lies, less surely. As it is where the glass does not explain what is seen.
+// where its foremost glass lies, less surely, and may look like those of one in bright field. As it is where
+// the glass does not explain what is seen.
 void LearntEnd::go_to_point(const GradientField& field, double noise, const NeedlePose& needle,
                             CutGlass& cut) {
-  constexpr double kReach_px = 4, kKnown_px = 0.9;
+  constexpr double kReach_px = 4, kKnown_px = 0.9, kSharp = 0.5;
+  if (!(cut.bevel.radius > 0) && (std::abs(cut.bevel.tangent) < kSharp || !lit_from_aside(field, needle))) {
+    return;
+  }
   const auto point = sharp_point(field, noise, needle, cut);
   if (!point || point->explained < kExplained || !(point->sd < kKnown_px)) {
     return;

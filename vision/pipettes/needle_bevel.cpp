@@ -23,7 +23,6 @@ constexpr double kSharpestCut = 2.8, kClearlySharp = 0.02, kClearlyCut = 0.025;
 // likelihood, twice.
 constexpr double kThanGranules = 20;
 constexpr double kSteepestFrom = 0.1;  // of the steepest: it may be steeper still
-constexpr double kLens_px = 1.2;       // blur of a lens in focus
 constexpr double kLit = 0.02;  // the picture is explained better by so much where light comes from one side
 constexpr double kOblique = 0.5;  // cut: of a blunter end in relief the walls tell the radius
 
@@ -245,9 +244,7 @@ std::optional<CutGlass> cut_of_glass(const GradientField& field, double noise, c
   } else if (!even.walls_differ()) {
     return as_in_bright_field(even, {even, back, ahead});
   }
-  // The outer flank of a face's line is steepest one blur outside of it: 0.8 to 1.1 for tubes of all usual
-  // walls.
-  const double radius = needle.half_width - math::hypot(kLens_px, field.sigma);
+  const double radius = radius_in_relief(needle.half_width, field.sigma);
   const CutModel lit(field, needle, noise, blur_px, back, ahead, CutModel::Shaft::near, radius);
   const CoarseEnds coarse(lit, back, ahead);
   if (!coarse.is_sharp) {

@@ -11,13 +11,13 @@
 
 #include "hal/math/elementary.hpp"
 #include "vision/image/kept_vector.hpp"
+#include "vision/pipettes/glass.hpp"
 
 namespace punctum::vision {
 
 namespace {
 
 constexpr double kBore = 0.65;       // of the outer radius; of usual capillaries 0.58 to 0.72
-constexpr double kLens_px = 1.2;     // blur of a lens in focus
 constexpr double kBefore_px = 0.55;  // the part of the blur that acts before the contrast
 constexpr int kFine = 2;             // samples of the path per px
 constexpr int kMargin_px = 6;        // round what is compared: the blur reaches so far
@@ -380,9 +380,11 @@ std::optional<SharpPoint> sharp_point(const GradientField& field, double noise, 
                                       const CutGlass& cut) {
   constexpr int kTries = 3, kSteps = 12;
   constexpr double kUsualRoll = 0.25, kUsualGain = 0.6, kDegree = std::numbers::pi / 180;
+  const double radius =
+      cut.bevel.radius > 0 ? cut.bevel.radius : radius_in_relief(needle.half_width, field.sigma);
   const auto lit_from = [&](double degrees) {
-    return Parameters(-cut.end.ahead, 0, cut.bevel.radius, std::abs(cut.bevel.tangent), kUsualRoll,
-                      kUsualGain, degrees * kDegree, 0);
+    return Parameters(-cut.end.ahead, 0, radius, std::abs(cut.bevel.tangent), kUsualRoll, kUsualGain,
+                      degrees * kDegree, 0);
   };
   return best_from(field, noise, needle, cut.bevel.tangent > 0 ? -1 : 1,
                    {lit_from(40), lit_from(90), lit_from(140)}, kTries, kSteps);

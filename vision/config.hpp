@@ -1,6 +1,7 @@
 // Parameters of vision, as a scene sets them. Without OpenCV, so that every program can read a scene.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -65,6 +66,13 @@ struct VisionConfig {
   double c_m = 3.8e-6;
 
   [[nodiscard]] double px(double m) const noexcept { return m / pixel_m; }
+  // So many pixels in a row, and in a column, are looked at as one: pixels finer than the lens resolves blur
+  // every edge over many of them, and add their noise. The wall of the membrane keeps four or more of them,
+  // and the radius of the smallest cell thirty-three. The keys in px count pixels that are binned.
+  [[nodiscard]] int binning() const noexcept {
+    constexpr double kWall_px = 4.5, kCell_px = 33, kMost = 16;
+    return static_cast<int>(std::clamp(std::min(px(h_m) / kWall_px, px(R_min_m) / kCell_px), 1.0, kMost));
+  }
 };
 constexpr auto keys_of(const VisionConfig*) {
   return hal::keys(hal::choice("method", &VisionConfig::method, "paper", "tracker", "truth"),

@@ -19,6 +19,48 @@ std::string verdict_on(const Result& result, const VisionConfig& config) {
   return v.empty() ? "ok" : v;
 }
 
+void tell_in_fine_pixels(Result& r, const Binning& binning) {
+  const double k = binning.by;
+  const auto place = [&](Point& p) { p = binning.fine(p); };
+  const auto lengths = [&](auto&... length) { ((length *= k), ...); };
+  const auto if_known = [&](auto&... length) { ((length ? void(*length *= k) : void()), ...); };
+  place(r.holder.mouth);
+  const Point corner = binning.fine(r.holder.box.tl() - Point(0.5, 0.5));
+  r.holder.box = {corner.x + 0.5, corner.y + 0.5, r.holder.box.width * k, r.holder.box.height * k};
+  place(r.needle.tip);
+  lengths(r.holder.sd, r.needle.sd, r.needle.constant_sd, r.needle.half_width, r.needle.point_aside);
+  for (Membrane* m : {&r.outer, &r.inner}) {
+    std::for_each(m->nodes.begin(), m->nodes.end(), place);
+    std::for_each(m->contour.begin(), m->contour.end(), place);
+    std::for_each(m->sd_px.begin(), m->sd_px.end(), lengths);
+    lengths(m->residual_px);
+  }
+  if (r.undeformed) {
+    place(r.undeformed->centre);
+    lengths(r.undeformed->r, r.undeformed->rms, r.undeformed->r_sd);
+  }
+  for (std::size_t i = 0; i < r.points.point.size(); ++i) {
+    if (r.points.point[i]) {
+      place(*r.points.point[i]);
+      lengths(r.points.behind_tip[i]);
+    }
+  }
+  if (r.entry) {
+    place(*r.entry);
+  }
+  if_known(r.inner_radius_px, r.gap_px, r.wd_px, r.a_px);
+  lengths(r.membrane_velocity_px_s, r.gap_sd_px, r.wd_sd_px, r.a_sd_px);
+  for (auto* net : {&r.outer_net, &r.inner_net}) {
+    if (*net) {
+      Section origin = Section::Zero();
+      origin.head<2>().setConstant(0.5 * (k - 1));
+      for (Section& section : (*net)->control) {
+        section = k * section + origin;
+      }
+    }
+  }
+}
+
 rt::Observation to_observation(const Result& r, const VisionConfig& config, int width, int height) {
   rt::Observation o;
   const double k = config.pixel_m;

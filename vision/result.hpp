@@ -9,6 +9,7 @@
 #include "rt/station/surface.hpp"
 #include "rt/station/telemetry.hpp"
 #include "vision/config.hpp"
+#include "vision/image/binning.hpp"
 #include "vision/membrane/membrane_following.hpp"
 #include "vision/membrane/membrane_on_needle.hpp"
 #include "vision/pipettes/holding_pipette.hpp"
@@ -63,6 +64,9 @@ struct Result {
 
 // "ok"; or what of the scene was not found, and why.
 [[nodiscard]] std::string verdict_on(const Result& result, const VisionConfig& config);
+
+// Of a binned picture, in the pixels of the one that was binned.
+void tell_in_fine_pixels(Result& result, const Binning& binning);
 
 // In metres, in the frame of the microscope: the origin is the middle of the picture, which has that size.
 [[nodiscard]] rt::Observation to_observation(const Result& result, const VisionConfig& config, int width,

@@ -57,12 +57,13 @@ void SeenCell::take(StartedMembranes&& begun, const Touch& touch, const Result& 
   outer_ = std::move(begun.outer);
   inner_ = std::move(begun.inner);
   const bool needed = touch.contact || touch.punctured || result.phase != rt::Phase::free;
-  if (outer_.known && needed && outer_rest.reliable() &&
-      undeformed_.same_cell(outer_.contour(), outer_.centre, result.needle)) {
+  const bool compared = outer_.known && needed && outer_rest.reliable();
+  if (compared && undeformed_.same_cell(outer_.contour(), outer_.centre, result.needle)) {
     outer_.rest = outer_rest;
     inner_.rest = inner_rest;
   } else {
     undeformed_.forget();
+    another_ = compared;
   }
 }
 
@@ -94,11 +95,17 @@ void SeenCell::follow(const ClearedPicture& picture, const SeenNeedle& needle, c
   doubt_outer(picture, touch, result);
   NeedlePose on_membrane = result.needle;  // its tip where the membrane on it is seen
   on_membrane.tip = needle.on_membrane(result.needle);
+  const std::optional<Point> held_at =
+      result.holder.ok && result.holder.sd > 0 ? std::optional(result.holder.mouth) : std::nullopt;
+  const std::optional<Point> carried =
+      held_at && held_at_ ? std::optional(*held_at - *held_at_) : std::nullopt;
+  held_at_ = held_at;
   const auto surroundings = [&] {
     return Surroundings{
         .needle = on_membrane,
         .last_tip = needle.last_on_membrane(),
         .expected_px = needle.expected_px(result.needle),
+        .carried = carried,
         .gone_odds = needle.membrane_gone_odds(),
         .punctured = touch.punctured,
         .wall_px = config_.px(config_.h_m),

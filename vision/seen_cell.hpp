@@ -4,6 +4,7 @@
 
 #include <opencv2/core.hpp>
 #include <optional>
+#include <utility>
 
 #include "vision/membrane/membrane_start.hpp"
 #include "vision/result.hpp"
@@ -32,6 +33,8 @@ class SeenCell {
   [[nodiscard]] bool must_start() const {
     return outer_.known ? outer_.lost() : !inner_.known || inner_.lost();
   }
+  // Once, when another one was found than the one that was touched.
+  [[nodiscard]] bool is_another() noexcept { return std::exchange(another_, false); }
   // at_once: all of the search is done in this frame. False while no membrane is known.
   [[nodiscard]] bool start(const ClearedPicture& picture, const Touch& touch, bool at_once, Result& result);
   // Sets the membranes of the result.
@@ -64,6 +67,8 @@ class SeenCell {
   int inner_missing_ = 0, next_doubt_ = kFirstDoubt;  // frames
   LearntUndeformed undeformed_;                       // of the outer one
   double entry_sd_px_ = 0;
+  bool another_ = false;
+  std::optional<Point> held_at_;  // the mouth of the holding pipette, when the cell was followed last
 };
 
 }  // namespace punctum::vision

@@ -89,12 +89,12 @@ void SeenEvents::decide(const ClearedPicture& picture, const SeenNeedle& needle,
   // A frame that does not show needle and cell changes nothing; a needle that points past the cell is off it.
   const bool unseen = !(result.needle.ok && result.outer.ok);
   in.contact = result.contact || (unseen && touch_.contact);
-  in.recoil = cell.outer().recoil_odds;
-  in.gap_px = result.gap_px.value_or(0);
+  in.recoil = result.outer.ok ? cell.outer().recoil_odds : 0;
+  in.gap_px = result.gap_px;
   in.radius_px = result.needle.half_width;
   in.points = behind_tip && result.entry;
   if (in.points) {
-    in.tip_px = -in.gap_px;
+    in.tip_px = -result.gap_px.value_or(0);
     in.membrane_px = in.tip_px - *behind_tip;
     in.depth_px = in.membrane_px;
     in.sd_px = math::hypot(kContactPoint_px, result.needle.sd) / clearness_at_needle(cell.outer(), result);

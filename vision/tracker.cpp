@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <memory>
 #include <optional>
+#include <string>
 
+#include "vision/image/binning.hpp"
 #include "vision/image/median.hpp"
 #include "vision/membrane/dimple.hpp"
 #include "vision/seen_cell.hpp"
@@ -71,14 +73,66 @@ struct Tracker::Impl {
   void reconstruct_surfaces();
 };
 
-Tracker::Tracker(const VisionConfig& config, int width, int height)
-    : impl_(std::make_unique<Impl>(config, width, height)) {}
+// Frames whose pixels are finer than the scene needs.
+struct Tracker::Binned {
+  Binning binning;
+  int width, height;  // of the frames
+  cv::Mat grey;
+  Result result;
+
+  Binned(int by, int w, int h) : binning{by}, width(w), height(h), grey(h / by, w / by, CV_8U) {}
+
+  const Result& process(Impl& impl, const hal::Frame& frame, const std::optional<Point>& stage) {
+    Stopwatch watch;
+    const std::string lacks = ClearedPicture::lacking(frame, width, height);
+    hal::Frame coarse = frame;
+    coarse.pixels = nullptr;
+    if (lacks.empty()) {
+      binning.bin(frame.pixels, frame.stride, grey);
+      coarse.pixels = grey.data;
+      coarse.width = grey.cols;
+      coarse.height = grey.rows;
+      coarse.stride = static_cast<int>(grey.step);
+    }
+    const double binning_us = watch.lap_us();
+    result = impl.process(coarse, stage ? std::optional(binning.coarse(*stage)) : std::nullopt);
+    if (!lacks.empty()) {
+      result.verdict = lacks;
+    }
+    tell_in_fine_pixels(result, binning);
+    result.us.prepare += binning_us;
+    result.us.total += binning_us;
+    return result;
+  }
+};
+
+Tracker::Tracker(const VisionConfig& config, int width, int height) {
+  const int by = config.binning();
+  VisionConfig coarse = config;
+  coarse.pixel_m *= by;
+  impl_ = std::make_unique<Impl>(coarse, width / by, height / by);
+  if (by > 1) {
+    binned_ = std::make_unique<Binned>(by, width, height);
+  }
+}
 Tracker::~Tracker() = default;
 Tracker::Tracker(Tracker&&) noexcept = default;
 Tracker& Tracker::operator=(Tracker&&) noexcept = default;
 
-void Tracker::seed_circle(const Circle& circle) { impl_->cell.seed(circle); }
-void Tracker::holder_template(const cv::Mat& pattern) { impl_->holder.use_template(pattern); }
+void Tracker::seed_circle(const Circle& circle) {
+  const Binning binning = binned_ ? binned_->binning : Binning{};
+  impl_->cell.seed({binning.coarse(circle.centre), circle.r / binning.by, circle.rms / binning.by});
+}
+void Tracker::holder_template(const cv::Mat& pattern) {
+  if (!binned_) {
+    impl_->holder.use_template(pattern);
+    return;
+  }
+  const int by = binned_->binning.by;
+  cv::Mat coarse(pattern.rows / by, pattern.cols / by, CV_8U);
+  binned_->binning.bin(pattern.data, static_cast<int>(pattern.step), coarse);
+  impl_->holder.use_template(coarse);
+}
 void Tracker::after_gap() {
   auto next = std::make_unique<Impl>(impl_->config, impl_->width, impl_->height);
   next->cell.go_on_from(impl_->cell);
@@ -90,7 +144,7 @@ void Tracker::after_gap() {
   impl_ = std::move(next);
 }
 const Result& Tracker::process(const hal::Frame& frame, const std::optional<Point>& stage) {
-  return impl_->process(frame, stage);
+  return binned_ ? binned_->process(*impl_, frame, stage) : impl_->process(frame, stage);
 }
 
 const Result& Tracker::Impl::process(const hal::Frame& frame, const std::optional<Point>& stage) {
@@ -135,6 +189,9 @@ const Result& Tracker::Impl::process(const hal::Frame& frame, const std::optiona
     if (config.method == Method::paper) {
       events.decide_as_paper(picture, needle, cell, result, watch);
     } else {
+      if (cell.is_another()) {
+        events.forget_puncture(result);
+      }
       events.decide(picture, needle, cell, result, watch);
     }
     if (!result.contact && !events.touch().contact) {  // nor while a touched cell is out of sight

@@ -12,6 +12,8 @@ namespace punctum::vision {
 
 class Tracker {
  public:
+  // width, height: of the frames. Where they are finer than the scene needs they are binned, and what they
+  // show is told in their pixels all the same.
   Tracker(const VisionConfig& config, int width, int height);
   ~Tracker();
   Tracker(Tracker&&) noexcept;
@@ -33,7 +35,9 @@ class Tracker {
 
  private:
   struct Impl;
+  struct Binned;
   std::unique_ptr<Impl> impl_;
+  std::unique_ptr<Binned> binned_;  // null: every pixel is looked at
 };
 
 }  // namespace punctum::vision

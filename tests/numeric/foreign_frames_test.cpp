@@ -439,6 +439,17 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
     const cv::Mat picture = drawn(folder, k <= deepest ? k : deepest - back * (k - deepest));
     EXPECT_FALSE(turned.process(frame_of(picture, static_cast<std::uint64_t>(k))).punctured) << k;
   }
+
+  // A table that shakes, by one pixel from frame to frame.
+  Tracker shaken(config, size.width, size.height);
+  for (int k = 0; k <= deepest; ++k) {
+    const cv::Mat still = drawn(folder, k);
+    cv::Mat picture = still.clone();
+    if (k % 2 == 1) {
+      still.colRange(0, still.cols - 1).copyTo(picture.colRange(1, picture.cols));
+    }
+    EXPECT_FALSE(shaken.process(frame_of(picture, static_cast<std::uint64_t>(k))).punctured) << k;
+  }
 }
 
 std::string name_of_film(const testing::TestParamInfo<Relief>& of) {

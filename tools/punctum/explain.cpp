@@ -248,6 +248,10 @@ std::string tick_text(const Scene& s) {
 std::string frame_text(const Scene& s) {
   const vision::VisionConfig& v = *s.vision;
   std::string out = "one frame of vision\n" + camera_text(s) + "\n";
+  if (const int by = s.vision->binning(); by > 1) {
+    out += fmt::format(
+        "                        {0} x {0} pixels are looked at as one: finer ones only blur\n", by);
+  }
   if (v.method == vision::Method::truth) {
     return out + "  truth                 the simulated world's own; no picture is drawn or looked at\n";
   }

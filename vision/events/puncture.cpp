@@ -1,6 +1,7 @@
 #include "vision/events/puncture.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace punctum::vision {
 
@@ -17,7 +18,7 @@ constexpr double kFree = 5;  // by the picture beside the needle, which says it 
 bool Puncture::update(const PunctureInput& in) {
   velocity_ = 0;
   ++frames_;
-  if (punctured_ && in.gap_px > 2 * in.radius_px) {  // away from the cell: the next puncture may come
+  if (has_left(in) && punctured_) {  // the next puncture may come
     *this = Puncture(recoil_px_);
   }
   if (in.contact && in.recoil > 0) {
@@ -44,6 +45,17 @@ bool Puncture::update(const PunctureInput& in) {
   last_ns_ = in.t_ns;
   last_membrane_ = in.membrane_px;
   return punctured_;
+}
+
+bool Puncture::has_left(const PunctureInput& in) {
+  constexpr int kFrames = 12;
+  if (!in.gap_px) {
+    ++unseen_frames_;
+    return false;
+  }
+  const bool was_away = std::exchange(unseen_frames_, 0) >= kFrames;
+  outside_frames_ = *in.gap_px > in.radius_px ? outside_frames_ + 1 : 0;
+  return *in.gap_px > 2 * in.radius_px || outside_frames_ >= kFrames || (outside_frames_ > 0 && was_away);
 }
 
 // Both signs of fig. 9: the membrane goes back in the picture, and it is not where the tip would have it. A
@@ -76,7 +88,8 @@ void Puncture::weigh_recoil(const PunctureInput& in) {
 // frame tells at the start, when no other came before; later three in a row do.
 bool Puncture::is_through_undented_membrane(const PunctureInput& in) {
   constexpr int kTakenFrames = 12;
-  const bool through = !punctured_ && -in.gap_px > 3 * in.radius_px && in.depth_px < -0.35 * in.gap_px;
+  const double inside_px = -in.gap_px.value_or(0);
+  const bool through = !punctured_ && inside_px > 3 * in.radius_px && in.depth_px < 0.35 * inside_px;
   inside_frames_ = through ? inside_frames_ + 1 : 0;
   return inside_frames_ >= (frames_ < 3 ? 1 : in.recoil < -kTaken ? kTakenFrames : 3);
 }

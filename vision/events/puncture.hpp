@@ -15,11 +15,11 @@ struct PunctureInput {
   double membrane_px = 0;  // mean place of the two contact points along the needle's axis, > 0 into the cell
   double tip_px = 0;       // place of the tip along the same axis
   double depth_px = 0;     // of the contact points past the undeformed membrane
-  double gap_px = 0;       // tip to undeformed membrane, > 0 outside
-  double radius_px = 0;    // of the needle
-  double sd_px = 0.7;      // of membrane_px
-  bool free = false;       // the picture beside the needle shows the membrane off the tip
-  double recoil = 0;       // log odds, by its motion, that it has gone back since the last frame
+  std::optional<double> gap_px = {};  // tip to undeformed membrane, > 0 outside; empty: not seen
+  double radius_px = 0;               // of the needle
+  double sd_px = 0.7;                 // of membrane_px
+  bool free = false;                  // the picture beside the needle shows the membrane off the tip
+  double recoil = 0;                  // log odds, by its motion, that it has gone back since the last frame
 };
 
 // Page's sequential test (CUSUM) on the way that the membrane has gone back further than the needle.
@@ -28,7 +28,8 @@ class Puncture {
   // recoil_px: least distance that the membrane has recoiled against the needle.
   explicit Puncture(double recoil_px) : recoil_px_(recoil_px) {}
 
-  // True from the puncture until the needle is outside the cell by more than its own diameter.
+  // True from the puncture until the needle is outside the cell by more than its own diameter; by half of
+  // that, when it stays there or was out of sight for as long.
   bool update(const PunctureInput& in);
   [[nodiscard]] bool punctured() const noexcept { return punctured_; }
   [[nodiscard]] double membrane_velocity_px_s() const noexcept { return velocity_; }
@@ -37,6 +38,7 @@ class Puncture {
   static constexpr double kUsualShare = 0.9;  // contact points lie beside the needle, a little behind its tip
   void weigh_recoil(const PunctureInput& in);
   [[nodiscard]] bool is_through_undented_membrane(const PunctureInput& in);
+  [[nodiscard]] bool has_left(const PunctureInput& in);
 
   double recoil_px_;
   bool punctured_ = false;
@@ -48,6 +50,7 @@ class Puncture {
   double tip_square_ = 0, tip_membrane_ = 0;  // means over the frames: tip^2, tip times membrane
   std::array<double, 4> before_{};            // membrane_px of the frames before, the newest at places_ - 1
   std::size_t places_ = 0;
+  int outside_frames_ = 0, unseen_frames_ = 0;  // in a row
   int inside_frames_ = 0;    // in a row with the tip inside a membrane that is hardly dented
   double evidence_ = 0;      // log odds of a recoil against none, over the frames since there was none
   std::int64_t frames_ = 0;  // since the start or the last reset

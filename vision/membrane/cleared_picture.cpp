@@ -55,6 +55,23 @@ bool has_contrast(const cv::Mat& grey) {
   return false;
 }
 
+// As in the dark: means over some pixels in a row differ as their noise makes them.
+bool shows_noise_alone(const cv::Mat& grey, double noise) {
+  constexpr int kPart_px = 8, kEveryRow = 16;
+  constexpr double kMost = 1.5;  // of the variance that noise gives; of thousands of them it is known to 3 %
+  double sum = 0, squares = 0, n = 0;
+  for (int y = 0; y < grey.rows; y += kEveryRow) {
+    const std::uint8_t* row = grey.ptr(y);
+    for (int x = 0; x + kPart_px <= grey.cols; x += kPart_px) {
+      const double mean = static_cast<double>(sums_of(row + x, kPart_px).values) / kPart_px;
+      sum += mean;
+      squares += mean * mean;
+      ++n;
+    }
+  }
+  return n > 0 && squares - sum * sum / n < n * kMost * noise * noise / kPart_px;
+}
+
 // Rows of n pixels; short loops, which the compiler vectorises.
 PUNCTUM_WIDE_LOOP void longer(const float* slope, int n, float square, std::uint8_t* out) {
   for (int i = 0; i < n; ++i) {
@@ -69,18 +86,26 @@ PUNCTUM_WIDE_LOOP void without(const std::uint8_t* v, const std::uint8_t* hidden
   }
 }
 
+std::string size_text(int w, int h) { return std::to_string(w) + "x" + std::to_string(h); }
+
 }  // namespace
 
-std::string ClearedPicture::load(const hal::Frame& frame, int width, int height) {
-  const auto size = [](int w, int h) { return std::to_string(w) + "x" + std::to_string(h); };
+std::string ClearedPicture::lacking(const hal::Frame& frame, int width, int height) {
   if (frame.pixels == nullptr || frame.width <= 0 || frame.height <= 0 || frame.stride < frame.width) {
     return "no picture";
   }
   if (frame.width != width || frame.height != height) {
-    return "size " + size(frame.width, frame.height) + " instead of " + size(width, height);
+    return "size " + size_text(frame.width, frame.height) + " instead of " + size_text(width, height);
+  }
+  return {};
+}
+
+std::string ClearedPicture::load(const hal::Frame& frame, int width, int height) {
+  if (std::string lacks = lacking(frame, width, height); !lacks.empty()) {
+    return lacks;
   }
   if (width < kSmallest_px || height < kSmallest_px) {
-    return "picture too small: at least " + size(kSmallest_px, kSmallest_px) + " is needed";
+    return "picture too small: at least " + size_text(kSmallest_px, kSmallest_px) + " is needed";
   }
   // OpenCV has no matrix over constant data.
   grey = cv::Mat(height, width, CV_8U, const_cast<std::uint8_t*>(frame.pixels),
@@ -89,6 +114,9 @@ std::string ClearedPicture::load(const hal::Frame& frame, int width, int height)
     return "no contrast: every pixel is about " + std::to_string(std::lround(cv::mean(grey)[0]));
   }
   noise = std::max(noise_level(grey), kLeastNoise);
+  if (shows_noise_alone(grey, noise)) {
+    return "nothing but noise round " + std::to_string(std::lround(cv::mean(grey)[0]));
+  }
   return {};
 }
 

@@ -24,6 +24,8 @@ struct ClearedPicture {
   cv::Mat covered;  // CV_8U, the whole picture: 255 = pipette or impurity
   cv::Mat strong;   // CV_8U, field.area: 255 = strong gradient, with the pipettes, without the impurities
 
+  // Why the frame is no picture of this size; empty when it is one.
+  [[nodiscard]] static std::string lacking(const hal::Frame& frame, int width, int height);
   // The frame, which must have this size; `grey` lies on its pixels. Returns why it cannot be used; empty
   // when it can.
   [[nodiscard]] std::string load(const hal::Frame& frame, int width, int height);

@@ -320,8 +320,9 @@ std::optional<double> odds_of_recoil(FollowedMembrane& m, const MembraneSearch& 
       // A hand that turns back at once is seen to; a tip that seems to jump ahead has not.
       const double moved_px =
           s.last_tip ? std::min(s.expected_px, (n.tip - *s.last_tip).dot(n.axis)) : s.expected_px;
-      const auto odds =
-          m.recoil.update(search.picture, n, *entry, moved_px, m.level, down_to_the_inner(search, *entry));
+      const auto odds = m.recoil.update(search.picture, n, *entry,
+                                        s.carried ? std::optional(s.carried->dot(n.axis)) : std::nullopt,
+                                        moved_px, m.level, down_to_the_inner(search, *entry));
       const bool pushed = std::max(m.dimple_px, search.depth_of_tip()) > kHardly_px;
       return odds && !pushed ? std::min(*odds, 0.0) : odds;
     }

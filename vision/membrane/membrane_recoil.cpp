@@ -108,13 +108,18 @@ void MembraneRecoil::compare(double noise, Unlike& unlike) const {
 }
 
 std::optional<double> MembraneRecoil::update(const ClearedPicture& picture, const NeedlePose& needle,
-                                             const Point& entry, double moved_px, double level,
-                                             double below_px) {
+                                             const Point& entry, std::optional<double> carried_px,
+                                             double moved_px, double level, double below_px) {
   // By which it may go back and go on, in a frame.
   constexpr double kBack_px = 12, kOn_px = 3, kReach_px = kPlace_px * (kMost - 1);
   // It follows a tip that goes back, which is seen less exactly while it is fast.
   constexpr double kLetsGo_px = 1, kFollows = 1.5;
   look(picture, needle, entry, below_px);
+  const double entry_moved = (entry - std::exchange(entry_, entry)).dot(needle.axis);
+  // Of all that is beside the needle, against the entry.
+  const double together =
+      std::clamp(carried_px.value_or(entry_moved) - entry_moved, -kReach_px / 2, kReach_px / 2);
+  moved_px -= carried_px.value_or(0);
   const double taken_from = kFollows * std::min(moved_px, 0.0) - kLetsGo_px;
   if (!std::exchange(seen_, true) || taken_from <= -kReach_px) {
     return std::nullopt;
@@ -133,7 +138,8 @@ std::optional<double> MembraneRecoil::update(const ClearedPicture& picture, cons
     for (double by = from; by <= to; by += kPlace_px) {
       double sum = 0;
       for (std::size_t k = 0; k < kLanes; ++k) {
-        const double shift = static_cast<double>(kMost) + by * share[k] / kPlace_px;
+        const double px = std::clamp(together + by * share[k], -kReach_px, kReach_px);
+        const double shift = static_cast<double>(kMost) + px / kPlace_px;
         const std::size_t whole = static_cast<std::size_t>(shift);
         const double part = shift - static_cast<double>(whole);
         sum += (1 - part) * static_cast<double>(unlike[k][whole]) +

@@ -13,14 +13,15 @@ namespace punctum::vision {
 
 class MembraneRecoil {
  public:
-  // entry: where the needle meets the outline at rest, which moves with the cell. moved_px: of the tip along
-  // the axis since the last frame. level: usual edge, grey levels per px. below_px: from the entry, how far
-  // down nothing but this membrane moves. Log odds that the membrane has gone
+  // entry: where the needle meets the outline at rest, which is expected to move with the cell. carried_px:
+  // by which the cell has moved along the axis since the last frame, where that is known better; moved_px: so
+  // much has the tip. level: usual edge, grey levels per px. below_px: from the entry, how far down nothing
+  // but this membrane moves. Log odds that the membrane has gone
   // back against the tip, against that it stayed or went on with it; empty where the last frame was not seen,
   // or the tip went back too far to tell.
   [[nodiscard]] std::optional<double> update(const ClearedPicture& picture, const NeedlePose& needle,
-                                             const Point& entry, double moved_px, double level,
-                                             double below_px);
+                                             const Point& entry, std::optional<double> carried_px,
+                                             double moved_px, double level, double below_px);
   void forget() noexcept { seen_ = false; }
 
  private:
@@ -41,6 +42,7 @@ class MembraneRecoil {
   [[nodiscard]] const Lanes& last() const noexcept { return lanes_[1 - now_]; }
 
   bool seen_ = false;
+  Point entry_;
   std::size_t now_ = 0;
   std::array<Lanes, 2> lanes_{};
 };

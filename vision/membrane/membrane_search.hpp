@@ -16,6 +16,7 @@ struct Surroundings {
   const NeedlePose& needle;
   std::optional<Point> last_tip;  // one frame ago
   double expected_px = 0;         // by which it has moved since, along the axis
+  std::optional<Point> carried;   // by which the cell has moved since, with what holds it
   double gone_odds = 0;           // log odds, across the needle's mouth, that the membrane is not on the tip
   bool punctured = false;
   double wall_px = 0;                        // of the outer membrane, by the scene

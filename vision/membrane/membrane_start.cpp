@@ -341,8 +341,9 @@ std::optional<StartedMembranes> CellSearch::advance(const ClearedPicture& pictur
     if (!circles_.empty()) {
       return std::nullopt;
     }
-    nothing.reason = "no circle found between " + std::to_string(std::lround(config.px(config.R_min_m))) +
-                     " and " + std::to_string(std::lround(config.px(config.R_max_m))) + " px radius";
+    const auto um = [](double m) { return std::to_string(std::lround(m * 1e6)); };
+    nothing.reason =
+        "no circle found between " + um(config.R_min_m) + " and " + um(config.R_max_m) + " um radius";
     return nothing;
   }
   if (!circles_.empty()) {

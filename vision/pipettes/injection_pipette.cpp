@@ -346,11 +346,18 @@ NeedlePose InjectionPipette::follow(const GradientField& field, double noise) {
   const Point across(-last_.axis.y, last_.axis.x);
   needle.tip = last_.tip + velocity_;
   needle.tip += aside(field, noise, needle, (correlated - needle.tip).dot(across)) * across;
-  const LearntEnd::Seen end = end_.find(field, noise, longest_, needle);
+  LearntEnd::Seen end = end_.find(field, noise, longest_, needle);
+  if (end == LearntEnd::Seen::no && lost_ > 0) {  // it may have gone further than an end is looked for
+    needle.tip = correlated;
+    needle.axis = last_.axis;
+    needle.half_width = last_.half_width;
+    needle.taper = last_.taper;
+    end = end_.find(field, noise, longest_, needle);
+  }
   if (end == LearntEnd::Seen::no) {
     needle.reason = "end of the needle not seen";
     velocity_ = {};
-    ++lost_;
+    search_next_ = ++lost_ > kLostMax;
     return needle;
   }
   const bool near = end == LearntEnd::Seen::near;

@@ -310,7 +310,7 @@ class EndModel {
     const int shift = (at.first + t) / kFinePerRow;  // row of the picture on the first one of the end
     const int from = std::clamp(shift, 0, rows), to = std::clamp(shift + shown, from, rows);
     const auto first = static_cast<std::size_t>(from), last = static_cast<std::size_t>(to),
-               p = static_cast<std::size_t>(std::max(from - shift, 0)), q = p + (last - first);
+               p = static_cast<std::size_t>(std::clamp(from - shift, 0, shown)), q = p + (last - first);
     const auto [a0, a1, b0] =
         products_with(at.step.data() + p, at.step_place.data() + p, at.line.data() + p,
                       on_walls_.strength.data() + first, on_line_.data() + first, last - first);

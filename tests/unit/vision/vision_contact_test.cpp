@@ -243,6 +243,37 @@ struct Script {
   }
 };
 
+// Whether a puncture is still told of a needle that lies so far outside, after frames in which it was not
+// seen.
+bool told_outside(int unseen, double gap_px, int frames) {
+  Script s;
+  s.push(20);
+  for (int i = 0; i < 4; ++i) {
+    s.step(21, 2);
+  }
+  EXPECT_TRUE(s.puncture.punctured());
+  for (int i = 0; i < unseen; ++i) {
+    PunctureInput in;
+    in.t_ns = s.t += 40'000'000;
+    (void)s.puncture.update(in);
+  }
+  EXPECT_TRUE(s.puncture.punctured());
+  for (int i = 0; i < frames; ++i) {
+    s.step(-gap_px, 0, false);
+  }
+  return s.puncture.punctured();
+}
+
+TEST(Puncture, is_over_when_the_needle_has_left_the_cell) {
+  EXPECT_FALSE(told_outside(0, 9.5, 1));
+  EXPECT_TRUE(told_outside(0, 8, 5));  // its membrane may still hang on it
+  EXPECT_FALSE(told_outside(0, 8, 15));
+  EXPECT_FALSE(told_outside(30, 8, 1));  // it has been away
+  EXPECT_TRUE(told_outside(5, 8, 1));
+  EXPECT_TRUE(told_outside(30, -8, 1));
+  EXPECT_TRUE(told_outside(30, 2, 15));
+}
+
 TEST(Puncture, is_the_recoil_of_the_membrane_while_the_needle_goes_on) {
   Script s;
   s.push(20);

@@ -677,6 +677,19 @@ TEST(WideNeedle, that_is_blunt_ends_where_its_glass_begins_in_relief) {
   }
 }
 
+// The rows of the picture then lie behind all that an end is compared by.
+TEST(WideNeedle, that_ends_beyond_the_border_of_the_picture_is_told_nowhere) {
+  const Tube tube{.tangent = 0, .light_deg = 45, .tip = 150, .widens = 0, .gain = 30};
+  const GradientField field = lit(tube);
+  NeedlePose pose;
+  pose.half_width = tube.radius + 0.6;
+  for (const double beyond_px : {20.0, 40.0, 60.0, 90.0}) {
+    pose.tip = {static_cast<double>(field.area.width) + beyond_px, kAxis_y};
+    pose.axis = {1, 0};
+    EXPECT_FALSE(end_of_glass(field, kWideNoise, pose, 0, 6, 6, true)) << beyond_px;
+  }
+}
+
 // With light along it a line across its end shows, with light across it what its sides show begins there.
 TEST(ThinNeedle, ends_where_its_glass_does_wherever_light_comes_from) {
   constexpr double kEnd_px = 0.45, kDeviations = 2.5, kRadius = 2.8, kBlur_px = 0.5;

@@ -20,6 +20,8 @@ constexpr double kHalfWidth_px = 5, kLevel = 4;
 // A needle from the right meets the cell at the entry.
 struct Scene {
   Point entry{130, 80};
+  double shaken_px =
+      0;  // of all that is in the picture, along x; where the entry is expected does not follow
   std::mt19937 random{7};
   MembraneRecoil recoil;
 
@@ -38,7 +40,7 @@ struct Scene {
     for (int y = 0; y < kHeight; ++y) {
       const double u = (y - entry.y) / wide_px, f = std::abs(u) < 1 ? (1 - u * u) * (1 - u * u) : 0;
       for (int x = 0; x < kWidth; ++x) {
-        const double at = x + depth_px * f - entry.x;
+        const double at = x + depth_px * f - entry.x - shaken_px;
         double grey = 140;
         for (int k = 1; k <= 4; ++k) {
           const double turn = 2.4 * k, wave = 2 * std::numbers::pi / (7.0 + 4 * k);
@@ -52,13 +54,14 @@ struct Scene {
 
   std::optional<double> see(double dimple_px, double tip_px, double moved_px, double wide_px = 22,
                             double noise = 5, const Vector<Polygon>& covered = {},
-                            double below_px = std::numeric_limits<double>::infinity()) {
+                            double below_px = std::numeric_limits<double>::infinity(),
+                            std::optional<double> carried_px = std::nullopt) {
     const cv::Mat pixels = draw(dimple_px, wide_px, noise);
     ClearedPicture picture;
     EXPECT_EQ(picture.load(test::frame_of(pixels), kWidth, kHeight), "");
     picture.compute_gradient({0, 0, kWidth, kHeight});
     picture.cover(covered);
-    return recoil.update(picture, needle(tip_px), entry, moved_px, kLevel, below_px);
+    return recoil.update(picture, needle(tip_px - shaken_px), entry, carried_px, moved_px, kLevel, below_px);
   }
 };
 
@@ -95,6 +98,22 @@ TEST(MembraneRecoil, is_not_told_of_a_cell_that_moves_as_a_whole) {
   EXPECT_LT(scene.see(8, 8, 0).value(), 0);
 }
 
+// The needle points to -x, so what goes back goes to +x.
+TEST(MembraneRecoil, is_not_told_of_a_picture_that_shakes_where_what_holds_the_cell_shows_that) {
+  for (const double by_px : {-2.0, -1.0, -0.5, 0.5, 1.0, 2.0}) {
+    for (const bool gives_way : {false, true}) {
+      Scene scene;
+      (void)scene.see(8, 8, 1);
+      scene.shaken_px = by_px;
+      const auto odds = scene.see(gives_way ? 4 : 9, 9, 1 - by_px, 22, 5, {},
+                                  std::numeric_limits<double>::infinity(), -by_px);
+      ASSERT_TRUE(odds);
+      EXPECT_EQ(*odds > 3, gives_way) << by_px << ' ' << *odds;
+      EXPECT_EQ(*odds < 0, !gives_way) << by_px << ' ' << *odds;
+    }
+  }
+}
+
 // As a yolk far below a chorion does.
 TEST(MembraneRecoil, is_told_by_what_lies_above_another_membrane_that_stays) {
   constexpr double kDown_px = 14;
@@ -109,7 +128,7 @@ TEST(MembraneRecoil, is_told_by_what_lies_above_another_membrane_that_stays) {
     EXPECT_EQ(picture.load(test::frame_of(both), kWidth, kHeight), "");
     picture.compute_gradient({0, 0, kWidth, kHeight});
     picture.cover({});
-    return scene.recoil.update(picture, scene.needle(tip_px), scene.entry, 1, kLevel, below_px);
+    return scene.recoil.update(picture, scene.needle(tip_px), scene.entry, std::nullopt, 1, kLevel, below_px);
   };
   for (const double below : {kDown_px - 4, std::numeric_limits<double>::infinity()}) {
     Scene scene;

@@ -266,6 +266,92 @@ TEST(Tracker, follows_a_whole_injection_within_its_errors) {
                                         Phase::withdrawal, Phase::clear}));
 }
 
+// Every pixel as so many equal ones: what is seen is the same, and told in the pixels of the frame.
+TEST(Tracker, tells_in_its_own_pixels_what_a_frame_finer_than_needed_shows) {
+  constexpr int kFiner = 3;
+  VisionConfig coarse, fine;
+  coarse.surface = fine.surface = true;
+  fine.pixel_m /= kFiner;
+  Tracker one(coarse, kW, kH), other(fine, kFiner * kW, kFiner * kH + 2);
+  const auto place = [](const Point& p) { return kFiner * (p + Point(0.5, 0.5)) - Point(0.5, 0.5); };
+  const auto expect_same_place = [&](const Point& a, const Point& b) {
+    EXPECT_LT(cv::norm(place(a) - b), 1e-9);
+  };
+  const auto expect_same_length = [](double a, double b) { EXPECT_NEAR(kFiner * a, b, 1e-9); };
+  int dented = 0;
+  for (const auto& [tip, depth] :
+       {std::pair{kR + 9, 0.0}, {kR + 7, 0.0}, {kR - 1, 1.0}, {kR - 4, 4.0}, {kR - 7, 7.0}}) {
+    const cv::Mat m = draw({.tip = kCentre.x + tip, .dent = depth});
+    cv::Mat big;
+    cv::resize(m, big, {}, kFiner, kFiner, cv::INTER_NEAREST);
+    cv::copyMakeBorder(big, big, 0, 2, 0, 0, cv::BORDER_REPLICATE);  // rows that make no whole pixel
+    const Result& a = one.process(frame_of(m), Point(tip, 3));
+    const Result& b = other.process(frame_of(big), place(Point(tip, 3)));
+    ASSERT_EQ(a.verdict, "ok");
+    ASSERT_EQ(b.verdict, "ok");
+    EXPECT_EQ(a.contact, b.contact);
+    dented += b.wd_px.value_or(0) > 1 ? 1 : 0;
+    expect_same_place(a.needle.tip, b.needle.tip);
+    expect_same_place(a.holder.mouth, b.holder.mouth);
+    expect_same_place(a.holder.box.tl() - Point(0.5, 0.5), b.holder.box.tl() - Point(0.5, 0.5));
+    expect_same_place(a.undeformed->centre, b.undeformed->centre);
+    expect_same_place(*a.entry, *b.entry);
+    expect_same_length(a.needle.half_width, b.needle.half_width);
+    expect_same_length(a.needle.sd, b.needle.sd);
+    expect_same_length(a.holder.sd, b.holder.sd);
+    expect_same_length(a.undeformed->r, b.undeformed->r);
+    expect_same_length(*a.inner_radius_px, *b.inner_radius_px);
+    expect_same_length(*a.gap_px, *b.gap_px);
+    expect_same_length(a.gap_sd_px, b.gap_sd_px);
+    ASSERT_EQ(a.wd_px.has_value(), b.wd_px.has_value());
+    expect_same_length(a.wd_px.value_or(0), b.wd_px.value_or(0));
+    expect_same_length(a.wd_sd_px, b.wd_sd_px);
+    expect_same_length(a.a_px.value_or(0), b.a_px.value_or(0));
+    expect_same_length(a.a_sd_px, b.a_sd_px);
+    expect_same_length(a.membrane_velocity_px_s, b.membrane_velocity_px_s);
+    for (std::size_t i = 0; i < 2; ++i) {
+      ASSERT_EQ(a.points.point[i].has_value(), b.points.point[i].has_value());
+      if (a.points.point[i]) {
+        expect_same_place(*a.points.point[i], *b.points.point[i]);
+        expect_same_length(a.points.behind_tip[i], b.points.behind_tip[i]);
+      }
+    }
+    for (const auto& [small, large] : {std::pair{&a.outer, &b.outer}, {&a.inner, &b.inner}}) {
+      ASSERT_EQ(small->contour.size(), large->contour.size());
+      for (std::size_t i = 0; i < small->contour.size(); ++i) {
+        expect_same_place(small->contour[i], large->contour[i]);
+        expect_same_length(small->sd_px[i], large->sd_px[i]);
+      }
+    }
+    // In metres, in the frame of the microscope: the middle of the picture is its origin.
+    const auto seen = to_observation(a, coarse, kW, kH),
+               finer = to_observation(b, fine, kFiner * kW, kFiner * kH);
+    EXPECT_NEAR(seen.tip_m[0], finer.tip_m[0], 1e-14);
+    EXPECT_NEAR(seen.tip_m[1], finer.tip_m[1], 1e-14);
+    const rt::CellSurface net = to_surface(a, coarse, kW, kH),
+                          finer_net = to_surface(b, fine, kFiner * kW, kFiner * kH);
+    ASSERT_TRUE(net.has(rt::CellSurface::outer_ok) && finer_net.has(rt::CellSurface::outer_ok));
+    for (std::size_t i = 0; i < std::size(net.outer.control_m); ++i) {
+      for (std::size_t k = 0; k < std::size(net.outer.control_m[i]); ++k) {
+        EXPECT_NEAR(net.outer.control_m[i][k], finer_net.outer.control_m[i][k], 1e-13);
+      }
+    }
+  }
+  EXPECT_GE(dented, 1);
+  EXPECT_EQ(other.process(frame_of(draw({}))).verdict, "size 640x420 instead of 1920x1262");
+}
+
+TEST(Binning, makes_of_each_block_its_mean) {
+  for (const int by : {2, 3, 7, 16}) {
+    cv::Mat fine(5 * by + 1, 70 * by + by - 1, CV_8U), coarse(5, 70, CV_8U), theirs;
+    cv::randu(fine, 0, 256);
+    Binning{by}.bin(fine.data, static_cast<int>(fine.step), coarse);
+    cv::resize(fine(cv::Rect(0, 0, 70 * by, 5 * by)), theirs, coarse.size(), 0, 0, cv::INTER_AREA);
+    EXPECT_LE(cv::norm(coarse, theirs, cv::NORM_INF), 1) << by;
+    EXPECT_LT(std::abs(cv::mean(coarse)[0] - cv::mean(theirs)[0]), 0.2) << by;
+  }
+}
+
 // The time of a stage that did not run is 0.
 TEST(Tracker, does_not_look_for_what_a_scene_does_not_have) {
   const double surface = kCentre.x + kR;
@@ -470,6 +556,56 @@ TEST(Tracker, outlives_a_pose_that_jumps) {
   }
   const Drawing drawn{.tip = tip, .seed = 99};
   EXPECT_TRUE(tracker.process(frame_of(draw(drawn), n), Point(tip, kCentre.y)).needle.ok);
+}
+
+// Of a camera that stops for some frames.
+TEST(Tracker, finds_a_needle_again_wherever_along_its_line_it_has_gone) {
+  for (const double back : {30.0, 45.0, 60.0}) {
+    for (const bool by_stage : {false, true}) {
+      Tracker tracker({}, kW, kH);
+      std::uint64_t n = 0;
+      const auto look = [&](double tip) -> const Result& {
+        const Drawing drawn{.tip = tip, .seed = static_cast<unsigned>(n) + 1};
+        return tracker.process(frame_of(draw(drawn), n++),
+                               by_stage ? std::optional(Point(tip, kCentre.y)) : std::nullopt);
+      };
+      for (double tip = 375; tip > 365; tip -= 2) {
+        ASSERT_TRUE(look(tip).needle.ok);
+      }
+      bool found = false;
+      for (int frame = 0; frame < 8 && !found; ++frame) {
+        const Result& r = look(365 + back);
+        found = r.needle.ok && std::abs(r.needle.tip.x - 365 - back) < 1;
+      }
+      EXPECT_TRUE(found) << back << by_stage;
+    }
+  }
+}
+
+TEST(Tracker, learns_nothing_from_pictures_taken_in_the_dark) {
+  Tracker tracker({}, kW, kH);
+  std::uint64_t n = 0;
+  const auto look = [&](double tip, double depth) -> const Result& {
+    const cv::Mat m = draw({.tip = tip, .dent = depth, .seed = static_cast<unsigned>(n) + 1});
+    return tracker.process(frame_of(m, n++));
+  };
+  const double surface = kCentre.x + kR;
+  for (double d = -8; d < 6; d += 1) {
+    (void)look(surface - d, std::max(d, 0.0));
+  }
+  cv::Mat dark(kH, kW, CV_8U);
+  for (const auto& [mean, sd] : {std::pair{2, 1.2}, {8, 2.0}, {2, 4.0}, {60, 20.0}}) {
+    for (int k = 0; k < 5; ++k) {
+      cv::randn(dark, mean, sd);
+      const Result& r = tracker.process(frame_of(dark, n++));
+      EXPECT_EQ(r.verdict.rfind("nothing but noise", 0), 0U) << r.verdict;
+      EXPECT_FALSE(r.needle.ok || r.outer.ok || r.inner.ok || r.contact || r.punctured);
+    }
+  }
+  const Result& r = look(surface - 6, 6);
+  EXPECT_EQ(r.verdict, "ok");
+  EXPECT_TRUE(r.contact);
+  EXPECT_FALSE(r.punctured);
 }
 
 TEST(Tracker, finds_a_needle_on_and_beside_which_specks_lie) {

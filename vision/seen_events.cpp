@@ -1,6 +1,7 @@
 #include "vision/seen_events.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "hal/math/elementary.hpp"
 #include "vision/membrane/dimple.hpp"
@@ -14,6 +15,8 @@ constexpr double kBeside_px = 12;         // further outside, no membrane lies o
 constexpr double kTouchesFrom_px = -3;    // further inside, it has touched before
 constexpr double kTouchesTo_px = 8;       // further outside, it does not touch in the next frame
 constexpr double kLeastDimple_px = 0.7;   // depth from which the width of a dimple can be measured
+constexpr double kUnsharp = 1.6;          // times as blurred
+constexpr double kRefocused_px = 0.5;     // in blur, against the frames before
 constexpr double kContactPoint_px = 0.7;  // standard deviation of a membrane on the needle's side
 // In relief, of the membrane at rest where the needle enters: how far beside what is seen its face lies,
 // differs round a cell.
@@ -97,8 +100,15 @@ void SeenEvents::decide(const ClearedPicture& picture, const SeenNeedle& needle,
     in.tip_px = -result.gap_px.value_or(0);
     in.membrane_px = in.tip_px - *behind_tip;
     in.depth_px = in.membrane_px;
-    in.sd_px = math::hypot(kContactPoint_px, result.needle.sd) / clearness_at_needle(cell.outer(), result);
-    in.free = !cell.outer().held;
+    // Out of the focus in which they touched, more than the membrane lies on the needle.
+    const EdgeLearnt& edge = cell.outer().edge;
+    touched_blur_px_ = touch_.contact && touched_blur_px_ > 0 ? touched_blur_px_ : edge.own_blur_px;
+    const double blurred = touched_blur_px_ > 0 ? std::max(1.0, edge.blur_now_px / touched_blur_px_) : 1;
+    in.sd_px = blurred * blurred * math::hypot(kContactPoint_px, result.needle.sd) /
+               clearness_at_needle(cell.outer(), result);
+    in.unsharp = blurred > kUnsharp;
+    in.free = !cell.outer().held && !in.unsharp;
+    in.refocused = std::abs(edge.blur_now_px - edge.own_blur_px) > kRefocused_px;
   }
   touch_.punctured = result.punctured = puncture_.update(in);
   result.inner_punctured = inner_puncture_.update(result.punctured, inner_on_needle(cell.inner(), result),

@@ -44,6 +44,7 @@ class SeenEvents {
 
   const VisionConfig& config_;
   Touch touch_;
+  double touched_blur_px_ = 0;  // of the outer membrane, when the needle touched it
   ContactTest contact_;
   Puncture puncture_;
   InnerPuncture inner_puncture_;

@@ -10,8 +10,9 @@ constexpr double kDecides =
     13.8;                        // log of a million: in so many frames a membrane that holds may be mistaken
 constexpr double kOneFrame = 9;  // at most by the contact points of one frame, which may be mistaken ones
 constexpr double kLearnt = 0.2;  // of a frame, of the membrane's share of the tip's depth
-constexpr double kLittle_px2 = 4;  // as much counts the usual share as a frame with the tip 2 px deep
-constexpr double kTaken = 3;       // log odds against a recoil, from which contact points are mistaken
+constexpr double kLittle_px2 = 4;         // as much counts the usual share as a frame with the tip 2 px deep
+constexpr double kRefocusedFrames = 0.5;  // as much counts one in which the focus has changed
+constexpr double kTaken = 3;              // log odds against a recoil, from which contact points are mistaken
 constexpr double kFree = 5;  // by the picture beside the needle, which says it with log odds of 3 or more
 }  // namespace
 
@@ -62,6 +63,14 @@ bool Puncture::has_left(const PunctureInput& in) {
 // membrane that holds lies at the same share of the tip's depth from frame to frame; a punctured one gives up
 // a quarter of that at least.
 void Puncture::weigh_recoil(const PunctureInput& in) {
+  if (in.refocused) {
+    evidence_ = 0;
+    places_ = 0;
+    tip_square_ = kRefocusedFrames * in.tip_px * in.tip_px;
+    tip_membrane_ = kRefocusedFrames * in.tip_px * in.membrane_px;
+    share_ = (tip_membrane_ + kUsualShare * kLittle_px2) / (tip_square_ + kLittle_px2);
+    return;
+  }
   const double pushed = share_ * in.tip_px;
   const double least = std::max(recoil_px_, 0.25 * pushed);
   const double off = pushed - in.membrane_px;
@@ -89,7 +98,8 @@ void Puncture::weigh_recoil(const PunctureInput& in) {
 bool Puncture::is_through_undented_membrane(const PunctureInput& in) {
   constexpr int kTakenFrames = 12;
   const double inside_px = -in.gap_px.value_or(0);
-  const bool through = !punctured_ && inside_px > 3 * in.radius_px && in.depth_px < 0.35 * inside_px;
+  const bool through =
+      !punctured_ && !in.unsharp && inside_px > 3 * in.radius_px && in.depth_px < 0.35 * inside_px;
   inside_frames_ = through ? inside_frames_ + 1 : 0;
   return inside_frames_ >= (frames_ < 3 ? 1 : in.recoil < -kTaken ? kTakenFrames : 3);
 }

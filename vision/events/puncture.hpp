@@ -19,6 +19,8 @@ struct PunctureInput {
   double radius_px = 0;               // of the needle
   double sd_px = 0.7;                 // of membrane_px
   bool free = false;                  // the picture beside the needle shows the membrane off the tip
+  bool refocused = false;             // what lies on the needle is told elsewhere than before
+  bool unsharp = false;               // far out of the focus in which they touched: a dent hardly shows
   double recoil = 0;                  // log odds, by its motion, that it has gone back since the last frame
 };
 

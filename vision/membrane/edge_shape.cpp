@@ -84,6 +84,7 @@ std::optional<SeenOutline> shaped_once(const ClearedPicture& picture, const Cont
     return std::nullopt;
   }
   constexpr double kPart = 0.3;
+  learnt.blur_now_px = steps->blur_px;
   learnt.own_blur_px += (learnt.own_blur_px == 0 ? 1 : kPart) * (steps->blur_px - learnt.own_blur_px);
   if (apart) {
     const double part = learnt.nearby_height == 0 ? 1 : kPart;

@@ -42,6 +42,7 @@ struct EdgeLearnt {
   bool halo = false;                      // in the last frame
   double nearby_height = 0, blur_px = 0;  // of the nearby edge: half of its change of grey, outwards
   double own_blur_px = 0;                 // 0: not known
+  double blur_now_px = 0;                 // of the last frame
   // What all profiles had in common in the last frame, and how single ones differed from it.
   Vector<double> shape, spread;
   Vector<double> turning;  // what they show the more of the more they face `relief`; empty: not in relief

@@ -104,6 +104,17 @@ TEST_F(FilesTest, where_there_is_no_room_the_old_file_stays_and_no_half_of_the_n
   EXPECT_EQ(files(), 1U);
 }
 
+TEST_F(FilesTest, what_has_the_name_of_a_work_file_is_not_written_to) {
+  const fs::path file = folder_ / "a.csv", mine = folder_ / "mine";
+  ASSERT_TRUE(write_whole(mine, "mine"));
+  fs::create_symlink(mine, unfinished(file));
+  ASSERT_TRUE(write_whole(file, "new"));
+  EXPECT_EQ(read_all(file), "new");
+  EXPECT_EQ(read_all(mine), "mine");
+  EXPECT_TRUE(fs::is_symlink(unfinished(file)));
+  EXPECT_EQ(files(), 3U);
+}
+
 TEST_F(FilesTest, a_folder_that_is_not_there_is_an_error_and_a_device_is_written_directly) {
   EXPECT_FALSE(write_whole(folder_ / "nowhere" / "a.csv", "x"));
   EXPECT_TRUE(write_whole("/dev/null", "x"));

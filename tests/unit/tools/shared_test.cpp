@@ -138,6 +138,23 @@ TEST_F(FilesTest, what_is_no_file_or_too_large_is_not_read_to_its_end) {
   EXPECT_EQ(read_whole(large).error(), large.string() + ": too large, allowed: at most 64 MB");
 }
 
+TEST_F(FilesTest, a_table_that_is_no_file_has_no_rows) {
+  const fs::path pipe = folder_ / "pipe";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  for (const fs::path& none : {pipe, fs::path("/dev/zero")}) {
+    CsvReader table(none);
+    EXPECT_TRUE(table.is_empty());
+    EXPECT_FALSE(table.next());
+  }
+}
+
+TEST_F(FilesTest, rows_do_not_wait_for_somebody_to_read_a_pipe) {
+  const fs::path pipe = folder_ / "pipe";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(RowFile::open(pipe, RowFile::Begin::empty).error(),
+            pipe.string() + ": cannot be written: nobody reads it");
+}
+
 TEST_F(FilesTest, an_output_is_the_same_file_by_whatever_name) {
   const fs::path file = folder_ / "a.csv", link = folder_ / "link";
   EXPECT_TRUE(same_file(file, folder_ / "." / "a.csv")) << "that is not there yet";

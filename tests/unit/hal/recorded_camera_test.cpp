@@ -226,7 +226,8 @@ TEST_F(Recorded, of_several_pictures_in_one_file_none_is_read_for_all) {
   ASSERT_TRUE(cv::imwritemulti(path("a.tif"), pages));
   const auto picture = recorded::read_picture(path("a.tif"));
   ASSERT_FALSE(picture);
-  EXPECT_EQ(picture.error(), path("a.tif") + ": the TIFF file holds several pictures; allowed: one in a file");
+  EXPECT_EQ(picture.error(),
+            path("a.tif") + ": the TIFF file holds several pictures; allowed: one in a file");
   EXPECT_TRUE(recorded::decode(encoded(disc(40, 30), ".tif")));
 }
 

@@ -2,6 +2,7 @@
 # Sourced by tools/run, tools/test and toolchain/checks/*: steps that stay quiet while all is well.
 # A step's output goes to a log; its progress is shown, and on failure the part of the log that matters.
 
+unset CDPATH # with it `cd` may go elsewhere, and prints where
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 export LANG=C.UTF-8 LC_ALL=C.UTF-8 # a compiler's cache tells both from none
 # Where ccache is there, clones in different places share what they compiled.

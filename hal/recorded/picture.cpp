@@ -3,15 +3,19 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdio>
 #include <exception>
 #include <iostream>
 #include <memory>
+#include <mutex>
 #include <new>
 #include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "hal/recorded/modules.hpp"
@@ -21,6 +25,8 @@ namespace punctum::recorded {
 namespace {
 
 using Bytes = std::span<const std::uint8_t>;
+
+constexpr const char* kDamaged = "the picture's data are damaged or incomplete";
 
 tl::unexpected<std::string> wrong(std::string what) { return tl::unexpected<std::string>(std::move(what)); }
 
@@ -39,6 +45,44 @@ class NoErrorOutput {
 
  private:
   std::streambuf* before_;
+};
+
+// Takes what the JPEG library writes to the standard error stream: it says there alone, and through nothing
+// that OpenCV lets through, that it has filled up what is missing. The stream that takes it is never closed,
+// since another thread may write to it.
+class LibraryWarnings {
+ public:
+  LibraryWarnings() : alone_(mutex()), before_(stderr) {
+    static std::FILE* const stream = ::fmemopen(text().data(), text().size(), "w");
+    if (stream != nullptr) {
+      std::rewind(stream);
+      text().fill('\0');
+      stderr = stream;
+    }
+  }
+  ~LibraryWarnings() { stderr = before_; }
+  LibraryWarnings(const LibraryWarnings&) = delete;
+  LibraryWarnings& operator=(const LibraryWarnings&) = delete;
+
+  // Bytes that belong to nothing do no harm: some cameras fill up their files.
+  [[nodiscard]] bool tell_of_damage() const {
+    (void)std::fflush(stderr);
+    const std::string_view all(text().data(), text().size());
+    return all.find("Corrupt JPEG data") != std::string_view::npos &&
+           all.find("extraneous bytes") == std::string_view::npos;
+  }
+
+ private:
+  static std::mutex& mutex() {
+    static std::mutex one;
+    return one;
+  }
+  static std::array<char, 1024>& text() {
+    static std::array<char, 1024> bytes{};
+    return bytes;
+  }
+  std::lock_guard<std::mutex> alone_;
+  std::FILE* before_;
 };
 
 // Bits per sample that the brightest pixel needs: 8, 10 .. 16.
@@ -70,14 +114,21 @@ tl::expected<Picture, std::string> decode(Bytes file, int bits) {
   try {
     const NoErrorOutput silenced;
     const cv::Mat bytes(1, static_cast<int>(file.size()), CV_8UC1, const_cast<std::uint8_t*>(file.data()));
+    std::optional<LibraryWarnings> warnings;
+    if (file[0] == 0xff) {  // JPEG
+      warnings.emplace();
+    }
     picture = pictures->decode(bytes);
+    if (warnings && warnings->tell_of_damage()) {
+      return wrong(kDamaged);
+    }
   } catch (const std::bad_alloc&) {
     return wrong("not enough memory for the picture");
   } catch (const std::exception&) {
-    return wrong("the picture's data are damaged or incomplete");
+    return wrong(kDamaged);
   }
   if (picture.empty()) {
-    return wrong("the picture's data are damaged or incomplete");
+    return wrong(kDamaged);
   }
   if (picture.type() != CV_8UC1 && picture.type() != CV_16UC1) {
     return wrong("its samples are neither 8 nor 16 bits wide; allowed: whole numbers of 8 or 16 bits");

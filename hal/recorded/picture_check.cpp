@@ -221,7 +221,24 @@ tl::expected<TiffField, std::string> read_field(Bytes file, std::size_t entry, b
   return field;
 }
 
-// The first directory only: its size, and that all strips or tiles lie inside the file.
+// A directory after the first one is a further picture, unless it says to be a smaller version of one.
+bool is_smaller_version(Bytes file, std::size_t directory, bool big_endian) {
+  constexpr std::uint32_t kSubfileType = 254, kReduced = 1;
+  if (directory > file.size() || file.size() - directory < 2) {
+    return false;
+  }
+  const std::size_t entries = number(file, directory, 2, big_endian);
+  for (std::size_t i = 0; i < entries && 12 * (i + 1) <= file.size() - directory - 2; ++i) {
+    const std::size_t entry = directory + 2 + 12 * i;
+    if (number(file, entry, 2, big_endian) == kSubfileType) {
+      return (number(file, entry + 8, 4, big_endian) & kReduced) != 0;
+    }
+  }
+  return false;
+}
+
+// The size of the first directory, that all its strips or tiles lie inside the file, and that it is the only
+// picture: of several the library would give the first alone.
 Verdict check_tiff(Bytes file) {
   const bool big_endian = file[0] == 'M';
   if (file.size() < 8) {
@@ -234,6 +251,10 @@ Verdict check_tiff(Bytes file) {
   const std::size_t entries = number(file, directory, 2, big_endian);
   if (entries * 12 + 4 > file.size() - directory - 2) {
     return wrong(kEndsEarly);
+  }
+  const std::size_t next = number(file, directory + 2 + 12 * entries, 4, big_endian);
+  if (next != 0 && !is_smaller_version(file, next, big_endian)) {
+    return wrong("the TIFF file holds several pictures; allowed: one in a file");
   }
   std::int64_t width = 0, height = 0;
   TiffField offset, length;  // of the strips or tiles

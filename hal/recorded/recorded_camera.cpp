@@ -26,9 +26,13 @@ namespace fs = std::filesystem;
 
 constexpr double kDefaultFps = 25;
 constexpr double kMaxFps = 1e5;
+constexpr std::int64_t kUncertain = 1;  // many kinds of video tell a duration, of which the count is rounded
 constexpr const char* kPictures = "*.png, *.jpg, *.jpeg, *.tif, *.tiff, *.bmp, *.pgm, *.ppm";
 constexpr std::array<std::string_view, 9> kPictureEndings{".png", ".jpg", ".jpeg", ".tif", ".tiff",
                                                           ".bmp", ".pgm", ".ppm",  ".pnm"};
+
+// What other systems lay beside a picture, as ._a.png, is hidden.
+bool is_hidden(const fs::path& path) { return path.filename().string().starts_with('.'); }
 
 bool is_picture_name(const fs::path& path) {
   std::string ending = path.extension().string();
@@ -50,7 +54,7 @@ tl::expected<std::vector<std::string>, std::string> files_of_folder(const std::s
   std::error_code error;
   fs::directory_iterator it(folder, error);
   for (; !error && it != fs::directory_iterator(); it.increment(error)) {
-    if (is_picture_name(it->path()) && is_file(it->path())) {
+    if (!is_hidden(it->path()) && is_picture_name(it->path()) && is_file(it->path())) {
       files.push_back(it->path().string());
     }
   }
@@ -180,7 +184,7 @@ struct Camera::Impl {
     cv::Mat raw;
     try {
       if (!video->read(raw) || raw.empty()) {
-        if (count > 0 && position < count) {
+        if (position + kUncertain < count) {
           error = source + ": ends after " + std::to_string(position) + " of " + std::to_string(count) +
                   " pictures";
         }

@@ -1,5 +1,6 @@
 // What is tracked speaks of the thing only: no path of one machine, nothing left open, no large file.
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <array>
 #include <cstdio>
@@ -92,6 +93,48 @@ TEST(Hygiene, top_level_is_the_one_of_the_design) {
     const std::string top = file.substr(0, file.find('/'));
     EXPECT_TRUE(std::regex_match(top, expected)) << top;
   }
+}
+
+// What a command prints, with its errors.
+std::string said(const std::string& command) {
+  const auto close = [](std::FILE* f) { pclose(f); };
+  const std::unique_ptr<std::FILE, decltype(close)> pipe(popen((command + " 2>&1").c_str(), "r"), close);
+  std::string text;
+  std::array<char, 4096> part{};
+  while (pipe != nullptr && std::fgets(part.data(), part.size(), pipe.get()) != nullptr) {
+    text += part.data();
+  }
+  return text;
+}
+
+TEST(Scripts, find_their_folder_whatever_path_the_shell_searches_and_through_a_link) {
+  const std::string source = PUNCTUM_SOURCE_DIR;
+  EXPECT_EQ(said("cd '" + source +
+                 "' && CDPATH=. bash -c 'export CDPATH; . toolchain/steps.sh; printf %s \"$root\"'"),
+            fs::canonical(source).string());
+  const fs::path link = fs::temp_directory_path() / ("punctum-link-" + std::to_string(getpid()));
+  fs::create_symlink(source + "/tools/test", link);
+  EXPECT_EQ(said(link.string() + " --none").substr(0, 17), "usage: tools/test");
+  fs::remove(link);
+}
+
+TEST(Scripts, complete_a_recording_and_the_words_that_are_programs_of_their_own) {
+  const fs::path folder = fs::temp_directory_path() / ("punctum-manual-" + std::to_string(getpid()));
+  fs::create_directory(folder);
+  const std::string program = folder / "tool";
+  std::ofstream(program)
+      << "#!/bin/sh\ncase $1 in go) echo 'Usage: tool go RECORDING'; exit;; esac\n"
+         "printf 'Usage: tool COMMAND\\n\\nSubcommands:\\n  go  x\\n\\nExamples:\\n  tool other "
+         "a.x\\n      does it; the program tool-other\\n'\n";
+  fs::permissions(program, fs::perms::owner_all);
+  const std::string text = said(PUNCTUM_SOURCE_DIR "/toolchain/manual/manual completion " + program);
+  EXPECT_NE(text.find("    other) files='f' ;;\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("words='go other'"), std::string::npos) << text;
+  std::ofstream(program)
+      << "#!/bin/sh\nprintf 'Usage: tool RECORDING\\n\\nArguments:\\n  RECORDING  a file\\n'\n";
+  const std::string alone = said(PUNCTUM_SOURCE_DIR "/toolchain/manual/manual completion " + program);
+  EXPECT_NE(alone.find("options='' words='' files='f'"), std::string::npos) << alone;
+  fs::remove_all(folder);
 }
 
 TEST(Hygiene, each_rule_finds_what_it_is_for) {

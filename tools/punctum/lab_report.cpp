@@ -49,9 +49,23 @@ std::string text_of(const Json& j) { return j.dump(2, ' ', false, Json::error_ha
 
 // Null where there is no such file, or nothing that could be read as one.
 Json read_json(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  Json j = Json::parse(in, nullptr, false);
+  const auto text = read_whole(path);
+  Json j = text ? Json::parse(*text, nullptr, false) : Json();
   return j.is_object() ? j : Json();
+}
+
+// The first of the files that a report is made of, or that it becomes, that may never end or be no file of
+// its own, such as a pipe; empty if there is none.
+fs::path no_file_in(const fs::path& folder) {
+  for (const char* name : {"report.json", "report.html", "figure.svg", kBegun, "scene.toml", "samples.csv",
+                           "events.csv", "obs.csv"}) {
+    std::error_code ec;
+    const fs::file_status there = fs::status(folder / name, ec);
+    if (fs::exists(there) && !fs::is_regular_file(there)) {
+      return folder / name;
+    }
+  }
+  return {};
 }
 
 // The page and the figure beside it; without samples there is a page still.
@@ -126,6 +140,7 @@ int report_folders(const std::vector<std::string>& folders, const std::string& o
     return exit_bad_input;
   }
   std::vector<ComparedRun> runs;
+  int code = exit_done;
   for (const std::string& folder : folders) {
     const fs::path path = fs::path(folder).lexically_normal();
     std::error_code ec;
@@ -140,13 +155,21 @@ int report_folders(const std::vector<std::string>& folders, const std::string& o
       complain(lock.error() + "; its report comes with its end, and samples.csv can be read meanwhile");
       return exit_bad_input;
     }
+    if (const fs::path odd = no_file_in(path); !odd.empty()) {
+      complain(odd.string() + ": not a file");
+      return exit_bad_input;
+    }
     Json facts = read_json(path / "report.json");
     if (facts.is_null()) {
       if (const std::string lack = what_samples_lack(path); !lack.empty()) {
         complain(lack);
         return exit_bad_input;
       }
-      facts = whole_facts(read_json(path / kBegun), rebuilt_facts(path.string()));
+      const Json begun = read_json(path / kBegun);
+      facts = whole_facts(begun, rebuilt_facts(path.string()));
+      if (begun.is_null() && fs::exists(path / kBegun, ec)) {
+        facts["not_kept"].push_back({{"file", kBegun}, {"t_s", 0}, {"why", "cannot be read"}});
+      }
       facts["sentence"] = run_sentence(facts);
       if (auto written = write_report_json(path.string(), facts); !written) {
         complain(written.error());
@@ -160,11 +183,16 @@ int report_folders(const std::vector<std::string>& folders, const std::string& o
     }
     Terminal().say("{}: {}\n{}", (path / "report.html").string(), text_in(facts, "outcome"),
                    run_sentence(facts));
+    for (const Json& n : list_in(facts, "not_kept")) {
+      complain(fmt::format("{}: {} from about {:.3f} s on: {}", path.string(), text_in(n, "file"),
+                           number_in(n, "t_s").value_or(0), text_in(n, "why")));
+      code = exit_not_done;
+    }
     const fs::path named = path.has_filename() ? path : path.parent_path();
     runs.push_back({named.filename().string(), std::move(facts), std::move(chart)});
   }
   if (runs.size() < 2) {
-    return exit_done;
+    return code;
   }
   const fs::path page = out.empty() ? fs::path(fmt::format("reports/comparison-{:%Y%m%d-%H%M%S}.html",
                                                            fmt::localtime(std::time(nullptr))))
@@ -178,7 +206,7 @@ int report_folders(const std::vector<std::string>& folders, const std::string& o
     return exit_not_done;
   }
   say("\n" + comparison_text(runs) + "\n" + page.string() + "\n");
-  return exit_done;
+  return code;
 }
 
 }  // namespace punctum::tools

@@ -171,12 +171,12 @@ int main_or_throw(int argc, char** argv) {
        {exit_fault, "the manipulator has a fault, came to rest somewhere else, or does not come to rest"}}));
   listing->footer(
       help_footer({{"punctum devices", "what a scene could name on this machine"}}, {{exit_done, "listed"}}));
-  reporting->footer(
-      help_footer({{"punctum report reports/icsi-20260101-120000", "after a crash, or from an older version"},
-                   {"punctum report reports/icsi-*", "all of them, compared in a table with figures"}},
-                  {{exit_done, "written"},
-                   {exit_not_done, "a report could not be written"},
-                   {exit_bad_input, "bad input"}}));
+  reporting->footer(help_footer(
+      {{"punctum report reports/icsi-20260101-120000", "after a crash, or from an older version"},
+       {"punctum report reports/icsi-*", "all of them, compared in a table with figures"}},
+      {{exit_done, "written"},
+       {exit_not_done, "a report could not be written, or what it is made of is damaged or ends early"},
+       {exit_bad_input, "bad input"}}));
 
   if (const auto code = parse_command_line(app, argc, argv)) {
     return *code;

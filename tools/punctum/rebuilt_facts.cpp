@@ -10,6 +10,9 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "rt/station/core_status.hpp"
 #include "rt/station/run_end.hpp"
@@ -17,6 +20,7 @@
 #include "tools/punctum/event_log.hpp"
 #include "tools/punctum/facts.hpp"
 #include "tools/punctum/measures.hpp"
+#include "tools/punctum/not_kept.hpp"
 #include "tools/punctum/run_report.hpp"
 #include "tools/scene/scene.hpp"
 #include "tools/shared/csv.hpp"
@@ -27,11 +31,29 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// A count in a cell of the table; 0 where there is none or it cannot be one.
-std::uint64_t count_in(const CsvReader& row, const char* column, std::uint64_t most) {
-  const double v = row.number(column).value_or(0);
-  return v >= 0 && v <= static_cast<double>(most) ? static_cast<std::uint64_t>(v) : 0;
-}
+// The numbers of a row, and whether all that were asked for could be read. A column that the table does not
+// have is 0.
+class RowNumbers {
+ public:
+  explicit RowNumbers(const CsvReader& row) : row_(row) {}
+
+  double number(const char* column) {
+    const auto v = row_.number(column);
+    read_ = read_ && (v || !row_.has(column));
+    return v.value_or(0);
+  }
+  std::uint32_t count(const char* column, std::uint32_t most = UINT32_MAX) {
+    const double v = number(column);
+    const bool is_one = v >= 0 && v <= static_cast<double>(most);
+    read_ = read_ && is_one;
+    return is_one ? static_cast<std::uint32_t>(v) : 0;
+  }
+  [[nodiscard]] bool all_read() const { return read_; }
+
+ private:
+  const CsvReader& row_;
+  bool read_ = true;
+};
 
 std::optional<rt::Phase> phase_named(std::string_view name) {
   for (int i = 0; i < rt::kPhases; ++i) {
@@ -42,30 +64,32 @@ std::optional<rt::Phase> phase_named(std::string_view name) {
   return std::nullopt;
 }
 
-// Nothing if the row was cut off.
+// Nothing if the row was cut off or is damaged.
 std::optional<rt::TelemetrySample> sample_of(const CsvReader& row, double rate_Hz) {
   const auto t_s = row.number("t_s"), fz = row.number("fz_N");
   const auto phase = phase_named(row.text("phase"));
-  if (!t_s || !fz || !phase || row.text("fault").empty() || !(*t_s >= 0 && *t_s < 1e9)) {
+  const std::string_view named = row.text("fault");
+  const auto fault = named == rt::name(rt::Fault::none) ? rt::Fault::none : fault_named(named);
+  if (!row.is_whole() || !t_s || !fz || !phase || !fault || !(*t_s >= 0 && *t_s < 1e9)) {
     return std::nullopt;
   }
-  const auto number = [&row](const char* column) { return row.number(column).value_or(0); };
+  RowNumbers of(row);
   rt::TelemetrySample s;
   s.t_s = *t_s;
   s.tick = static_cast<std::uint64_t>(std::llround(*t_s * rate_Hz));
   s.phase = *phase;
-  s.fault = fault_named(row.text("fault")).value_or(rt::Fault::none);
-  s.alarms = static_cast<std::uint32_t>(count_in(row, "alarms", UINT32_MAX));
-  s.buttons = static_cast<std::uint32_t>(count_in(row, "buttons", UINT32_MAX));
-  s.cell = static_cast<std::uint32_t>(count_in(row, "cell", UINT32_MAX));
-  s.force_N[0] = number("fx_N"), s.force_N[1] = number("fy_N"), s.force_N[2] = *fz;
-  s.wd_m = number("wd_m");
-  s.tip_force_N = number("tip_force_N");
-  s.obs_age_s = number("obs_age_s");
-  s.obs_gap_m = number("obs_gap_m");
-  s.injected_energy_J = number("injected_energy_J");
-  s.injector_open = static_cast<std::uint8_t>(count_in(row, "injector_open", 1));
-  return s;
+  s.fault = *fault;
+  s.alarms = of.count("alarms");
+  s.buttons = of.count("buttons");
+  s.cell = of.count("cell");
+  s.force_N[0] = of.number("fx_N"), s.force_N[1] = of.number("fy_N"), s.force_N[2] = *fz;
+  s.wd_m = of.number("wd_m");
+  s.tip_force_N = of.number("tip_force_N");
+  s.obs_age_s = of.number("obs_age_s");
+  s.obs_gap_m = of.number("obs_gap_m");
+  s.injected_energy_J = of.number("injected_energy_J");
+  s.injector_open = static_cast<std::uint8_t>(of.count("injector_open", 1));
+  return of.all_read() ? std::optional(s) : std::nullopt;
 }
 
 // What the samples have of the simulated truth.
@@ -190,6 +214,27 @@ class Holes {
   Hole longest_;
 };
 
+// Rows of a table that has been damaged: what they told is missing, however short the time.
+struct Damage {
+  std::uint64_t unreadable = 0, not_rising = 0;
+  double unreadable_s = 0, not_rising_s = 0;  // after which the first of them stands
+  bool at_end = false;                        // no row after it can be read
+
+  [[nodiscard]] bool any() const { return unreadable + not_rising > 0; }
+  void tell(std::vector<NotKept>& not_kept) const {
+    const auto rows = [](std::uint64_t n) {
+      return n == 1 ? std::string("1 row") : fmt::format("{} rows", n);
+    };
+    if (unreadable > 0) {
+      not_kept.push_back({"samples.csv", unreadable_s, rows(unreadable) + " cannot be read"});
+    }
+    if (not_rising > 0) {
+      not_kept.push_back(
+          {"samples.csv", not_rising_s, rows(not_rising) + " left out: their times do not rise"});
+    }
+  }
+};
+
 std::optional<rt::RunEnd> run_end_named(const std::string& name) {
   for (int i = 0; i < rt::kRunEnds; ++i) {
     if (name == rt::name(static_cast<rt::RunEnd>(i))) {
@@ -271,23 +316,35 @@ Json rebuilt_facts(const std::string& folder) {
   Delays delays;
   CsvReader row(folder + "/samples.csv");
   Holes holes;
+  Damage damage;
   std::uint64_t rows = 0, cut_off = 0;
   double apart_s = 0;  // at most, of two rows while the injector may have been open
   while (row.next()) {
-    if (const auto sample = sample_of(row, scene.servo.rate_Hz)) {
-      if (rows > 0 && (may_inject(*sample) || may_inject(measures.last))) {
-        apart_s = std::max(apart_s, sample->t_s - measures.last.t_s);
-      }
-      holes.take(sample->tick, sample->t_s);
-      measures.tick(*sample, nullptr);
-      truth.take(row, *sample);
-      if (truth.any) {
-        delays.take(*sample, truth.contact, truth.punctured);
-      }
-      ++rows;
-    } else {
+    const auto sample = sample_of(row, scene.servo.rate_Hz);
+    if (!sample && row.is_cut_off()) {
       ++cut_off;
+      continue;
     }
+    if (!sample) {
+      damage.unreadable_s = damage.unreadable++ == 0 ? measures.last_s : damage.unreadable_s;
+      damage.at_end = true;
+      continue;
+    }
+    if (rows > 0 && !(sample->t_s > measures.last.t_s)) {
+      damage.not_rising_s = damage.not_rising++ == 0 ? measures.last_s : damage.not_rising_s;
+      continue;
+    }
+    damage.at_end = false;
+    if (rows > 0 && (may_inject(*sample) || may_inject(measures.last))) {
+      apart_s = std::max(apart_s, sample->t_s - measures.last.t_s);
+    }
+    holes.take(sample->tick, sample->t_s);
+    measures.tick(*sample, nullptr);
+    truth.take(row, *sample);
+    if (truth.any) {
+      delays.take(*sample, truth.contact, truth.punctured);
+    }
+    ++rows;
   }
   measures.finish();
   const auto events = read_events(folder + "/events.csv");
@@ -299,7 +356,7 @@ Json rebuilt_facts(const std::string& folder) {
   if (cut) {
     result.not_kept.push_back(
         {"samples.csv", measures.last_s, fmt::format("its rows end here, the events at {:.3f} s", told_s)});
-  } else {
+  } else if (!damage.at_end) {
     result.needle = truth.needle(measures.whereabouts(), inner);
   }
   const auto hole = holes.longest();
@@ -308,6 +365,8 @@ Json rebuilt_facts(const std::string& folder) {
         {"samples.csv", hole->from_s,
          fmt::format("its rows go on at {:.3f} s: the longest of its holes", hole->to_s)});
   }
+  damage.tell(result.not_kept);
+  const bool all_rows = !cut && !hole && !damage.any();
   const auto no_core = std::make_unique<rt::CoreStatus>();
   Json j = report_facts(scene, result, measures, EventList{}, *no_core, read_pictures(folder + "/obs.csv"));
   j["rebuilt"] = true;
@@ -316,7 +375,7 @@ Json rebuilt_facts(const std::string& folder) {
                             ? fmt::format("the recording ends in phase {}", rt::name(measures.last.phase))
                             : "nothing was recorded";
   j["events"] = events;
-  const bool dose_is_known = rows > 0 && row.has("injector_open") && row.has("buttons") && !cut && !hole &&
+  const bool dose_is_known = rows > 0 && row.has("injector_open") && row.has("buttons") && all_rows &&
                              apart_s < CellMeasures::kDoseTolerance_s;
   for (const Json& e : events) {
     if (text_in(e, "event") == "ended") {
@@ -361,8 +420,13 @@ Json rebuilt_facts(const std::string& folder) {
   j["contact_delay_ms"] = mean_ms(delays.contact_s);
   j["puncture_delay_ms"] = inner ? Json(nullptr) : mean_ms(delays.inner_s);
   j["puncture_inner_delay_ms"] = mean_ms(delays.inner_s);
-  j["samples"] = {
-      {"rows", rows}, {"cut_off", cut_off}, {"every", nullptr}, {"lost", nullptr}, {"gaps", nullptr}};
+  j["samples"] = {{"rows", rows},
+                  {"cut_off", cut_off},
+                  {"unreadable", damage.unreadable},
+                  {"not_rising", damage.not_rising},
+                  {"every", nullptr},
+                  {"lost", nullptr},
+                  {"gaps", nullptr}};
   if (truth.any) {
     j["peak_force_N"] = truth.peak_force_N;
     j["max_depth_um"] = truth.max_depth_m * 1e6;
@@ -373,7 +437,7 @@ Json rebuilt_facts(const std::string& folder) {
     }
     j["cells"] = {{"tried", measures.last.cell + 1}, {"lost", truth.lost ? Json(1) : Json(nullptr)}};
   }
-  if (cut || hole) {
+  if (!all_rows) {
     forget_what_needs_every_sample(j);
   }
   if (cut) {

@@ -31,6 +31,10 @@ constexpr const char* kElsewhere = ", allowed: another --report";
 
 // A run that has written anything has written its resolved scene first.
 bool is_report(const fs::path& folder) {
+  std::error_code ec;
+  if (!fs::is_regular_file(folder / "scene.toml", ec)) {
+    return false;  // such as a pipe, which may never end
+  }
   std::ifstream in(folder / "scene.toml");
   std::string line;
   return std::getline(in, line) && line.starts_with("# ") && line.ends_with(kResolvedScene);

@@ -133,13 +133,15 @@ TimeChart chart_of_run(const std::string& folder, const Json& facts) {
   Curve total("force at the hand", chart.begin_s, chart.end_s);
   CsvReader row(folder + "/samples.csv");
   bool any = false;
+  double last_s = -std::numeric_limits<double>::infinity();
   while (row.next()) {
     const auto t_s = row.number("t_s");
     const auto fx = row.number("fx_N"), fy = row.number("fy_N"), fz = row.number("fz_N");
-    if (!t_s || !fx || !fy || !fz) {
-      continue;  // the row that a crash has cut off
+    if (!row.is_whole() || !fx || !fy || !fz || !t_s || !(*t_s > last_s)) {
+      continue;  // cut off by a crash, or damaged
     }
     any = true;
+    last_s = *t_s;
     total.add(*t_s, std::hypot(*fx, *fy, *fz));
     for (std::vector<Source>* panel_sources : {&force, &needle, &depth, &hand, &tip}) {
       for (Source& s : *panel_sources) {

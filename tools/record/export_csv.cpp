@@ -18,6 +18,7 @@
 namespace punctum::tools {
 namespace {
 
+constexpr const char* kSceneFile = "scene.toml";
 constexpr const char* kObservationColumns =
     "frame,exposure_ns,holder_ok,tip_ok,outer_ok,inner_ok,contact,punctured,inner_punctured,tip_x_m,tip_y_m,"
     "tip_z_m,axis_x,axis_y,"
@@ -67,25 +68,26 @@ class Tables {
  public:
   [[nodiscard]] tl::expected<void, std::string> open(const std::string& folder) {
     std::error_code ec;
-    std::filesystem::create_directories(folder, ec);
+    for (const std::string name : {samples_.name, events_.name, observations_.name, kSceneFile}) {
+      if (is_there(folder + "/" + name)) {
+        return tl::unexpected(folder + "/" + name + ": is there already; an export replaces nothing");
+      }
+    }
+    folder_ = folder;
+    new_folder_ = std::filesystem::create_directories(folder, ec);
     if (ec) {
       return tl::unexpected(folder + ": cannot be made: " + ec.message());
     }
     for (Table* table : {&samples_, &events_, &observations_}) {
-      const std::string path = folder + "/" + table->name;
-      if (std::filesystem::exists(path, ec)) {
-        return tl::unexpected(path + ": is there already; an export replaces nothing");
-      }
-      auto file = RowFile::open(path, RowFile::Begin::empty);
+      auto file = RowFile::open(folder + "/" + table->name, RowFile::Begin::empty);
       if (!file) {
-        return tl::unexpected(file.error());
+        return tl::unexpected(given_up(file.error()));
       }
       table->file = std::move(*file);
     }
     samples_.file.append(sample_columns());
     events_.file.append(kEventColumns);
     observations_.file.append(kObservationColumns);
-    folder_ = folder;
     return {};
   }
 
@@ -94,6 +96,8 @@ class Tables {
     if (from_wire(t, sample_)) {
       waits_ = true;
       ++exported_.ticks;
+    } else {
+      ++exported_.unknown_ticks;
     }
   }
   void operator()(const v1::Truth& t) {
@@ -125,7 +129,7 @@ class Tables {
       }
     }
     if (!scene_.empty()) {
-      if (auto written = write_whole(folder_ + "/scene.toml", scene_); !written) {
+      if (auto written = write_whole(folder_ + "/" + kSceneFile, scene_); !written) {
         return tl::unexpected(given_up(written.error()));
       }
     }
@@ -135,10 +139,15 @@ class Tables {
  private:
   // A table that is cut off looks like a whole one, and nothing would replace it.
   std::string given_up(const std::string& why) {
+    std::error_code ignored;
     for (Table* table : {&samples_, &events_, &observations_}) {
-      table->file = {};
-      std::error_code ignored;
-      std::filesystem::remove(folder_ + "/" + table->name, ignored);
+      if (table->file.is_open()) {
+        table->file = {};
+        std::filesystem::remove(folder_ + "/" + table->name, ignored);
+      }
+    }
+    if (new_folder_) {
+      std::filesystem::remove(folder_, ignored);
     }
     return why;
   }
@@ -161,7 +170,7 @@ class Tables {
   Table observations_{.name = "observations.csv", .file = {}};
   std::string folder_, scene_, row_;
   rt::TelemetrySample sample_;
-  bool waits_ = false;
+  bool waits_ = false, new_folder_ = false;
   Exported exported_;
 };
 
@@ -180,6 +189,12 @@ tl::expected<Exported, std::string> export_csv(const std::string& recording, con
   auto exported = tables.finish();
   if (exported) {
     exported->ends = ends;
+    if (exported->unknown_ticks > 0) {
+      exported->ends += fmt::format(
+          "{}{} ticks are left out of samples.csv: their phase, fault, stop or time is none that this build "
+          "knows",
+          ends.empty() ? recording + ": " : "; ", exported->unknown_ticks);
+    }
   }
   return exported;
 }

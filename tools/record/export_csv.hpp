@@ -10,7 +10,8 @@ namespace punctum::tools {
 
 struct Exported {
   std::uint64_t ticks = 0, events = 0, observations = 0;
-  std::string ends;  // why the recording is not the whole run, in a line; empty if it is
+  std::uint64_t unknown_ticks = 0;  // left out: of a phase, fault, stop or time that this build does not know
+  std::string ends;                 // why the tables are not the whole run, in a line; empty if they are
 };
 
 // samples.csv and events.csv as the run wrote them, scene.toml, and observations.csv, into a folder that may

@@ -371,23 +371,26 @@ tl::expected<std::string, std::string> export_hdf5(const std::string& recording,
   if (!reader) {
     return tl::unexpected(reader.error());
   }
-  std::error_code ec;
-  if (std::filesystem::exists(file, ec)) {
+  if (is_there(file)) {
     return tl::unexpected(file + ": is there already; an export replaces nothing");
   }
   (void)H5dont_atexit();  // it would touch a file again that could not be closed for want of room, and crash
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // its own words
-  const std::string part = unfinished(file).string();
+  const auto part = begin_unfinished(file);
+  if (!part) {
+    return tl::unexpected(part.error());
+  }
   std::string ends;
   try {
-    NwbFile nwb(part);
+    NwbFile nwb(part->string());
     ends = reader->read_all(nwb);
     nwb.finish(recording);
   } catch (const H5Failed& failed) {
-    std::filesystem::remove(part, ec);
+    std::error_code ignored;
+    std::filesystem::remove(*part, ignored);
     return tl::unexpected(fmt::format("{}: cannot be written{}", file, failed.why));
   }
-  if (auto placed = put_in_place(file); !placed) {
+  if (auto placed = put_in_place(*part, file); !placed) {
     return tl::unexpected(placed.error());
   }
   return ends;

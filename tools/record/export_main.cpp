@@ -40,7 +40,8 @@ int run(int argc, char** argv) {
        {"punctum-export */recording.mcap --overview runs",
         "many runs side by side: runs.csv, punctures.csv, runs.svg"}},
       {{exit_done, "exported, and the recording is whole"},
-       {exit_not_done, "the recording ends early or has holes: what it holds is exported"},
+       {exit_not_done,
+        "the recording ends early, has holes, or tells what this build does not know: the rest is exported"},
        {exit_bad_input, "no recording, nowhere to write, or what is asked for is not in it"}}));
   app.add_option("RECORDING", recordings, "MCAP files of punctum-record; one, but for --overview")
       ->required();

@@ -115,6 +115,8 @@ std::string ome_xml(const PicturesOverview& all, double pixel_m, const std::stri
   return xml + "</Pixels></Image></OME>\n";
 }
 
+std::string picture_name(std::size_t i) { return fmt::format("{:06}.png", i); }
+
 struct CloseFile {
   void operator()(std::FILE* f) const noexcept { (void)std::fclose(f); }
 };
@@ -132,7 +134,7 @@ tl::expected<std::string, std::string> export_png(const std::string& recording, 
                                       all->longest_side, kLongestSide));
   }
   std::error_code error;
-  if (std::filesystem::exists(folder, error)) {
+  if (is_there(folder)) {
     return tl::unexpected(folder + ": is there already; an export replaces nothing");
   }
   std::filesystem::create_directories(folder, error);
@@ -142,7 +144,7 @@ tl::expected<std::string, std::string> export_png(const std::string& recording, 
   std::string table = "file,frame,t_s\n", why;
   std::size_t i = 0;
   const auto read = each_picture(recording, [&](const v1::Picture& p) {
-    const std::string name = fmt::format("{:06}.png", i);
+    const std::string name = picture_name(i);
     fmt::format_to(std::back_inserter(table), "{},{},{:.9f}\n", name, p.frame(), all->t_s(all->pictures[i]));
     ++i;
     const auto written =
@@ -152,14 +154,21 @@ tl::expected<std::string, std::string> export_png(const std::string& recording, 
     return why.empty() && i < all->pictures.size();
   });
   if (!read) {
-    return tl::unexpected(read.error());
+    why = read.error();
   }
   if (why.empty()) {
     if (const auto written = write_whole(folder + "/pictures.csv", table); !written) {
       why = written.error();
     }
   }
-  return why.empty() ? tl::expected<std::string, std::string>(all->ends) : tl::unexpected(why);
+  if (!why.empty()) {  // a folder of some of the pictures looks like one of all, and nothing would replace it
+    for (std::size_t n = 0; n < i; ++n) {
+      std::filesystem::remove(folder + "/" + picture_name(n), error);
+    }
+    std::filesystem::remove(folder, error);
+    return tl::unexpected(why);
+  }
+  return all->ends;
 }
 
 tl::expected<std::string, std::string> export_ome_tiff(const std::string& recording,
@@ -172,12 +181,14 @@ tl::expected<std::string, std::string> export_ome_tiff(const std::string& record
     return tl::unexpected(recording +
                           ": its pictures are of several sizes; an OME-TIFF has one, PNG files any");
   }
-  std::error_code error;
-  if (std::filesystem::exists(file, error)) {
+  if (is_there(file)) {
     return tl::unexpected(file + ": is there already; an export replaces nothing");
   }
-  const std::string beside = unfinished(file).string();
-  std::unique_ptr<std::FILE, CloseFile> out(std::fopen(beside.c_str(), "wb"));
+  const auto part = begin_unfinished(file);
+  if (!part) {
+    return tl::unexpected(part.error());
+  }
+  std::unique_ptr<std::FILE, CloseFile> out(std::fopen(part->c_str(), "wb"));
   if (!out) {
     return tl::unexpected(fmt::format("{}: {}", file, std::strerror(errno)));
   }
@@ -193,11 +204,11 @@ tl::expected<std::string, std::string> export_ome_tiff(const std::string& record
   const bool good = read && tiff.good() && std::fflush(out.get()) == 0;
   const int why = errno;
   if (!good) {
-    (void)std::remove(beside.c_str());
+    (void)std::remove(part->c_str());
     return tl::unexpected(read ? fmt::format("{}: {}", file, std::strerror(why)) : read.error());
   }
   out.reset();
-  if (const auto placed = put_in_place(file); !placed) {
+  if (const auto placed = put_in_place(*part, file); !placed) {
     return tl::unexpected(placed.error());
   }
   return all->ends;

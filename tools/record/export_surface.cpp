@@ -11,6 +11,7 @@
 #include <string>
 
 #include "tools/record/recording_reader.hpp"
+#include "tools/shared/whole_file.hpp"
 #include "tools/vision/surface_files.hpp"
 
 namespace punctum::tools {
@@ -54,6 +55,11 @@ class NearestSurface {
 
 tl::expected<std::string, std::string> export_surface(const std::string& recording, const std::string& stem,
                                                       std::optional<double> at_s) {
+  for (const std::string& file : surface_files(stem)) {
+    if (is_there(file)) {
+      return tl::unexpected(file + ": is there already; an export replaces nothing");
+    }
+  }
   auto reader = RecordingReader::open(recording);
   if (!reader) {
     return tl::unexpected(reader.error());

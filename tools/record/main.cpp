@@ -182,6 +182,13 @@ std::string summary(const std::string& file, const StationRecorder& r) {
   std::string text = fmt::format("{}: {} ticks, {} observations, {} events, {:.1f} MB\n", file,
                                  r.count(Stream::telemetry), r.count(Stream::observation),
                                  r.count(Stream::event), static_cast<double>(r.bytes()) * 1e-6);
+  for (const auto& [from_s, what] :
+       {std::pair{r.ticks_from_s(), "ticks"}, {r.observations_from_s(), "observations"}}) {
+    if (from_s) {
+      text += fmt::format("{} from {:.3f} s of the run on: the recorder came later than those before\n", what,
+                          *from_s);
+    }
+  }
   const v1::Loss lost = r.loss();
   std::vector<std::string> overwritten;
   for (const auto& [n, what] : {std::pair{lost.telemetry(), "ticks"},
@@ -215,7 +222,7 @@ int run(int argc, char** argv) {
        {"punctum-record --station icsi-4711 --out moment.mcap",
         "a station that runs, from some seconds ago until Ctrl-C"},
        {"punctum-export moment.mcap --csv tables", "what was recorded, as tables"}},
-      {{exit_done, "all that the station told is in the file"},
+      {{exit_done, "all that the station told since the times that are said is in the file"},
        {exit_not_done, "something is not: it was overwritten before it was read, or the disk was full"},
        {exit_bad_input, "bad input, or no such station"}}));
   app.add_option("--station", options.station, "its name, as `punctum run` says it")->type_name("NAME");

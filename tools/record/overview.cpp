@@ -266,8 +266,9 @@ tl::expected<void, std::string> write_overview(const std::vector<RunFacts>& runs
   }
   const fs::path table = fs::path(folder) / "runs.csv", cells = fs::path(folder) / "punctures.csv",
                  picture = fs::path(folder) / kPicture;
-  for (const fs::path& path : {table, cells, picture}) {
-    if (fs::exists(path, ec)) {
+  for (const fs::path& path : {table, cells, picture, fs::path(picture).replace_extension(".gp"),
+                               fs::path(picture).replace_extension(".log")}) {
+    if (is_there(path)) {
       return tl::unexpected(path.string() + ": is there already; an export replaces nothing");
     }
   }
@@ -286,7 +287,11 @@ tl::expected<void, std::string> write_overview(const std::vector<RunFacts>& runs
   if (auto written = write_whole(table, lines); !written) {
     return written;
   }
-  return write_whole(cells, each);
+  auto written = write_whole(cells, each);
+  if (!written) {
+    fs::remove(table, ec);
+  }
+  return written;
 }
 
 tl::expected<void, std::string> draw_overview(const std::vector<RunFacts>& runs, const std::string& folder) {

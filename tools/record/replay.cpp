@@ -86,9 +86,10 @@ class Replay {
     }
   }
   void operator()(const v1::Telemetry& t) {
-    rt::TelemetrySample sample;
-    if (!over() && from_wire(t, sample)) {
-      recorded_.push_back(sample);
+    if (!over()) {
+      Recorded& recorded = recorded_.emplace_back();
+      recorded.known = from_wire(t, recorded.sample);
+      recorded.sample.tick = t.tick();
       compare();
     }
   }
@@ -104,6 +105,13 @@ class Replay {
   std::string wrong;  // why it cannot be replayed
 
   [[nodiscard]] bool any_inputs() const { return next_ > 0; }
+  // No further message comes, and the recording is whole: what waits for another one waits in vain.
+  void finish() {
+    if (!over()) {
+      result.not_told += now_.size();
+      result.not_given += recorded_.size();
+    }
+  }
 
  private:
   [[nodiscard]] bool over() const { return result.differs || !result.ends.empty() || !wrong.empty(); }
@@ -175,8 +183,9 @@ class Replay {
 
   void compare() {
     while (!over() && !recorded_.empty() && !now_.empty()) {
-      const rt::TelemetrySample &recorded = recorded_.front(), &now = now_.front();
+      const rt::TelemetrySample &recorded = recorded_.front().sample, &now = now_.front();
       if (recorded.tick < now.tick) {
+        ++result.not_given;
         recorded_.pop_front();
         continue;
       }
@@ -185,9 +194,13 @@ class Replay {
         now_.pop_front();
         continue;
       }
-      ++result.ticks;
-      result.end_s = recorded.t_s;
-      result.differs = first_difference(recorded, now);
+      if (recorded_.front().known) {
+        ++result.ticks;
+        result.end_s = recorded.t_s;
+        result.differs = first_difference(recorded, now);
+      } else {
+        ++result.not_known;
+      }
       recorded_.pop_front();
       now_.pop_front();
     }
@@ -204,7 +217,12 @@ class Replay {
   std::unique_ptr<rt::Servo> servo_;
   rt::InputSample input_;
   std::uint64_t next_ = 0, seen_ = 0;
-  std::deque<rt::TelemetrySample> recorded_, now_;
+  struct Recorded {
+    rt::TelemetrySample sample;
+    bool known = false;
+  };
+  std::deque<Recorded> recorded_;
+  std::deque<rt::TelemetrySample> now_;
 };
 
 }  // namespace
@@ -216,6 +234,9 @@ tl::expected<Replayed, std::string> replay_inputs(const std::string& recording) 
   }
   Replay replay;
   const std::string ends = reader->read_all(replay);
+  if (ends.empty()) {
+    replay.finish();
+  }
   if (replay.wrong.empty() && !replay.any_inputs()) {
     return tl::unexpected(ends.empty()
                               ? recording +

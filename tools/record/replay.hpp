@@ -20,6 +20,8 @@ struct Replayed {
   std::uint64_t ticks = 0;            // compared, bit by bit; the one that differs included
   double end_s = 0;                   // of the run, at the last of them
   std::uint64_t not_told = 0;         // ticks whose telemetry is not in the recording
+  std::uint64_t not_known = 0;        // whose phase, fault, stop or time is none that this build knows
+  std::uint64_t not_given = 0;        // recorded ticks whose input is not in the recording
   std::optional<Difference> differs;  // the first one; nothing is replayed after it
   std::string ends;                   // why it ends before the run did, in a line; empty if it does not
 };

@@ -40,9 +40,13 @@ int replay_again(const std::string& recording) {
     complain("punctum-replay: " + replayed.error());
     return exit_bad_input;
   }
-  if (replayed->not_told > 0) {
-    say(fmt::format("  {} ticks were replayed whose telemetry is not in the recording\n",
-                    replayed->not_told));
+  for (const auto& [ticks, which] :
+       {std::pair{replayed->not_told, "whose telemetry is not in the recording"},
+        {replayed->not_known, "whose phase, fault, stop or time is none that this build knows"},
+        {replayed->not_given, "whose input is not in the recording"}}) {
+    if (ticks > 0) {
+      complain(fmt::format("punctum-replay: not compared: {} ticks {}", ticks, which));
+    }
   }
   if (!replayed->ends.empty()) {
     complain("punctum-replay: " + replayed->ends);
@@ -53,9 +57,11 @@ int replay_again(const std::string& recording) {
                     d->more > 0 ? fmt::format("; and {} more values of this tick", d->more) : ""));
     return exit_not_done;
   }
-  say(fmt::format("{}: {} ticks, to {:.3f} s of the run: bit-identical\n", recording, replayed->ticks,
-                  replayed->end_s));
-  return replayed->ends.empty() && replayed->not_told == 0 ? exit_done : exit_not_done;
+  const std::uint64_t not_compared = replayed->not_told + replayed->not_known + replayed->not_given;
+  say(fmt::format("{}: {} ticks, to {:.3f} s of the run: bit-identical{}\n", recording, replayed->ticks,
+                  replayed->end_s,
+                  not_compared > 0 ? fmt::format("; {} more were not compared", not_compared) : ""));
+  return replayed->ends.empty() && not_compared == 0 ? exit_done : exit_not_done;
 }
 
 constexpr std::chrono::milliseconds kRound{5};
@@ -253,7 +259,8 @@ int run(int argc, char** argv) {
        {"punctum-replay recording.mcap --console --speed 0.25", "the run once more in a browser, slowly"}},
       {{exit_done, "bit-identical, and the recording is whole"},
        {exit_not_done,
-        "it differs, and the first difference is said; or the recording ends early or has holes"},
+        "it differs, and the first difference is said; or the recording ends early, has holes, or has ticks "
+        "that cannot be compared"},
        {exit_bad_input, "no recording, or none that holds the inputs of a run from its first tick on"}}));
   app.add_flag("--console", showing.console,
                "show it in a browser instead, as a run; what is typed seeks, changes the speed, pauses");

@@ -116,6 +116,9 @@ void StationRecorder::take(const rt::TelemetrySample& sample) {
   now_ns_ = file_ns(static_cast<std::int64_t>(core_.status.start_ns.load(std::memory_order_relaxed) +
                                               sample.tick * period_ns_));
   if (!scene_told_) {
+    if (sample.tick > 0) {
+      ticks_from_s_ = sample.t_s;
+    }
     chunk_begun_ns_ = now_ns_;
     scene_told_ = true;
     const auto now = std::chrono::system_clock::now().time_since_epoch();
@@ -213,6 +216,12 @@ void StationRecorder::take_what_vision_found() {
        ++i) {
     to_wire(observation, observation_message_);
     observation_message_.set_number(observations_->position());
+    if (counts_[static_cast<std::size_t>(Stream::observation)] == 0 && observations_->position() > 1) {
+      observations_from_s_ =
+          1e-9 * static_cast<double>(
+                     observation.exposure_ns -
+                     static_cast<std::int64_t>(core_.status.start_ns.load(std::memory_order_relaxed)));
+    }
     const std::uint64_t published = file_ns(observation.exposure_ns);
     add(Stream::observation, logged(published), published, observation_message_);
   }

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <tl/expected.hpp>
 
@@ -54,6 +55,10 @@ class StationRecorder {
   [[nodiscard]] std::uint64_t count(Stream stream) const noexcept {
     return written_[static_cast<std::size_t>(stream)];
   }
+  // Time of the run of the first tick, and of the exposure of the first observation, s, where something was
+  // told before them and is not in the file; nothing: all is, or none has come.
+  [[nodiscard]] std::optional<double> ticks_from_s() const noexcept { return ticks_from_s_; }
+  [[nodiscard]] std::optional<double> observations_from_s() const noexcept { return observations_from_s_; }
   [[nodiscard]] v1::Loss loss() const;
   [[nodiscard]] bool lost_nothing() const;
   [[nodiscard]] std::uint64_t bytes() const noexcept { return file_.bytes(); }
@@ -105,6 +110,7 @@ class StationRecorder {
   const rt::PictureSegment::Ring* picture_ring_ = nullptr;
   std::unique_ptr<hal::Follower<rt::PictureSegment::Ring::Heads>> pictures_;
   std::uint64_t pictures_lost_ = 0;
+  std::optional<double> ticks_from_s_, observations_from_s_;
   WorldOfTick world_of_tick_;
   std::uint64_t unusable_ = 0;
   std::uint64_t now_ns_ = 0;  // of the file, at the newest tick

@@ -1,6 +1,7 @@
 #include "tools/shared/csv.hpp"
 
 #include <charconv>
+#include <filesystem>
 
 namespace punctum::tools {
 
@@ -16,10 +17,15 @@ std::vector<std::string_view> split_csv(std::string_view line) {
   }
 }
 
-CsvReader::CsvReader(const std::string& path) : in_(path) {
+CsvReader::CsvReader(const std::string& path) {
+  std::error_code ec;
+  if (!std::filesystem::is_regular_file(path, ec)) {
+    return;
+  }
+  in_.open(path);
   if (std::getline(in_, line_)) {
     for (const std::string_view name : split_csv(line_)) {
-      columns_.emplace(name, columns_.size());
+      columns_.emplace(name, width_++);
     }
   }
 }

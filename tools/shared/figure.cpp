@@ -462,35 +462,40 @@ tl::expected<void, std::string> draw(const Figure& figure, const fs::path& pictu
   if (find_program("gnuplot").empty()) {
     return tl::unexpected(std::string("gnuplot is not installed (package gnuplot-nox)"));
   }
-  const fs::path part = unfinished(picture);
+  const auto made = begin_unfinished(picture);
+  if (!made) {
+    return tl::unexpected(made.error());
+  }
+  const fs::path& part = *made;
+  const auto fail = [&part](const std::string& why) {
+    std::error_code ignored;
+    fs::remove(part, ignored);
+    return tl::unexpected(why);
+  };
   if (auto written = write_whole(script, gnuplot_script(figure, part), Sync::later); !written) {
-    return written;
+    return fail(written.error());
   }
   auto gnuplot = Child::start("gnuplot", {script.string()}, log.string());
   if (!gnuplot) {
-    return tl::unexpected(gnuplot.error());
+    return fail(gnuplot.error());
   }
   Ended how;
   const auto limit = std::chrono::steady_clock::now() + std::chrono::duration<double>(kLongestDrawing_s);
   while (!gnuplot->ended(how)) {
     if (std::chrono::steady_clock::now() > limit) {
-      return tl::unexpected(
-          fmt::format("gnuplot: not ready with {} after {} s", script.string(), kLongestDrawing_s));
+      return fail(fmt::format("gnuplot: not ready with {} after {} s", script.string(), kLongestDrawing_s));
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
-  if (how.exited && how.code == 0 && fs::exists(part, ec) && !is_whole_picture(part)) {
-    fs::remove(part, ec);  // gnuplot does not notice a full disk
-    return tl::unexpected(picture.string() + ": cannot be written: it is not complete");
+  if (!how.exited || how.code != 0) {
+    return fail(fmt::format("gnuplot {}: {}, {}", script.string(), how.text(), last_line(log.string())));
   }
-  if (!how.exited || how.code != 0 || !fs::exists(part, ec)) {
-    fs::remove(part, ec);
-    return tl::unexpected(
-        fmt::format("gnuplot {}: {}, {}", script.string(), how.text(), last_line(log.string())));
+  if (!is_whole_picture(part)) {  // gnuplot does not notice a full disk
+    return fail(picture.string() + ": cannot be written: it is not complete");
   }
   fs::remove(script, ec);
   fs::remove(log, ec);
-  return put_in_place(picture);
+  return put_in_place(part, picture);
 }
 
 }  // namespace punctum::tools

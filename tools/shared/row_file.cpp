@@ -17,11 +17,15 @@ constexpr std::size_t kEnough = 32 * 1024;  // some 70 rows of samples.csv
 
 tl::expected<RowFile, std::string> RowFile::open(const std::string& path, Begin begin) {
   RowFile rows;
+  // A pipe is not waited for until somebody reads it.
   rows.file_ = ::open(
-      path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | (begin == Begin::empty ? O_TRUNC : 0), 0666);
+      path.c_str(),
+      O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | O_NONBLOCK | (begin == Begin::empty ? O_TRUNC : 0), 0666);
   if (rows.file_ < 0) {
-    return tl::unexpected(fmt::format("{}: cannot be written: {}", path, std::strerror(errno)));
+    return tl::unexpected(fmt::format("{}: cannot be written: {}", path,
+                                      errno == ENXIO ? "nobody reads it" : std::strerror(errno)));
   }
+  (void)::fcntl(rows.file_, F_SETFL, O_APPEND);
   return rows;
 }
 

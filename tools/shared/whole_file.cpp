@@ -36,6 +36,33 @@ int write_all(int file, std::string_view content) {
   return error;
 }
 
+// NAME.part.EXT, NAME.part-2.EXT, ...
+fs::path part_name(const fs::path& path, int n) {
+  fs::path name = path.stem();
+  name += n < 2 ? std::string(".part") : fmt::format(".part-{}", n);
+  name += path.extension();
+  return path.parent_path() / name;
+}
+
+struct OpenPart {
+  fs::path name;
+  int file = -1;
+  int error = 0;
+};
+OpenPart open_part(const fs::path& path) {
+  constexpr int kMostNames = 1000;
+  OpenPart part;
+  for (int n = 1; n <= kMostNames; ++n) {
+    part.name = part_name(path, n);
+    part.file = open(part.name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+    part.error = part.file < 0 ? errno : 0;
+    if (part.error != EEXIST) {
+      break;
+    }
+  }
+  return part;
+}
+
 // 0, or the error. EINVAL: what lies there keeps nothing that could be brought to a disk.
 int bring_to_disk(const fs::path& path, int flags) {
   const int file = open(path.c_str(), flags | O_CLOEXEC);
@@ -49,15 +76,23 @@ int bring_to_disk(const fs::path& path, int flags) {
 
 }  // namespace
 
-fs::path unfinished(const fs::path& path) {
-  fs::path name = path.stem();
-  name += ".part";
-  name += path.extension();
-  return path.parent_path() / name;
+fs::path unfinished(const fs::path& path) { return part_name(path, 1); }
+
+tl::expected<fs::path, std::string> begin_unfinished(const fs::path& path) {
+  const OpenPart part = open_part(path);
+  if (part.file < 0) {
+    return not_written(path, part.error);
+  }
+  (void)close(part.file);
+  return part.name;
 }
 
-tl::expected<void, std::string> put_in_place(const fs::path& path, Sync sync) {
-  const fs::path part = unfinished(path);
+bool is_there(const fs::path& path) {
+  std::error_code ec;
+  return fs::exists(fs::symlink_status(path, ec));
+}
+
+tl::expected<void, std::string> put_in_place(const fs::path& part, const fs::path& path, Sync sync) {
   int error = sync == Sync::to_disk ? bring_to_disk(part, O_RDONLY) : 0;
   if (error == 0 && std::rename(part.c_str(), path.c_str()) != 0) {
     error = errno;
@@ -105,19 +140,20 @@ bool same_file(const fs::path& a, const fs::path& b) {
 tl::expected<void, std::string> write_whole(const fs::path& path, std::string_view content, Sync sync) {
   std::error_code ec;
   const fs::file_status there = fs::status(path, ec);
-  const bool plain = !fs::exists(there) || fs::is_regular_file(there);
-  const fs::path place = plain ? unfinished(path) : path;
-  const int file = open(place.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (file < 0) {
-    return not_written(path, errno);
+  if (fs::exists(there) && !fs::is_regular_file(there)) {
+    const int file = open(path.c_str(), O_WRONLY | O_CLOEXEC);
+    const int error = file < 0 ? errno : write_all(file, content);
+    return error == 0 ? tl::expected<void, std::string>{} : not_written(path, error);
   }
-  if (const int error = write_all(file, content); error != 0) {
-    if (plain) {
-      (void)unlink(place.c_str());
-    }
+  const OpenPart part = open_part(path);
+  if (part.file < 0) {
+    return not_written(path, part.error);
+  }
+  if (const int error = write_all(part.file, content); error != 0) {
+    (void)unlink(part.name.c_str());
     return not_written(path, error);
   }
-  return plain ? put_in_place(path, sync) : tl::expected<void, std::string>{};
+  return put_in_place(part.name, path, sync);
 }
 
 }  // namespace punctum::tools

@@ -4,12 +4,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include "tools/shared/csv.hpp"
 
 namespace punctum::tools {
 
 tl::expected<StagePoses, std::string> StagePoses::read(const std::string& file) {
+  std::error_code ec;
+  if (const auto there = std::filesystem::status(file, ec);
+      std::filesystem::exists(there) && !std::filesystem::is_regular_file(there)) {
+    return tl::unexpected(file + ": not a file");
+  }
   CsvReader table(file);
   for (const char* column : {"t_s", "tip_x_m", "tip_y_m"}) {
     if (!table.has(column)) {

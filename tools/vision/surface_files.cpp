@@ -143,6 +143,10 @@ std::string stl_of(const char* name, const Mesh& mesh) {
 
 }  // namespace
 
+std::vector<std::string> surface_files(const std::string& stem) {
+  return {stem + ".json", stem + ".obj", stem + "-outer.stl", stem + "-inner.stl"};
+}
+
 tl::expected<void, std::string> write_surface(const std::string& stem, const rt::CellSurface& surface) {
   const std::vector<NamedNet> nets = nets_of(surface);
   if (nets.empty()) {

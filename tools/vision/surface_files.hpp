@@ -3,6 +3,7 @@
 
 #include <string>
 #include <tl/expected.hpp>
+#include <vector>
 
 #include "rt/station/surface.hpp"
 
@@ -15,5 +16,8 @@ namespace punctum::tools {
 // What was not reconstructed is not there; without either nothing is written. The error is one line.
 [[nodiscard]] tl::expected<void, std::string> write_surface(const std::string& stem,
                                                             const rt::CellSurface& surface);
+
+// All that write_surface() may write with this stem.
+[[nodiscard]] std::vector<std::string> surface_files(const std::string& stem);
 
 }  // namespace punctum::tools

@@ -209,7 +209,7 @@ std::string clash(const TrackOptions& options, const Input& input) {
     }
     taken.emplace_back(option, path);
   }
-  if (!options.overlay.empty() && !fs::is_regular_file(options.frames, ec) && !input.camera.files().empty() &&
+  if (!options.overlay.empty() && !input.camera.files().empty() &&
       fs::equivalent(options.overlay, fs::absolute(input.camera.files().front()).parent_path(), ec)) {
     return fmt::format("--overlay {}: is the folder of --frames, allowed: another one", options.overlay);
   }
@@ -282,6 +282,7 @@ void Output::write_surfaces(const vision::Result& result, const Input& input,
 
 struct Counts {
   int frames = 0, outer = 0, inner = 0, unusable = 0;
+  std::string ends;  // why it ends before the recording should; empty if it does not
 };
 
 Counts track_all(Input& input, Output& output) {
@@ -292,6 +293,7 @@ Counts track_all(Input& input, Output& output) {
     hal::Frame frame;
     const hal::Status status = input.camera.next(frame, 0);
     if (status == hal::Status::disconnected || status == hal::Status::no_data) {
+      counts.ends = input.camera.last_error();
       return counts;
     }
     ++counts.frames;
@@ -350,7 +352,10 @@ int track(const TrackOptions& options) {
     return kBadInput;
   }
   const Counts counts = track_all(*input, *output);
-  int code = output->whole ? kDone : kNotWritten;
+  if (!counts.ends.empty()) {
+    complain(counts.ends);
+  }
+  int code = output->whole && counts.ends.empty() ? kDone : kNotWritten;
   const auto check_complete = [&code](bool written, const std::string& file, const std::string& why) {
     if (!written) {
       complain(fmt::format("{}: not complete: {}", file, why));

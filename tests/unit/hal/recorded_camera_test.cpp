@@ -213,6 +213,35 @@ TEST_F(Recorded, a_bad_picture_is_a_fault_and_the_next_one_follows) {
   EXPECT_EQ(frame.pixels[0], disc(40, 30, 1).at<std::uint8_t>(0, 0));
 }
 
+TEST_F(Recorded, what_another_system_has_laid_beside_the_pictures_is_none_of_them) {
+  write("._a.png", {0, 5, 22, 7});
+  write("a.png", encoded(disc(40, 30), ".png"));
+  const auto camera = recorded::Camera::open(folder.string());
+  ASSERT_TRUE(camera) << camera.error();
+  EXPECT_EQ(camera->files(), std::vector<std::string>{path("a.png")});
+}
+
+TEST_F(Recorded, of_several_pictures_in_one_file_none_is_read_for_all) {
+  const std::vector<cv::Mat> pages{disc(40, 30), disc(40, 30, 1)};
+  ASSERT_TRUE(cv::imwritemulti(path("a.tif"), pages));
+  const auto picture = recorded::read_picture(path("a.tif"));
+  ASSERT_FALSE(picture);
+  EXPECT_EQ(picture.error(),
+            path("a.tif") + ": the TIFF file holds several pictures; allowed: one in a file");
+  EXPECT_TRUE(recorded::decode(encoded(disc(40, 30), ".tif")));
+}
+
+TEST(Picture, whose_coded_data_end_early_is_refused_and_the_library_stays_silent) {
+  Bytes jpeg = encoded(disc(200, 150), ".jpg");
+  jpeg.resize(jpeg.size() / 2);
+  jpeg.insert(jpeg.end(), {0xff, 0xd9});
+  testing::internal::CaptureStderr();
+  const auto picture = recorded::decode(jpeg);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  ASSERT_FALSE(picture);
+  EXPECT_EQ(picture.error(), "the picture's data are damaged or incomplete");
+}
+
 TEST_F(Recorded, a_bad_first_picture_is_an_error_of_open) {
   Bytes cut = encoded(disc(40, 30), ".jpg");
   cut.resize(cut.size() - 40);
@@ -282,6 +311,7 @@ TEST_F(Recorded, a_video_plays_at_its_own_rate_or_at_the_given_one) {
       ++n;
     }
     EXPECT_LT(n, 10);
+    EXPECT_EQ(cut->last_error(), video + ": ends after " + std::to_string(n) + " of 10 pictures");
   } else {
     EXPECT_TRUE(one_line(cut.error()));
   }

@@ -27,6 +27,8 @@
 #include "tools/record/recording.hpp"
 #include "tools/scene/scene.hpp"
 #include "tools/shared/csv.hpp"
+#include "tools/shared/whole_file.hpp"
+#include "tools/vision/surface_files.hpp"
 #include "tools/wire/messages.hpp"
 
 namespace punctum::tools {
@@ -75,6 +77,9 @@ class ExportTest : public FullDisk {
     EXPECT_TRUE(ends && ends->empty()) << (ends ? *ends : ends.error());
     std::ifstream in(stem + ".json");
     const std::string text{std::istreambuf_iterator<char>(in), {}};
+    for (const std::string& file : surface_files(stem)) {
+      std::filesystem::remove(file);
+    }
     const std::string key = "\"frame\": ";
     const auto at = text.find(key);
     return at == std::string::npos ? text : text.substr(at + key.size(), 1);
@@ -322,6 +327,75 @@ std::string recorded_run(const std::filesystem::path& folder, bool whole = true)
     file->close_chunk();
   }
   return path;
+}
+
+TEST_F(ExportTest, ticks_that_this_build_does_not_know_are_counted) {
+  const std::string path = folder_ / "odd.mcap";
+  auto file = mcap::Writer::create(path, "punctum test");
+  ASSERT_TRUE(file) << file.error();
+  const std::uint16_t telemetry = add(*file, Stream::telemetry);
+  for (std::uint64_t tick = 0; tick < 10; ++tick) {
+    v1::Telemetry t;
+    t.set_tick(tick);
+    t.set_t_s(tick < 8 ? 1e-3 * static_cast<double>(tick) : std::numeric_limits<double>::quiet_NaN());
+    t.set_phase(tick == 3 ? static_cast<v1::Phase>(99) : v1::PHASE_FREE);
+    file->message(telemetry, tick, tick, t.SerializeAsString());
+  }
+  file->finish();
+  const auto exported = export_csv(path, folder_ / "t");
+  ASSERT_TRUE(exported) << exported.error();
+  EXPECT_EQ(exported->ticks, 7U);
+  EXPECT_EQ(exported->unknown_ticks, 3U);
+  EXPECT_EQ(exported->ends, path +
+                                ": 3 ticks are left out of samples.csv: their phase, fault, stop or time is "
+                                "none that this build knows");
+}
+
+TEST_F(ExportTest, nothing_that_is_there_is_replaced_and_what_is_refused_leaves_nothing) {
+  const std::string run = recorded_run(folder_);
+  const auto refused = [](const auto& exported, const std::string& file) {
+    ASSERT_FALSE(exported) << file;
+    EXPECT_EQ(exported.error(), file + ": is there already; an export replaces nothing");
+  };
+  for (const char* name : {"samples.csv", "events.csv", "observations.csv", "scene.toml"}) {
+    const auto folder = folder_ / name;
+    std::filesystem::create_directory(folder);
+    std::ofstream(folder / name) << "mine";
+    refused(export_csv(run, folder), folder / name);
+    EXPECT_EQ(bytes_of(folder / name), "mine");
+    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder), {}), 1) << name;
+  }
+  const std::string stem = folder_ / "cell";
+  for (const std::string& file : surface_files(stem)) {
+    std::ofstream(file) << "mine";
+    refused(export_surface(recording(), stem, {}), file);
+    EXPECT_EQ(bytes_of(file), "mine");
+    std::filesystem::remove(file);
+  }
+  const std::string nowhere = folder_ / "link.nwb";
+  std::filesystem::create_symlink(folder_ / "none", nowhere);
+  refused(export_hdf5(run, nowhere), nowhere);
+}
+
+TEST_F(ExportTest, nothing_is_written_through_a_name_that_somebody_else_has_taken) {
+  const std::string run = recorded_run(folder_), whole = bytes_of(run), pictures = recorded_pictures(folder_);
+  std::filesystem::create_symlink(run, folder_ / "a.part.nwb");
+  std::ofstream(folder_ / "a.ome.part.tif") << "mine";
+  EXPECT_TRUE(export_hdf5(run, folder_ / "a.nwb"));
+  EXPECT_TRUE(export_ome_tiff(pictures, folder_ / "a.ome.tif"));
+  EXPECT_EQ(bytes_of(run), whole);
+  EXPECT_EQ(bytes_of(folder_ / "a.nwb").substr(1, 3), "HDF");
+  EXPECT_EQ(bytes_of(folder_ / "a.ome.part.tif"), "mine");
+  EXPECT_TRUE(std::filesystem::is_symlink(folder_ / "a.part.nwb"));
+}
+
+TEST_F(ExportTest, pictures_that_a_full_disk_did_not_take_leave_room_for_another_try) {
+  const std::string pictures = recorded_pictures(folder_), out = folder_ / "png";
+  full_beyond(100);
+  EXPECT_FALSE(export_png(pictures, out));
+  has_room_again();
+  EXPECT_FALSE(std::filesystem::exists(out));
+  EXPECT_TRUE(export_png(pictures, out));
 }
 
 // To the end of a process, where the library closes what is still open.

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -22,7 +23,9 @@
 #include "hal/devices.hpp"
 #include "rt/forces/list.hpp"
 #include "tools/punctum/event_log.hpp"
+#include "tools/punctum/facts.hpp"
 #include "tools/punctum/folder_lock.hpp"
+#include "tools/punctum/provenance.hpp"
 #include "tools/punctum/rebuilt_facts.hpp"
 #include "tools/punctum/run_page.hpp"
 #include "tools/punctum/run_report.hpp"
@@ -428,6 +431,65 @@ TEST(Rebuilt, rows_that_are_missing_between_others_are_told) {
   EXPECT_EQ(facts["outcome"], "done") << "what the cell got is not known";
   folder.put("samples.csv", RecordedInjection::rows(7));
   EXPECT_TRUE(rebuilt_facts(folder.path())["not_kept"].empty()) << "every seventh row, and changes of phase";
+}
+
+TEST(Rebuilt, rows_that_are_damaged_are_counted_and_what_depends_on_them_is_unknown) {
+  const Folder folder;
+  folder.put("scene.toml", to_toml(*load_scene("icsi")));
+  folder.put("events.csv", ended_as(rt::RunEnd::done));
+  const std::string rows = RecordedInjection::rows(1);
+  const auto rebuilt = [&folder](const std::string& table, const char* why, double t_s) {
+    folder.put("samples.csv", table);
+    Json facts = rebuilt_facts(folder.path());
+    const Json told = facts["not_kept"].empty() ? Json::object() : facts["not_kept"].back();
+    EXPECT_EQ(text_in(told, "why"), why);
+    EXPECT_NEAR(number_in(told, "t_s").value_or(-1), t_s, 1e-9) << why;
+    EXPECT_TRUE(facts["dose"]["given_s"].is_null() && facts["dose"]["asked_s"].is_null()) << why;
+    EXPECT_TRUE(facts["alarms_s"].is_null() && facts["phases"].empty()) << why;
+    return facts;
+  };
+  std::string zeroed = rows;
+  const std::size_t block = zeroed.find("\n0.400000,") + 20;
+  std::fill_n(zeroed.begin() + static_cast<std::ptrdiff_t>(block), 4096, '\0');
+  Json facts = rebuilt(zeroed, "1 row cannot be read", 0.399);
+  EXPECT_NE(facts["needle_at_end"]["where"], "unknown");
+  EXPECT_EQ(facts["samples"]["unreadable"], 1);
+  std::string odd = rows;
+  for (std::size_t at = 0; (at = odd.find(",1,0,1e-06,", at)) != std::string::npos;) {
+    odd[at + 1] = '#';  // injector_open
+  }
+  (void)rebuilt(odd, "800 rows cannot be read", 0.249);
+  facts =
+      rebuilt(rows + rows.substr(rows.find('\n') + 1), "1400 rows left out: their times do not rise", 1.399);
+  EXPECT_EQ(facts["samples"]["rows"], 1400);
+  EXPECT_EQ(facts["samples"]["not_rising"], 1400);
+  facts = rebuilt(rows + "1.400000,clear,0\n", "1 row cannot be read", 1.399);
+  EXPECT_EQ(facts["needle_at_end"]["where"], "unknown") << "what came last cannot be read";
+  EXPECT_EQ(report_folders({folder.path()}, ""), 1);
+  EXPECT_EQ(report_folders({folder.path()}, ""), 1) << "from report.json, too";
+}
+
+TEST(Rebuilt, what_a_run_began_as_is_said_to_be_unreadable) {
+  const Folder folder;
+  folder.put("samples.csv", "t_s,phase,fz_N,fault\n0.000,free,0,none\n");
+  folder.put(kBegun, "{\"scene\": ");
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(report_folders({folder.path()}, ""), 1);
+  const std::string said = testing::internal::GetCapturedStderr();
+  EXPECT_TRUE(contains(said, "begun.json from about 0.000 s on: cannot be read")) << said;
+}
+
+TEST(Rebuilt, a_pipe_in_the_folder_is_refused_and_not_waited_for) {
+  for (const char* name :
+       {"begun.json", "events.csv", "obs.csv", "report.json", "report.html", "scene.toml"}) {
+    const Folder folder;
+    folder.put("samples.csv", "t_s,phase,fz_N,fault\n0.000,free,0,none\n");
+    ASSERT_EQ(mkfifo((fs::path(folder.path()) / name).c_str(), 0600), 0);
+    testing::internal::CaptureStderr();
+    EXPECT_EQ(report_folders({folder.path()}, ""), 2) << name;
+    const std::string said = testing::internal::GetCapturedStderr();
+    EXPECT_TRUE(contains(said, std::string(name) + ": not a file")) << said;
+  }
 }
 
 TEST(Rebuilt, what_came_about_between_two_rows_came_at_a_time_that_is_not_known) {

@@ -3,6 +3,7 @@
 #include "tools/punctum/recorder.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -390,6 +391,13 @@ TEST_F(RecorderTest, a_report_that_is_replaced_takes_no_file_of_anybody_else_wit
   EXPECT_TRUE(fs::exists(old / "frames" / "of_mine.jpg"));
   EXPECT_TRUE(fs::exists(old / "notes.txt"));
   EXPECT_FALSE(fs::exists(fresh->folder));
+}
+
+TEST_F(RecorderTest, a_pipe_in_place_of_a_scene_is_no_report_and_is_not_waited_for) {
+  ASSERT_EQ(mkfifo((folder_ / "scene.toml").c_str(), 0600), 0);
+  const auto report = prepare_report_folder(*load_scene("free"), folder_.string(), false);
+  ASSERT_FALSE(report);
+  EXPECT_NE(report.error().find("scene.toml: is there, but no run has written it"), std::string::npos);
 }
 
 // ---- whether vision hangs ----

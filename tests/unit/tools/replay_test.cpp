@@ -7,6 +7,7 @@
 #include <cmath>
 #include <deque>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -309,7 +310,33 @@ TEST_F(ReplayTest, what_is_missing_ends_it_there_and_is_told) {
       replay_inputs(changed<v1::Telemetry>([](v1::Telemetry& m) { return m.tick() % 2 == 0; }));
   ASSERT_TRUE(telemetry) << telemetry.error();
   EXPECT_FALSE(telemetry->differs);
-  EXPECT_EQ(telemetry->not_told, kTicks / 2 - 1) << "the last tick is none that another follows";
+  EXPECT_EQ(telemetry->not_told, kTicks / 2);
+}
+
+TEST_F(ReplayTest, ticks_that_cannot_be_compared_are_counted_to_the_end_of_the_recording) {
+  const auto times = replay_inputs(changed<v1::Telemetry>([](v1::Telemetry& m) {
+    m.set_t_s(m.tick() < 1000 ? m.t_s() : std::numeric_limits<double>::quiet_NaN());
+    return true;
+  }));
+  ASSERT_TRUE(times) << times.error();
+  EXPECT_EQ(times->ticks, 1000U);
+  EXPECT_EQ(times->not_known, kTicks - 1000);
+  EXPECT_EQ(times->not_told + times->not_given, 0U);
+  const auto phases = replay_inputs(changed<v1::Telemetry>([](v1::Telemetry& m) {
+    if (m.tick() >= 300 && m.tick() < 310) {
+      m.set_phase(static_cast<v1::Phase>(99));
+    }
+    return true;
+  }));
+  ASSERT_TRUE(phases) << phases.error();
+  EXPECT_EQ(phases->ticks, kTicks - 10);
+  EXPECT_EQ(phases->not_known, 10U);
+  const auto told = replay_inputs(changed<v1::Telemetry>([](v1::Telemetry& m) { return m.tick() < 1000; }));
+  ASSERT_TRUE(told) << told.error();
+  EXPECT_EQ(told->not_told, kTicks - 1000);
+  const auto given = replay_inputs(changed<v1::Input>([](v1::Input& m) { return m.tick() < 1000; }));
+  ASSERT_TRUE(given) << given.error();
+  EXPECT_EQ(given->not_given, kTicks - 1000);
 }
 
 TEST_F(ReplayTest, a_recording_without_a_beginning_is_refused_in_one_line) {

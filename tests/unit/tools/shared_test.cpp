@@ -104,6 +104,17 @@ TEST_F(FilesTest, where_there_is_no_room_the_old_file_stays_and_no_half_of_the_n
   EXPECT_EQ(files(), 1U);
 }
 
+TEST_F(FilesTest, what_has_the_name_of_a_work_file_is_not_written_to) {
+  const fs::path file = folder_ / "a.csv", mine = folder_ / "mine";
+  ASSERT_TRUE(write_whole(mine, "mine"));
+  fs::create_symlink(mine, unfinished(file));
+  ASSERT_TRUE(write_whole(file, "new"));
+  EXPECT_EQ(read_all(file), "new");
+  EXPECT_EQ(read_all(mine), "mine");
+  EXPECT_TRUE(fs::is_symlink(unfinished(file)));
+  EXPECT_EQ(files(), 3U);
+}
+
 TEST_F(FilesTest, a_folder_that_is_not_there_is_an_error_and_a_device_is_written_directly) {
   EXPECT_FALSE(write_whole(folder_ / "nowhere" / "a.csv", "x"));
   EXPECT_TRUE(write_whole("/dev/null", "x"));
@@ -125,6 +136,23 @@ TEST_F(FilesTest, what_is_no_file_or_too_large_is_not_read_to_its_end) {
   std::ofstream(large) << "{";
   fs::resize_file(large, kReadMost + 1);
   EXPECT_EQ(read_whole(large).error(), large.string() + ": too large, allowed: at most 64 MB");
+}
+
+TEST_F(FilesTest, a_table_that_is_no_file_has_no_rows) {
+  const fs::path pipe = folder_ / "pipe";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  for (const fs::path& none : {pipe, fs::path("/dev/zero")}) {
+    CsvReader table(none);
+    EXPECT_TRUE(table.is_empty());
+    EXPECT_FALSE(table.next());
+  }
+}
+
+TEST_F(FilesTest, rows_do_not_wait_for_somebody_to_read_a_pipe) {
+  const fs::path pipe = folder_ / "pipe";
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(RowFile::open(pipe, RowFile::Begin::empty).error(),
+            pipe.string() + ": cannot be written: nobody reads it");
 }
 
 TEST_F(FilesTest, an_output_is_the_same_file_by_whatever_name) {

@@ -390,6 +390,27 @@ TEST_F(StationRecorderTest, who_comes_late_gets_what_the_rings_still_hold_and_ha
   EXPECT_TRUE(r->lost_nothing());
 }
 
+TEST_F(StationRecorderTest, who_comes_late_knows_from_when_on_the_file_tells) {
+  tick(1);
+  EXPECT_FALSE(recorder()->ticks_from_s());
+  fs::remove(path());
+  tick(3 * rt::TelemetryRing::kSize);
+  rt::Observation o;
+  for (std::uint64_t i = 0; i < 3 * rt::ObservationSlot::kSize; ++i) {
+    o.exposure_ns = 5'000'000'000 + static_cast<std::int64_t>(i) * 40'000'000;
+    observation_->slot.push(o);
+  }
+  auto r = recorder();
+  r->finish();
+  const Recorded all = read();
+  ASSERT_TRUE(r->ticks_from_s() && r->observations_from_s());
+  EXPECT_EQ(*r->ticks_from_s(), all.ticks.front().t_s());
+  EXPECT_NEAR(*r->observations_from_s(),
+              1e-9 * static_cast<double>(all.observations.front().exposure_ns() - 5'000'000'000), 1e-9);
+  EXPECT_GT(*r->observations_from_s(), 0);
+  EXPECT_TRUE(r->lost_nothing());
+}
+
 TEST_F(StationRecorderTest, the_truth_of_a_tick_follows_it) {
   scene_ = *load_scene("free", {"scene.clock=\"virtual\""});
   const auto bench = std::make_unique<sim::Bench>();

@@ -1,5 +1,6 @@
 // punctum-vision track: its input files, its output files, and its messages about bad ones.
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <array>
 #include <cmath>
@@ -306,6 +307,21 @@ TEST_F(Track, refuses_an_output_that_is_an_input_or_another_output) {
   refused([](TrackOptions& o) { o.contours = o.out; }, ": is the file of --out,");
   refused([this](TrackOptions& o) { o.overlay = (folder_ / "frames" / ".").string(); },
           ": is the folder of --frames, allowed: another one\n");
+  refused(
+      [this](TrackOptions& o) {
+        o.frames = name(1);
+        o.overlay = (folder_ / "frames").string();
+      },
+      ": is the folder of --frames, allowed: another one\n");
+  refused(
+      [this](TrackOptions& o) {
+        o.poses = (folder_ / "pipe").string();
+        ASSERT_EQ(mkfifo(o.poses.c_str(), 0600), 0);
+      },
+      "pipe: not a file\n");
+  refused([](TrackOptions& o) { o.poses = "/dev/zero"; }, "/dev/zero: not a file\n");
+  refused([this](TrackOptions& o) { o.out = (folder_ / "pipe").string(); },
+          "pipe: cannot be written: nobody reads it\n");
   EXPECT_FALSE(fs::exists(folder_ / "obs.csv"));
   EXPECT_GT(fs::file_size(name(1)), 100U);
   options_.contours = options_.overlay = "";

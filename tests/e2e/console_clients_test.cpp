@@ -930,6 +930,87 @@ TEST_F(Console, drops_the_oldest_of_a_client_that_does_not_read_and_nobody_else_
   EXPECT_TRUE(alive(console_->pid()));
 }
 
+TEST_F(Console, tells_what_holds_until_the_next_change_also_whoever_did_not_read_for_a_while) {
+  start_console(station_.name());
+  // Samples and ticks fill what waits for it within seconds.
+  const auto stalled =
+      client(R"({"op":"subscribe","subscriptions":[{"id":10,"channelId":0},{"id":15,"channelId":5},)"
+             R"({"id":16,"channelId":6},{"id":17,"channelId":7}]})",
+             4096);
+  const auto quick = client(kAll);
+  std::jthread core([&](const std::stop_token& done) {
+    for (; !done.stop_requested(); std::this_thread::sleep_for(500us)) {
+      station_.tick();
+    }
+  });
+  const auto wait = [&quick](int messages) {
+    for (int i = 0; i < messages; ++i) {
+      ASSERT_TRUE(is_of(quick->until([](const auto& f) { return is_of(f, 10); }), 10)) << i;
+    }
+  };
+  wait(600);
+  rt::Event changed;
+  changed.kind = rt::Event::command;
+  changed.what = rt::Command::depth_limit;
+  changed.value = 20e-6;
+  station_.core().events.push(changed);
+  wait(1500);
+  const auto depth_um = [](const WebClient::Frame& f) {
+    const Json all = Json::parse(f.payload.substr(13));
+    for (const Json& p : all["parameters"]) {
+      if (p["name"] == "depth_limit") {
+        return p["value"].get<double>();
+      }
+    }
+    return 0.0;
+  };
+  int dropped = 0;
+  const auto told = stalled->until([&](const auto& f) {
+    if (is_of(f, 15)) {
+      dropped = Json::parse(f.payload.substr(13))["dropped"];
+    }
+    return (is_of(f, 16) && depth_um(f) < 21) || dropped > 1000;
+  });
+  EXPECT_TRUE(is_of(told, 16)) << dropped;
+  const auto words = stalled->until([](const auto& f) {
+    return is_of(f, 15) && Json::parse(f.payload.substr(13)).value("dropped", 0) > 0;
+  });
+  EXPECT_TRUE(is_of(words, 15)) << "messages were dropped, but not this one";
+}
+
+TEST_F(Console, tells_over_a_line_that_is_too_slow_fewer_samples_but_no_old_ones) {
+  start_console(station_.name());
+  const auto slow = client(kAll, 4096);
+  std::jthread core([&](const std::stop_token& done) {
+    for (; !done.stop_requested(); std::this_thread::sleep_for(1ms)) {
+      station_.tick();
+    }
+  });
+  constexpr double kLine_bytes_s = 30e3;
+  const auto begun = std::chrono::steady_clock::now();
+  double told_bytes = 0, age_s = 0;
+  std::uint64_t last = 0, skipped = 0;
+  while (std::chrono::steady_clock::now() - begun < 8s) {
+    const auto f = slow->read();
+    ASSERT_GE(f.opcode, 0);
+    told_bytes += static_cast<double>(f.payload.size());
+    std::this_thread::sleep_until(begun + std::chrono::duration_cast<std::chrono::nanoseconds>(
+                                              std::chrono::duration<double>(told_bytes / kLine_bytes_s)));
+    v1::Telemetry t;
+    if (!is_of(f, 10) || !t.ParseFromString(f.payload.substr(13))) {
+      continue;
+    }
+    skipped = std::max(skipped, t.tick() - std::exchange(last, t.tick()));
+    const auto told_ns = static_cast<std::int64_t>(
+        number_at(f.payload, 5) | static_cast<std::uint64_t>(number_at(f.payload, 9)) << 32U);
+    age_s = std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch() -
+                                          std::chrono::nanoseconds(told_ns))
+                .count();
+  }
+  EXPECT_LT(age_s, 2.0);
+  EXPECT_GT(skipped, 100U);
+}
+
 TEST_F(Console, tells_a_client_that_is_behind_no_pictures_and_so_all_the_rest) {
   start_console(station_.name());
   const auto one =

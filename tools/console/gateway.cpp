@@ -1,6 +1,7 @@
 #include "tools/console/gateway.hpp"
 
 #include <fmt/format.h>
+#include <netinet/tcp.h>
 
 #include <algorithm>
 #include <array>
@@ -60,9 +61,17 @@ constexpr std::array<Offered, 5> kServices = {
      {replay_service, "/punctum/replay", "punctum.v1.ReplayRequest"},
      {hand_service, "/punctum/hand", "punctum.v1.HandRequest"}}};
 constexpr int kSendBuffer_bytes = 64 * 1024;  // what the kernel keeps for a client that does not read
+// Of it, what has not left yet: what waits there cannot be left out any more, and is old when it arrives.
+constexpr int kUnsent_bytes = 8 * 1024;
 
 // A client that is so far behind is told no pictures: they would only push out what is newer.
 constexpr std::size_t kBehind_bytes = kOutboxBytes / 4;
+// And so far, nothing of which only the newest counts: what waits behind it would be old when it arrives. The
+// page takes for fresh what is twice as old.
+constexpr double kBehind_s = 0.25;
+constexpr bool only_the_newest_counts(ChannelId channel) {
+  return channel == telemetry || channel == observation || channel == surface;
+}
 
 constexpr std::size_t kMostReasonBytes = 120;  // of a close frame
 // Whoever asked for a stop waits for the word that it is latched.
@@ -257,6 +266,7 @@ class Gateway::Server::Client : public std::enable_shared_from_this<Client> {
   void read_more();
   void obey(const ClientMessage& message);
   void subscribe(const Subscribe& wanted);
+  void put(const Told& news, std::uint32_t subscription);
   void call(const ServiceCall& request);
   [[nodiscard]] tl::expected<void, std::string> serve(const ServiceCall& request);
   [[nodiscard]] tl::expected<void, std::string> control(std::string_view request);
@@ -468,6 +478,7 @@ void Gateway::Server::Client::obey(const ClientMessage& message) {
   } else if (const auto* no_more = std::get_if<Unsubscribe>(&message)) {
     for (const std::uint32_t id : no_more->ids) {
       subscriptions_.erase(id);
+      outbox_.forget(id);
     }
   } else if (const auto* request = std::get_if<ServiceCall>(&message)) {
     call(*request);
@@ -489,14 +500,7 @@ void Gateway::Server::Client::subscribe(const Subscribe& wanted) {
     std::vector<Told> missed;
     server_.feed_.catch_up(static_cast<ChannelId>(one.channel), missed);
     for (const Told& news : missed) {
-      std::string head(1, '\x01');
-      append(head, one.id, 4);
-      append(head, news.time_ns, 8);
-      if (news.channel == state) {
-        outbox_.push({std::move(head) + own_state(*news.message), nullptr, false});
-      } else {
-        outbox_.push({std::move(head), news.message, false});
-      }
+      put(news, one.id);
     }
   }
   send_next();
@@ -603,7 +607,7 @@ void Gateway::Server::Client::call(const ServiceCall& request) {
   append(response, kEncoding.size(), 4);
   response += kEncoding;
   response += "{}";
-  outbox_.push({std::move(response), nullptr, false});
+  outbox_.push({.head = std::move(response), .since_s = now_s()});
   send_next();
 }
 
@@ -611,20 +615,33 @@ void Gateway::Server::Client::tell(const Told& news) {
   if (news.channel == picture && outbox_.bytes() > kBehind_bytes) {
     return;
   }
+  const bool is_behind = only_the_newest_counts(news.channel) && outbox_.behind_s(now_s()) > kBehind_s;
   for (const auto& [id, channel] : subscriptions_) {
     if (channel != news.channel) {
       continue;
     }
-    std::string head(1, '\x01');
-    append(head, id, 4);
-    append(head, news.time_ns, 8);
-    if (news.channel == state) {  // the one message that is of this client's own
-      outbox_.push({std::move(head) + own_state(*news.message), nullptr, false});
+    if (is_behind) {
+      outbox_.leave_out();
     } else {
-      outbox_.push({std::move(head), news.message, false});
+      put(news, id);
     }
   }
   send_next();
+}
+
+void Gateway::Server::Client::put(const Told& news, std::uint32_t subscription) {
+  Outgoing message{.head = "\x01", .since_s = now_s()};
+  append(message.head, subscription, 4);
+  append(message.head, news.time_ns, 8);
+  if (news.channel == state) {  // the one message that is of this client's own
+    message.head += own_state(*news.message);
+  } else {
+    message.body = news.message;
+  }
+  if (news.holds) {
+    message.holds_for = subscription;
+  }
+  outbox_.push(std::move(message));
 }
 
 std::string Gateway::Server::Client::own_state(std::string common) const {
@@ -649,7 +666,7 @@ ChannelSet Gateway::Server::Client::wanted() const {
 }
 
 void Gateway::Server::Client::send_text(std::string text) {
-  outbox_.push({std::move(text), nullptr, true});
+  outbox_.push({.head = std::move(text), .text = true, .since_s = now_s()});
   send_next();
 }
 
@@ -748,6 +765,8 @@ void Gateway::Server::accept() {
       error_code ignored;
       ignored = socket.set_option(tcp::no_delay(true), ignored);
       ignored = socket.set_option(asio::socket_base::send_buffer_size(kSendBuffer_bytes), ignored);
+      ignored = socket.set_option(
+          asio::detail::socket_option::integer<IPPROTO_TCP, TCP_NOTSENT_LOWAT>(kUnsent_bytes), ignored);
       const tcp::endpoint at = socket.remote_endpoint(ignored);
       const std::string from = fmt::format("{}:{}", bracketed(at.address()), at.port());
       if (tls_) {

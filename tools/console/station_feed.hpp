@@ -65,6 +65,7 @@ struct Told {
   ChannelId channel;
   std::uint64_t time_ns;  // since 1970, when it was read
   std::shared_ptr<const std::string> message;
+  bool holds = false;  // until the next one that does: it is told once per change
 };
 
 class StationFeed {

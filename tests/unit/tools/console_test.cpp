@@ -322,6 +322,56 @@ TEST(Outbox, drops_the_oldest_when_it_is_full_and_counts_it) {
   EXPECT_EQ(box.bytes(), 0U);
 }
 
+std::string sent_from(Outbox& box) {
+  std::string sent;
+  while (const Outgoing* next = box.begin_sending()) {
+    sent += next->head;
+    box.sent();
+  }
+  return sent;
+}
+
+TEST(Outbox, keeps_what_holds_until_the_next_of_its_kind_and_of_that_the_newest_alone) {
+  const auto holding = [](const std::string& text, std::uint32_t kind) {
+    return Outgoing{.head = text, .holds_for = kind};
+  };
+  Outbox box(4, 1000);
+  box.push(holding("P", 7));
+  box.push(holding("F", 8));
+  box.push(holding("Q", 7));
+  for (const char* text : {"a", "b", "c", "d", "e"}) {
+    box.push(outgoing(text));
+  }
+  EXPECT_EQ(box.dropped(), 3U) << "what a newer one replaced is not missed";
+  EXPECT_EQ(sent_from(box), "FQde");
+  EXPECT_EQ(box.bytes(), 0U);
+  // The one under way stays; nobody who has gone is told; one that alone is too much is still sent.
+  box.push(holding("1", 7));
+  EXPECT_EQ(box.begin_sending()->head, "1");
+  box.push(holding("2", 7));
+  box.push(holding("x", 8));
+  box.forget(8);
+  box.forget(9);
+  box.sent();
+  EXPECT_EQ(sent_from(box), "2");
+  box.push(holding(std::string(2000, 'z'), 7));
+  box.push(outgoing("y"));
+  EXPECT_EQ(sent_from(box).size(), 2001U);
+  EXPECT_EQ(box.bytes(), 0U);
+}
+
+TEST(Outbox, says_for_how_long_the_oldest_has_waited) {
+  Outbox box(10, 1000);
+  EXPECT_EQ(box.behind_s(100), 0);
+  box.push({.head = "a", .since_s = 100});
+  box.push({.head = "b", .since_s = 101});
+  EXPECT_EQ(box.behind_s(102), 2);
+  (void)box.begin_sending();
+  EXPECT_EQ(box.behind_s(102), 2) << "one that is on its way for long is behind, too";
+  box.sent();
+  EXPECT_EQ(box.behind_s(102), 1);
+}
+
 TEST(Outbox, keeps_the_one_under_way_where_it_is) {
   Outbox box(2, 1000);
   box.push(outgoing("first"));

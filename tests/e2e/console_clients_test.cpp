@@ -547,7 +547,10 @@ TEST_F(SafeConsole, listens_for_other_machines_with_TLS_and_private_tokens_alone
   EXPECT_NE(said_.find("0600"), std::string::npos) << said_;
   chmod(own.key.c_str(), 0600);
   EXPECT_EQ(code({"0.0.0.0", "--tokens", file}, {"--certificate", own.certificate}), 2);
-  EXPECT_EQ(code({"127.0.0.1", "--tokens", tokens(0644)}, {}), 2) << "on the loopback, too";
+  EXPECT_EQ(code({"127.0.0.1", "--tokens", tokens(0644)}, tls), 2) << "on the loopback, too";
+  EXPECT_NE(said_.find("0600"), std::string::npos) << said_;
+  EXPECT_EQ(code({"127.0.0.1", "--tokens", tokens()}, {}), 2) << "TLS on the loopback, too";
+  EXPECT_NE(said_.find("--tokens: refused without TLS"), std::string::npos) << said_;
 
   chmod(file.c_str(), 0600);
   start_console(station_.name(), {"--port", "0", "--address", "0.0.0.0", "--tokens", file, "--certificate",
@@ -664,16 +667,19 @@ TEST_F(SafeConsole, answers_whoever_it_refuses_whatever_the_other_is_called) {
   const std::string second = std::string(40, 'p');
   std::ofstream(path) << "operate " << operate_ << " J\xf6rg\noperate " << second << " ada\n";
   chmod(path.c_str(), 0600);
-  start_console(station_.name(), {"--port", "0", "--tokens", path});
+  const Certificate own(path.parent_path());
+  start_console(station_.name(),
+                {"--port", "0", "--tokens", path, "--certificate", own.certificate, "--key", own.key});
   begin_to_tick();
-  token_ = operate_;
-  const auto first = operator_client();
-  token_ = second;
-  const auto ada = operator_client();
-  EXPECT_EQ(control(*first), "");
-  EXPECT_NE(control(*ada).find("rg (127.0.0.1"), std::string::npos);
-  EXPECT_EQ(control(*first, false), "");
-  EXPECT_EQ(control(*ada), "");
+  WebClient first(port_), ada(port_);
+  for (auto& [web, token] : {std::pair{&first, operate_}, std::pair{&ada, second}}) {
+    ASSERT_TRUE(web->encrypt(own.certificate));
+    ASSERT_TRUE(web->upgrade(host(), "", with_token(token)).starts_with("HTTP/1.1 101 "));
+  }
+  EXPECT_EQ(control(first), "");
+  EXPECT_NE(control(ada).find("rg (127.0.0.1"), std::string::npos);
+  EXPECT_EQ(control(first, false), "");
+  EXPECT_EQ(control(ada), "");
 }
 
 TEST_F(SafeConsole, moves_the_hand_for_whoever_has_control_and_lets_go_with_it) {

@@ -707,8 +707,12 @@ tl::expected<std::unique_ptr<Gateway::Server>, std::string> Gateway::Server::ope
   if (failed) {
     return tl::unexpected(fmt::format("{}: not an address", settings.address));
   }
-  const bool encrypted = !settings.certificate.empty();
-  if (!address.is_loopback() && (!encrypted || !settings.tokens.made().empty())) {
+  const bool encrypted = !settings.certificate.empty(), from_file = settings.tokens.made().empty();
+  if (from_file && !encrypted) {  // they are good for later gateways, too, and whoever has this port next
+                                  // would be shown them
+    return tl::unexpected(std::string("--tokens: refused without TLS; give --certificate and --key, too"));
+  }
+  if (!address.is_loopback() && !from_file) {
     return tl::unexpected(fmt::format("{}: refused without TLS and a file of tokens", settings.address));
   }
   std::optional<TlsFront> tls;

@@ -84,9 +84,10 @@ int main_or_throw(int argc, char** argv) {
       app.add_option("--key", settings.key, "of the certificate, PEM, mode 0600")->type_name("FILE");
   certificate->needs(key);
   key->needs(certificate);
-  app.add_option(
-         "--tokens", tokens,
-         "mode 0600; lines `view TOKEN [NAME]` or `operate TOKEN [NAME]`: without a token nobody is let in")
+  app.add_option("--tokens", tokens,
+                 "mode 0600; lines `view TOKEN [NAME]` or `operate TOKEN [NAME]`: without a token nobody is "
+                 "let in; needs "
+                 "--certificate and --key")
       ->type_name("FILE");
   app.add_option("--host", settings.hosts, "another name of this machine, for pages; may be repeated")
       ->type_name("NAME")

@@ -546,6 +546,19 @@ TEST_F(SafeConsole, listens_for_other_machines_with_TLS_and_private_tokens_alone
   EXPECT_EQ(code({"0.0.0.0", "--tokens", file}, tls), 2);
   EXPECT_NE(said_.find("0600"), std::string::npos) << said_;
   chmod(own.key.c_str(), 0600);
+  const std::string pipe = fs::path(words()).replace_filename("pipe");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  for (const Words& waits : {Words{"--certificate", pipe, "--key", own.key},
+                             Words{"--certificate", own.certificate, "--key", pipe}}) {
+    EXPECT_EQ(code({"0.0.0.0", "--tokens", file}, waits), 2);
+    EXPECT_NE(said_.find("not a file"), std::string::npos) << said_;
+  }
+  if (geteuid() == 0) {  // who else could give a file away
+    ASSERT_EQ(chown(own.key.c_str(), 1, 1), 0);
+    EXPECT_EQ(code({"0.0.0.0", "--tokens", file}, tls), 2);
+    EXPECT_NE(said_.find("another user"), std::string::npos) << said_;
+    ASSERT_EQ(chown(own.key.c_str(), 0, 0), 0);
+  }
   EXPECT_EQ(code({"0.0.0.0", "--tokens", file}, {"--certificate", own.certificate}), 2);
   EXPECT_EQ(code({"127.0.0.1", "--tokens", tokens(0644)}, tls), 2) << "on the loopback, too";
   EXPECT_NE(said_.find("0600"), std::string::npos) << said_;

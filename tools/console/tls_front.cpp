@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <openssl/ssl.h>
-#include <sys/stat.h>
 
 #include <array>
 #include <boost/asio/local/connect_pair.hpp>
@@ -10,10 +9,10 @@
 #include <boost/asio/ssl.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/write.hpp>
-#include <cerrno>
 #include <chrono>
-#include <cstring>
 #include <utility>
+
+#include "tools/console/private_file.hpp"
 
 namespace punctum::console {
 namespace {
@@ -122,12 +121,13 @@ TlsFront& TlsFront::operator=(TlsFront&&) noexcept = default;
 TlsFront::~TlsFront() = default;
 
 tl::expected<TlsFront, std::string> TlsFront::open(const std::string& certificate, const std::string& key) {
-  struct stat facts{};
-  if (stat(key.c_str(), &facts) != 0) {
-    return tl::unexpected(fmt::format("{}: {}", key, std::strerror(errno)));
+  const auto secret = read_file(key, Readers::owner);
+  if (!secret) {
+    return tl::unexpected(secret.error());
   }
-  if ((facts.st_mode & 077U) != 0) {
-    return tl::unexpected(fmt::format("{}: others may read or write it; allowed: mode 0600", key));
+  const auto shown = read_file(certificate, Readers::everybody);
+  if (!shown) {
+    return tl::unexpected(shown.error());
   }
   auto context = std::make_unique<Context>();
   asio::ssl::context& tls = context->tls;
@@ -137,10 +137,10 @@ tl::expected<TlsFront, std::string> TlsFront::open(const std::string& certificat
   // Nobody sits here to type a passphrase.
   failed =
       tls.set_password_callback([](std::size_t, asio::ssl::context::password_purpose) { return ""; }, failed);
-  if (failed = tls.use_certificate_chain_file(certificate, failed); failed) {
+  if (failed = tls.use_certificate_chain(asio::buffer(*shown), failed); failed) {
     return tl::unexpected(fmt::format("{}: {}", certificate, failed.message()));
   }
-  if (failed = tls.use_private_key_file(key, asio::ssl::context::pem, failed); failed) {
+  if (failed = tls.use_private_key(asio::buffer(*secret), asio::ssl::context::pem, failed); failed) {
     return tl::unexpected(fmt::format("{}: {}", key, failed.message()));
   }
   if (SSL_CTX_check_private_key(tls.native_handle()) != 1) {

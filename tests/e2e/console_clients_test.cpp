@@ -3,12 +3,18 @@
 #include <openssl/evp.h>
 #include <openssl/pem.h>
 #include <openssl/x509.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/un.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <csignal>
+#include <cstddef>
 #include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -459,6 +465,44 @@ TEST_F(OwnHand, that_is_cut_off_while_it_pushes_has_let_go) {
   EXPECT_LT(moved_m, 1e-6) << "a stopped needle stays";
 }
 
+// A process, of another user if that is not 0, that listens by a name in the abstract namespace until this
+// ends.
+class Listener {
+ public:
+  explicit Listener(const std::string& name, uid_t user = 0) {
+    int ready[2];
+    EXPECT_EQ(pipe(ready), 0);
+    process_ = fork();
+    if (process_ == 0) {
+      const int socket = ::socket(AF_UNIX, SOCK_SEQPACKET, 0);
+      sockaddr_un address{};
+      address.sun_family = AF_UNIX;
+      name.copy(address.sun_path + 1, sizeof address.sun_path - 1);
+      const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
+      const bool listens = (user == 0 || setuid(user) == 0) &&
+                           bind(socket, reinterpret_cast<const sockaddr*>(&address), size) == 0 &&
+                           listen(socket, 1) == 0;
+      if (listens && write(ready[1], "", 1) == 1) {
+        pause();
+      }
+      _exit(1);
+    }
+    close(ready[1]);
+    char byte = 0;
+    EXPECT_EQ(read(ready[0], &byte, 1), 1) << "nobody listens";
+    close(ready[0]);
+  }
+  ~Listener() {
+    kill(process_, SIGKILL);
+    waitpid(process_, nullptr, 0);
+  }
+  Listener(const Listener&) = delete;
+  Listener& operator=(const Listener&) = delete;
+
+ private:
+  pid_t process_ = 0;
+};
+
 // A certificate that stands for itself, and its key, in files.
 struct Certificate {
   explicit Certificate(const fs::path& folder, const char* name = "server")
@@ -756,7 +800,15 @@ TEST_F(Console, refuses_with_one_line_what_it_cannot_do) {
   EXPECT_EQ(code_of({"--station", station_.name(), "--origin", "evil"}), 2);
   {
     FakeStation another(station_.name() + "-another");
+    // Names that are none, and one that another user has taken.
+    const Listener odd("punctum." + std::to_string(geteuid()) + ".a\x1b]0;odd"),
+        foreign("punctum." + std::to_string(geteuid()) + "." + station_.name() + "-foreign",
+                geteuid() == 0 ? 65534 : 0);
     EXPECT_EQ(code_of({}), 2) << "two of them run";
+    EXPECT_EQ(said_.find('\x1b'), std::string::npos) << said_;
+    if (geteuid() == 0) {
+      EXPECT_EQ(said_.find("-foreign"), std::string::npos) << said_;
+    }
     EXPECT_NE(said_.find(station_.name() + ", " + another.name()), std::string::npos) << said_;
   }
   start_console(station_.name());

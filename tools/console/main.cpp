@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "hal/ipc/rendezvous.hpp"
 #include "tools/console/allow_list.hpp"
 #include "tools/console/gateway.hpp"
 #include "tools/console/station_feed.hpp"
@@ -35,7 +36,8 @@ int bad(const std::string& text) {
   return exit_bad_input;
 }
 
-// Stations of this user, by the names of their sockets (hal/ipc/rendezvous.hpp).
+// Stations of this user, by the names of their sockets (hal/ipc/rendezvous.hpp), which another user may have
+// taken.
 std::vector<std::string> running_stations() {
   const std::string prefix = fmt::format("@punctum.{}.", geteuid());
   std::set<std::string> names;  // a visitor's connection has the name, too
@@ -45,6 +47,7 @@ std::vector<std::string> running_stations() {
       names.insert(line.substr(at + prefix.size()));
     }
   }
+  std::erase_if(names, [](const std::string& name) { return !hal::runs(name); });
   return {names.begin(), names.end()};
 }
 

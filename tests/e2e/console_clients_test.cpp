@@ -772,6 +772,38 @@ TEST_F(SafeConsole, moves_the_hand_for_whoever_has_control_and_lets_go_with_it) 
   EXPECT_TRUE(in_queue().empty());
 }
 
+TEST_F(SafeConsole, logs_who_asked_for_what_in_the_unit_that_was_asked_for) {
+  start_console(station_.name());
+  begin_to_tick();
+  auto ada = operator_client(kState);
+  const auto eve = client();
+  ASSERT_TRUE(is_told(*ada, "core", "ticking"));
+  const auto ada_sets = [&](const char* name, double value) {
+    return in_control(*ada, [&] { return set(*ada, name, value); });
+  };
+  EXPECT_EQ(ada_sets("depth_limit", 20), "");
+  EXPECT_EQ(ada_sets("force_scale", 0.5), "");
+  EXPECT_EQ(control(*ada), "");
+  EXPECT_EQ(control(*ada, false), "");
+  for (int i = 0; i < 20; ++i) {
+    EXPECT_EQ(problem(*eve, 1, "{}"), "");
+  }
+  EXPECT_EQ(problem(*ada, 1, "{}"), "");
+  end_console();
+  const std::string log = console_->output();
+  const auto lines_with = [&log](const std::string& wanted) {
+    const std::regex line("(^|\n)" + wanted);
+    return std::distance(std::sregex_iterator(log.begin(), log.end(), line), std::sregex_iterator());
+  };
+  const std::string of_ada = R"(operator \(127\.0\.0\.1:\d+\) )", of_eve = R"(visitor \(127\.0\.0\.1:\d+\) )";
+  EXPECT_EQ(lines_with(of_ada + R"(asked for depth_limit = 20 um at [\d.]+ s: sent\n)"), 1) << log;
+  EXPECT_EQ(lines_with(of_ada + R"(asked for force_scale = 0\.5 at [\d.]+ s: sent\n)"), 1) << log;
+  EXPECT_GE(lines_with(of_ada + "has given control back\n"), 1) << log;
+  EXPECT_EQ(lines_with(of_ada + R"(asked for a stop at [\d.]+ s: sent\n)"), 1) << log;
+  const auto stops = lines_with(of_eve + R"(asked for a stop at [\d.]+ s: sent\n)");
+  EXPECT_TRUE(stops >= 1 && stops < 20) << log;
+}
+
 TEST_F(SafeConsole, ends_the_control_of_a_client_that_is_silent_or_gone) {
   start_console(station_.name());
   auto ada = operator_client(kState);

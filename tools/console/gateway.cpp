@@ -74,6 +74,7 @@ constexpr bool only_the_newest_counts(ChannelId channel) {
 }
 
 constexpr std::size_t kMostReasonBytes = 120;  // of a close frame
+constexpr double kStopTold_s = 1;  // one line in the log for all the stops that a client asks for within it
 // Whoever asked for a stop waits for the word that it is latched.
 constexpr double kQuickPoll_s = 0.002, kQuickFor_s = 0.5;
 
@@ -269,10 +270,12 @@ class Gateway::Server::Client : public std::enable_shared_from_this<Client> {
   void put(const Told& news, std::uint32_t subscription);
   void call(const ServiceCall& request);
   [[nodiscard]] tl::expected<void, std::string> serve(const ServiceCall& request);
+  [[nodiscard]] tl::expected<void, std::string> stop();
   [[nodiscard]] tl::expected<void, std::string> control(std::string_view request);
   [[nodiscard]] tl::expected<void, std::string> set(std::string_view request);
   [[nodiscard]] tl::expected<void, std::string> replay_wish(std::string_view request);
   [[nodiscard]] tl::expected<void, std::string> move_hand(std::string_view request);
+  void say_asked(std::string_view what, const tl::expected<void, std::string>& asked) const;
   [[nodiscard]] std::string who() const { return fmt::format("{} ({})", person_.name, from_); }
   void send_text(std::string text);
   void send_text(const json& message) { send_text(words(message)); }
@@ -294,6 +297,7 @@ class Gateway::Server::Client : public std::enable_shared_from_this<Client> {
   Outbox outbox_{kOutboxMessages, kOutboxBytes};
   TokenBucket bucket_{kMostMessages, kMessagesPer_s};
   double begun_s_ = now_s();
+  double stop_told_s_ = -kStopTold_s;  // in the log
 };
 
 void Gateway::Server::Client::abandon() {
@@ -516,6 +520,7 @@ tl::expected<void, std::string> Gateway::Server::Client::control(std::string_vie
     if (server_.control_.holder() == number_) {
       server_.control_.give_back(number_);
       server_.feed_.let_go_of_hand();
+      tools::say(fmt::format("{} has given control back\n", who()));
     }
     return {};
   }
@@ -551,8 +556,22 @@ tl::expected<void, std::string> Gateway::Server::Client::set(std::string_view re
     return tl::unexpected(command.error());
   }
   auto asked = server_.feed_.ask(*command, person_.name);
-  tools::say(fmt::format("{} asked for {} = {:g} at {:.3f} s: {}\n", who(), wanted->name, command->value,
-                         server_.feed_.run_s(), asked ? "sent" : asked.error()));
+  say_asked(parameters.in_words(wanted->name, *command), asked);
+  return asked;
+}
+
+void Gateway::Server::Client::say_asked(std::string_view what,
+                                        const tl::expected<void, std::string>& asked) const {
+  tools::say(fmt::format("{} asked for {} at {:.3f} s: {}\n", who(), what, server_.feed_.run_s(),
+                         asked ? "sent" : asked.error()));
+}
+
+tl::expected<void, std::string> Gateway::Server::Client::stop() {
+  auto asked = server_.stop(who());
+  if (const double now = now_s(); now - stop_told_s_ > kStopTold_s) {
+    stop_told_s_ = now;
+    say_asked("a stop", asked);
+  }
   return asked;
 }
 
@@ -579,7 +598,7 @@ tl::expected<void, std::string> Gateway::Server::Client::move_hand(std::string_v
 tl::expected<void, std::string> Gateway::Server::Client::serve(const ServiceCall& request) {
   switch (request.service) {
     case stop_service:
-      return server_.stop(person_.name);
+      return stop();
     case control_service:
       return control(request.request);
     case set_service:

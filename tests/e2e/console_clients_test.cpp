@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -213,6 +214,29 @@ TEST_F(Console, serves_its_page_with_strict_rules_and_nothing_else) {
                   .request("POST / HTTP/1.1\r\nHost: " + host() + "\r\nContent-Length: 0\r\n\r\n")
                   .starts_with("HTTP/1.1 405 "));
   EXPECT_EQ(end_console(), 0);
+}
+
+TEST_F(Console, serves_its_page_over_a_slow_line_but_waits_for_nobody_who_takes_nothing) {
+  start_console(station_.name());
+  const std::string script = "GET /page.js HTTP/1.1\r\nHost: " + host() + "\r\n\r\n";
+  WebClient slow(port_, 4096), stalled(port_, 4096);
+  ASSERT_TRUE(slow.send(script) && stalled.send(script));
+  const std::size_t size = fs::file_size(PUNCTUM_SOURCE_DIR "/tools/console/page/built/page.js");
+  const auto all = [size](const WebClient& client, std::chrono::milliseconds pause) {
+    std::size_t got = 0;
+    std::array<char, 4096> part{};
+    for (ssize_t n = 1; n > 0 && got <= size;
+         std::this_thread::sleep_for(pause)) {  // with its head more than the file
+      pollfd look{client.descriptor(), POLLIN, 0};
+      n = poll(&look, 1, 3000) > 0 ? recv(client.descriptor(), part.data(), part.size(), 0) : 0;
+      got += static_cast<std::size_t>(std::max<ssize_t>(n, 0));
+    }
+    return got;
+  };
+  const auto begun = std::chrono::steady_clock::now();
+  EXPECT_GT(all(slow, 60ms), size);
+  EXPECT_GT(std::chrono::steady_clock::now() - begun, 7s) << "the line was quick, and shows nothing";
+  EXPECT_LT(all(stalled, 0ms), size / 2);
 }
 
 TEST_F(Console, lets_in_only_its_own_names_and_origins_and_those_that_were_named) {

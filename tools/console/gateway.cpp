@@ -176,6 +176,20 @@ std::string services() {
   return json{{"op", "advertiseServices"}, {"services", std::move(list)}}.dump();
 }
 
+// An HTTP response while it is sent.
+template <class Body>
+struct Answer {
+  Answer(http::response<Body> all, bool only_head) : response(std::move(all)), head_only(only_head) {
+    serializer.split(head_only);
+  }
+  [[nodiscard]] bool is_sent() { return head_only ? serializer.is_header_done() : serializer.is_done(); }
+
+  http::response<Body> response;
+  http::response_serializer<Body> serializer{response};
+  bool head_only;
+  std::chrono::steady_clock::time_point until = std::chrono::steady_clock::now() + Seconds(kAnswer_s);
+};
+
 }  // namespace
 
 // What a server and its connections share.
@@ -262,6 +276,8 @@ class Gateway::Server::Client : public std::enable_shared_from_this<Client> {
   void send(http::response<http::span_body<const char>> response);
   template <class Body>
   void write(http::response<Body> response);
+  template <class Body>
+  void write_more(const std::shared_ptr<Answer<Body>>& answer);
   void begin_websocket();
   void read_message();
   void read_more();
@@ -379,24 +395,23 @@ void Gateway::Server::Client::write(http::response<Body> response) {
   response.set("Cross-Origin-Opener-Policy", "same-origin");
   response.set(http::field::cache_control, "no-store");
   response.prepare_payload();
-  const bool goes_on = response.keep_alive();
   const bool head_only = request_->get().method() == http::verb::head;
-  const auto kept = std::make_shared<http::response<Body>>(std::move(response));
-  const auto serializer = std::make_shared<http::response_serializer<Body>>(*kept);
-  http_.expires_after(Seconds(kHandshake_s));
-  const auto written = mine([this, kept, serializer, goes_on](error_code failed, std::size_t) {
-    if (!failed && goes_on) {
-      read_request();
-    } else {
-      failed = http_.socket().shutdown(tcp::socket::shutdown_send, failed);
-    }
-  });
-  if (head_only) {
-    serializer->split(true);
-    http::async_write_header(http_, *serializer, written);
-  } else {
-    http::async_write(http_, *serializer, written);
-  }
+  write_more(std::make_shared<Answer<Body>>(std::move(response), head_only));
+}
+
+// Piece by piece: whoever takes some of it within kHandshake_s has as long again, but not for ever.
+template <class Body>
+void Gateway::Server::Client::write_more(const std::shared_ptr<Answer<Body>>& answer) {
+  http_.expires_at(std::min(std::chrono::steady_clock::now() + Seconds(kHandshake_s), answer->until));
+  http::async_write_some(http_, answer->serializer, mine([this, answer](error_code failed, std::size_t) {
+                           if (!failed && !answer->is_sent()) {
+                             write_more(answer);
+                           } else if (!failed && answer->response.keep_alive()) {
+                             read_request();
+                           } else {
+                             failed = http_.socket().shutdown(tcp::socket::shutdown_send, failed);
+                           }
+                         }));
 }
 
 void Gateway::Server::Client::begin_websocket() {

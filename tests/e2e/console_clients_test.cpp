@@ -256,6 +256,14 @@ TEST_F(Console, lets_in_only_its_own_names_and_origins_and_those_that_were_named
         << known;
   }
   EXPECT_TRUE(WebClient(port_).upgrade(host(), "", "chat").starts_with("HTTP/1.1 400 "));
+  for (const std::string& more : {"Host: evil.example\r\n"s, "Host: " + host() + "\r\n"}) {
+    EXPECT_TRUE(WebClient(port_).get("/", host(), more).starts_with("HTTP/1.1 400 ")) << more;
+    EXPECT_TRUE(WebClient(port_).upgrade(host(), more).starts_with("HTTP/1.1 400 ")) << more;
+  }
+  EXPECT_TRUE(
+      WebClient(port_)
+          .request("GET / HTTP/1.1\r\nHost: " + host() + "\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n")
+          .starts_with("HTTP/1.1 400 "));
 }
 
 // Of JSON Schema what messages.schema.json uses of it for what is told; the page's check has a whole

@@ -347,6 +347,10 @@ void Gateway::Server::Client::answer() {
     const auto value = request[field];
     return std::string_view(value.data(), value.size());
   };
+  // Of two names another program on the way may have looked at the other one; a request has no body.
+  if (request.count(http::field::host) > 1 || request.count(http::field::transfer_encoding) > 0) {
+    return refuse(http::status::bad_request, "two Host headers, or a Transfer-Encoding");
+  }
   if (!server_.allowed_.host(text(http::field::host))) {
     return refuse(http::status::misdirected_request, "this name is not one of this gateway");
   }

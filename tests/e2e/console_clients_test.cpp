@@ -1002,6 +1002,19 @@ TEST_F(Console, parts_with_a_client_that_sends_too_much) {
     one->text(R"({"op":"unsubscribe","subscriptionIds":[]})");
   }
   EXPECT_EQ(one->closed_with(), 1008);
+  // Frames that make no message count as well: of one that never ends, and of the protocol itself.
+  for (const std::string& frame : {"\x00\x80\0\0\0\0"s, "\x89\x80\0\0\0\0"s, "\x8a\x80\0\0\0\0"s}) {
+    const auto other = client();
+    if (frame[0] == '\0') {
+      other->send("\x01\x81\0\0\0\0{"s);
+    }
+    std::string many;
+    for (int i = 0; i < 500; ++i) {
+      many += frame;
+    }
+    other->send(many);
+    EXPECT_EQ(other->closed_with(), 1008) << static_cast<int>(frame[0]);
+  }
   EXPECT_TRUE(alive(console_->pid()));
 }
 

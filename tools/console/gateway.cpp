@@ -24,6 +24,7 @@
 #include "tools/console/allow_list.hpp"
 #include "tools/console/client_message.hpp"
 #include "tools/console/control_lease.hpp"
+#include "tools/console/frame_counter.hpp"
 #include "tools/console/outbox.hpp"
 #include "tools/console/page_files.hpp"
 #include "tools/console/tls_front.hpp"
@@ -176,6 +177,47 @@ std::string services() {
   return json{{"op", "advertiseServices"}, {"services", std::move(list)}}.dump();
 }
 
+// A connection that says how many frames of a WebSocket came. Beast keeps to itself those that are empty or
+// carry no message.
+class Stream : public beast::basic_stream<asio::generic::stream_protocol> {
+ public:
+  using Base = beast::basic_stream<asio::generic::stream_protocol>;
+  using Base::Base;
+
+  // Called with the number of frames that have just begun.
+  void on_frames(std::function<void(int)> call) { call_ = std::move(call); }
+  template <class Buffers, class Handler>
+  void async_read_some(const Buffers& buffers, Handler&& handler) {
+    Base::async_read_some(buffers, [this, buffers, handler = std::forward<Handler>(handler)](
+                                       error_code failed, std::size_t n) mutable {
+      if (call_) {
+        count(buffers, n);
+      }
+      handler(failed, n);
+    });
+  }
+
+  template <class Handler>
+  friend void async_teardown(beast::role_type role, Stream& stream, Handler&& handler) {
+    async_teardown(role, static_cast<Base&>(stream), std::forward<Handler>(handler));
+  }
+
+ private:
+  template <class Buffers>
+  void count(const Buffers& buffers, std::size_t n) {
+    int begun = 0;
+    for (auto one = asio::buffer_sequence_begin(buffers); n > 0 && one != asio::buffer_sequence_end(buffers);
+         ++one) {
+      const asio::const_buffer piece = asio::buffer(asio::const_buffer(*one), n);
+      begun += frames_.count({static_cast<const char*>(piece.data()), piece.size()});
+      n -= piece.size();
+    }
+    call_(begun);
+  }
+  std::function<void(int)> call_;
+  FrameCounter frames_;
+};
+
 // An HTTP response while it is sent.
 template <class Body>
 struct Answer {
@@ -281,6 +323,7 @@ class Gateway::Server::Client : public std::enable_shared_from_this<Client> {
   void begin_websocket();
   void read_message();
   void read_more();
+  void count(int frames);
   void obey(const ClientMessage& message);
   void subscribe(const Subscribe& wanted);
   void put(const Told& news, std::uint32_t subscription);
@@ -298,7 +341,6 @@ class Gateway::Server::Client : public std::enable_shared_from_this<Client> {
   void send_next();
   void close(websocket::close_code code, std::string_view why);
 
-  using Stream = beast::basic_stream<asio::generic::stream_protocol>;
   Server& server_;
   Stream http_;
   std::string from_;      // address of the other side
@@ -438,6 +480,7 @@ void Gateway::Server::Client::begin_websocket() {
   person_ = std::move(*known);
   http_.expires_never();  // the WebSocket has time limits of its own
   socket_.emplace(std::move(http_));
+  socket_->next_layer().on_frames([this](int frames) { count(frames); });
   websocket::stream_base::timeout limits{};
   limits.handshake_timeout = Seconds(kHandshake_s);
   limits.idle_timeout = Seconds(kIdle_s);
@@ -480,9 +523,6 @@ void Gateway::Server::Client::read_more() {
         if (!socket_->is_message_done()) {
           return read_more();
         }
-        if (!bucket_.take(now_s() - begun_s_)) {
-          return close(websocket::close_code::policy_error, "too many messages");
-        }
         const std::string_view bytes(static_cast<const char*>(buffer_.data().data()), buffer_.size());
         const auto message = socket_->got_text() ? read_text(bytes) : read_binary(bytes);
         if (!message) {
@@ -493,6 +533,19 @@ void Gateway::Server::Client::read_more() {
           read_message();
         }
       }));
+}
+
+// In the middle of a reading, which goes on until the other side has seen why it is parted with.
+void Gateway::Server::Client::count(int frames) {
+  const double now = now_s() - begun_s_;
+  while (frames > 0 && bucket_.take(now)) {
+    --frames;
+  }
+  if (frames > 0 && is_open_ && !is_closing_) {
+    is_closing_ = true;
+    asio::post(socket_->get_executor(),
+               mine([this] { close(websocket::close_code::policy_error, "too many messages"); }));
+  }
 }
 
 void Gateway::Server::Client::obey(const ClientMessage& message) {

@@ -23,6 +23,7 @@
 #include "tools/console/client_message.hpp"
 #include "tools/console/control_lease.hpp"
 #include "tools/console/fixtures.hpp"
+#include "tools/console/frame_counter.hpp"
 #include "tools/console/outbox.hpp"
 #include "tools/console/parameters.hpp"
 #include "tools/console/station_feed.hpp"
@@ -425,6 +426,36 @@ TEST(Outbox, is_bounded_in_bytes_and_counts_a_shared_body_too) {
   EXPECT_EQ(box.dropped(), 8U);
   box.push({std::string(500, 'y'), nullptr, false});
   EXPECT_EQ(box.messages(), 1U) << "one that is too large alone is still sent";
+}
+
+TEST(FrameCounter, counts_frames_of_every_length_however_they_are_cut) {
+  const std::string mask(4, 'm');
+  std::string bytes;
+  int frames = 0;
+  for (const std::size_t length : {0UL, 1UL, 125UL, 126UL, 127UL, 65535UL, 65536UL, 0UL, 0UL}) {
+    for (const bool masked : {true, false}) {
+      const auto bit = static_cast<char>(masked ? 0x80 : 0);
+      bytes += '\x80';
+      const std::size_t more = length < 126 ? 0 : length < 65536 ? 2 : 8;
+      bytes += static_cast<char>((more == 0   ? length
+                                  : more == 2 ? 126
+                                              : 127) |
+                                 static_cast<unsigned char>(bit));
+      for (std::size_t i = more; i-- > 0;) {
+        bytes += static_cast<char>(length >> (8 * i) & 0xFFU);
+      }
+      bytes += (masked ? mask : "") + std::string(length, '\x89');
+      ++frames;
+    }
+  }
+  for (const std::size_t step : {1UL, 2UL, 3UL, 7UL, 1000UL, bytes.size()}) {
+    FrameCounter counter;
+    int counted = 0;
+    for (std::size_t at = 0; at < bytes.size(); at += step) {
+      counted += counter.count(std::string_view(bytes).substr(at, step));
+    }
+    EXPECT_EQ(counted, frames) << step;
+  }
 }
 
 std::string call(std::uint32_t service, std::uint32_t id, const std::string& encoding,

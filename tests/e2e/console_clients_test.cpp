@@ -1126,9 +1126,13 @@ TEST_F(Console, tells_what_holds_until_the_next_change_also_whoever_did_not_read
   EXPECT_TRUE(is_of(words, 15)) << "messages were dropped, but not this one";
 }
 
-TEST_F(Console, tells_over_a_line_that_is_too_slow_fewer_samples_but_no_old_ones) {
-  start_console(station_.name());
-  const auto slow = client(kAll, 4096);
+class OverASlowLine : public SafeConsole {
+ protected:
+  void expect_fewer_samples_but_no_old_ones(WebClient& slow);
+};
+
+void OverASlowLine::expect_fewer_samples_but_no_old_ones(WebClient& slow) {
+  slow.text(kAll);
   std::jthread core([&](const std::stop_token& done) {
     for (; !done.stop_requested(); std::this_thread::sleep_for(1ms)) {
       station_.tick();
@@ -1139,7 +1143,7 @@ TEST_F(Console, tells_over_a_line_that_is_too_slow_fewer_samples_but_no_old_ones
   double told_bytes = 0, age_s = 0;
   std::uint64_t last = 0, skipped = 0;
   while (std::chrono::steady_clock::now() - begun < 8s) {
-    const auto f = slow->read();
+    const auto f = slow.read();
     ASSERT_GE(f.opcode, 0);
     told_bytes += static_cast<double>(f.payload.size());
     std::this_thread::sleep_until(begun + std::chrono::duration_cast<std::chrono::nanoseconds>(
@@ -1155,8 +1159,24 @@ TEST_F(Console, tells_over_a_line_that_is_too_slow_fewer_samples_but_no_old_ones
                                           std::chrono::nanoseconds(told_ns))
                 .count();
   }
-  EXPECT_LT(age_s, 2.0);
+  EXPECT_LT(age_s, 0.8);
   EXPECT_GT(skipped, 100U);
+}
+
+TEST_F(OverASlowLine, fewer_samples_are_told_but_no_old_ones) {
+  start_console(station_.name());
+  const auto slow = client("", 4096);
+  expect_fewer_samples_but_no_old_ones(*slow);
+}
+
+TEST_F(OverASlowLine, fewer_samples_are_told_but_no_old_ones_with_TLS_as_well) {
+  const Certificate own(fs::path(words()).parent_path());
+  start_console(station_.name(),
+                {"--port", "0", "--tokens", tokens(), "--certificate", own.certificate, "--key", own.key});
+  WebClient slow(port_, 4096);
+  ASSERT_TRUE(slow.encrypt(own.certificate));
+  ASSERT_TRUE(slow.upgrade(host(), "", with_token(view_)).starts_with("HTTP/1.1 101 "));
+  expect_fewer_samples_but_no_old_ones(slow);
 }
 
 TEST_F(Console, tells_a_client_that_is_behind_no_pictures_and_so_all_the_rest) {

@@ -24,6 +24,7 @@ using Local = asio::local::stream_protocol::socket;
 
 constexpr int kSend_s = 20;                      // a peer that takes nothing for so long is left
 constexpr std::size_t kPiece_bytes = 16 * 1024;  // a TLS record
+constexpr int kPlain_bytes = 8 * 1024;  // what waits between the gateway and here: no more than it knows of
 
 }  // namespace
 
@@ -43,19 +44,20 @@ class TlsFront::Connection : public std::enable_shared_from_this<Connection> {
 
   void begin(int limit_s, std::function<void(Plain)> begun) {
     expire_after(limit_s);
-    encrypted_.async_handshake(asio::ssl::stream_base::server,
-                               [self = shared_from_this(), begun = std::move(begun)](error_code failed) {
-                                 if (!failed) {
-                                   failed = asio::local::connect_pair(self->plain_, self->other_, failed);
-                                 }
-                                 if (failed) {
-                                   return self->end();
-                                 }
-                                 self->limit_.cancel();
-                                 begun(Plain(std::move(self->other_)));
-                                 self->pump_in();
-                                 self->pump_out();
-                               });
+    encrypted_.async_handshake(asio::ssl::stream_base::server, [self = shared_from_this(),
+                                                                begun = std::move(begun)](error_code failed) {
+      if (!failed) {
+        failed = asio::local::connect_pair(self->plain_, self->other_, failed);
+      }
+      if (failed) {
+        return self->end();
+      }
+      self->limit_.cancel();
+      failed = self->other_.set_option(asio::socket_base::send_buffer_size(kPlain_bytes), failed);
+      begun(Plain(std::move(self->other_)));
+      self->pump_in();
+      self->pump_out();
+    });
   }
 
  private:

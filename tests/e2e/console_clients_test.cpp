@@ -890,6 +890,8 @@ TEST_F(Console, tells_what_it_can_do_and_then_what_the_station_does) {
   EXPECT_EQ(info["op"], "serverInfo");
   EXPECT_EQ(info["capabilities"], Json{"services"});
   EXPECT_EQ(info["metadata"]["wire"], "1");
+  const std::chrono::nanoseconds said(std::stoll(info["metadata"]["time_ns"].get<std::string>()));
+  EXPECT_LT(std::chrono::abs(std::chrono::system_clock::now().time_since_epoch() - said), 60s);
   const Json channels = Json::parse(one->read().payload)["channels"];
   ASSERT_EQ(channels.size(), 11U);
   EXPECT_EQ(channels[0]["schemaName"], "punctum.v1.Telemetry");

@@ -130,6 +130,7 @@ std::string server_info(const std::string& station) {
                {{"station", station},
                 {"wire", kWireVersion},
                 {"effects", effects},
+                {"time_ns", std::to_string(StationFeed::now_ns())},
                 {"version", tools::version_line("punctum-console")}}},
               {"sessionId", station}}
       .dump();

@@ -170,6 +170,8 @@ tl::expected<void, std::string> StationFeed::join_replay(const hal::Joined& join
   return {};
 }
 
+std::uint64_t StationFeed::now_ns() { return wall_ns(); }
+
 bool StationFeed::is_over() const { return has_ended(parent_); }
 
 tl::expected<void, std::string> StationFeed::stop(const std::string& who) {

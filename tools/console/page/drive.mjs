@@ -346,6 +346,18 @@ async function all() {
     assert.ok(Number(/([\d.]+) s old/.exec(await far.locator('#time').innerText())?.[1]) > 2.5);
     await far.evaluate(() => { late_ms = 0; });
     await until('it is fresh again', async () => !await isGrey());
+    // A line that is slow from the start: the first words came before anything waited.
+    await far.addInitScript(() => {
+      Object.defineProperty(WebSocket.prototype, 'onmessage', {set(take) {
+        this.addEventListener('message', (event) => (typeof event.data === 'string' ? take(event) : setTimeout(() => take(event), 3000)));
+      }});
+    });
+    await far.reload();
+    await far.waitForFunction(() => punctum.newest?.tick > 0);
+    for (let i = 0; i < 20; i++) {
+      assert.ok(await isGrey(), 'ticks come, 3 s late from the first on');
+      await far.waitForTimeout(50);
+    }
     await far.close();
   });
 

@@ -76,6 +76,7 @@ export class Link {
   private text(message: {op?: string} & Record<string, any>): void {
     if (message.op === 'serverInfo') {
       if (message.metadata?.wire !== '1') throw new Error('this page is of another version than punctum-console: load it again');
+      this.delay.age_ms(Number(message.metadata.time_ns) / 1e6, performance.now());  // before anything can wait for the line
       this.state.connected = true;
       this.state.reason = '';
       this.state.station = message.metadata.station;

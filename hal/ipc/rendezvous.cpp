@@ -113,11 +113,13 @@ void Rendezvous::serve() const {
   }
 }
 
-tl::expected<Joined, std::string> Joined::join(std::string_view station) {
+namespace {
+
+tl::expected<Descriptor, std::string> connected(std::string_view station) {
   if (!usable_name(station)) {
     return refuse(station, "its name may hold only letters, digits, '.', '_' and '-'");
   }
-  const Descriptor socket(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  Descriptor socket(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   const Address address = address_of(station);
   if (!socket ||
       ::connect(socket.number(), reinterpret_cast<const sockaddr*>(&address.of), address.size) != 0) {
@@ -126,7 +128,19 @@ tl::expected<Joined, std::string> Joined::join(std::string_view station) {
   if (!peer_is_this_user(socket.number())) {
     return refuse(station, "belongs to another user");
   }
-  pollfd answer{socket.number(), POLLIN, 0};
+  return socket;
+}
+
+}  // namespace
+
+bool runs(std::string_view station) { return connected(station).has_value(); }
+
+tl::expected<Joined, std::string> Joined::join(std::string_view station) {
+  const auto socket = connected(station);
+  if (!socket) {
+    return tl::unexpected(socket.error());
+  }
+  pollfd answer{socket->number(), POLLIN, 0};
   if (::poll(&answer, 1, kAnswer_ms) <= 0) {
     return refuse(station, "does not answer in time");
   }
@@ -138,7 +152,7 @@ tl::expected<Joined, std::string> Joined::join(std::string_view station) {
   message.msg_iovlen = 1;
   message.msg_control = control.bytes.data();
   message.msg_controllen = control.bytes.size();
-  const ssize_t size = ::recvmsg(socket.number(), &message, MSG_CMSG_CLOEXEC);
+  const ssize_t size = ::recvmsg(socket->number(), &message, MSG_CMSG_CLOEXEC);
   Joined joined;
   for (cmsghdr* part = CMSG_FIRSTHDR(&message); part != nullptr; part = CMSG_NXTHDR(&message, part)) {
     if (part->cmsg_level != SOL_SOCKET || part->cmsg_type != SCM_RIGHTS) {

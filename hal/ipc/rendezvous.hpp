@@ -35,6 +35,9 @@ class Rendezvous {
   std::vector<NamedDescriptor> offered_;
 };
 
+// Whether a station of this name and of this user listens: not one of another user who has taken the name.
+[[nodiscard]] bool runs(std::string_view station);
+
 // What a station offers. Waits up to two seconds for its answer.
 class Joined {
  public:

@@ -3,12 +3,19 @@
 #include <openssl/evp.h>
 #include <openssl/pem.h>
 #include <openssl/x509.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/un.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <csignal>
+#include <cstddef>
 #include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -209,6 +216,29 @@ TEST_F(Console, serves_its_page_with_strict_rules_and_nothing_else) {
   EXPECT_EQ(end_console(), 0);
 }
 
+TEST_F(Console, serves_its_page_over_a_slow_line_but_waits_for_nobody_who_takes_nothing) {
+  start_console(station_.name());
+  const std::string script = "GET /page.js HTTP/1.1\r\nHost: " + host() + "\r\n\r\n";
+  WebClient slow(port_, 4096), stalled(port_, 4096);
+  ASSERT_TRUE(slow.send(script) && stalled.send(script));
+  const std::size_t size = fs::file_size(PUNCTUM_SOURCE_DIR "/tools/console/page/built/page.js");
+  const auto all = [size](const WebClient& client, std::chrono::milliseconds pause) {
+    std::size_t got = 0;
+    std::array<char, 4096> part{};
+    for (ssize_t n = 1; n > 0 && got <= size;
+         std::this_thread::sleep_for(pause)) {  // with its head more than the file
+      pollfd look{client.descriptor(), POLLIN, 0};
+      n = poll(&look, 1, 3000) > 0 ? recv(client.descriptor(), part.data(), part.size(), 0) : 0;
+      got += static_cast<std::size_t>(std::max<ssize_t>(n, 0));
+    }
+    return got;
+  };
+  const auto begun = std::chrono::steady_clock::now();
+  EXPECT_GT(all(slow, 60ms), size);
+  EXPECT_GT(std::chrono::steady_clock::now() - begun, 7s) << "the line was quick, and shows nothing";
+  EXPECT_LT(all(stalled, 0ms), size / 2);
+}
+
 TEST_F(Console, lets_in_only_its_own_names_and_origins_and_those_that_were_named) {
   start_console(station_.name(), {"--port", "0", "--origin", "https://app.foxglove.dev"});
   for (const std::string& foreign : {"evil.example:" + std::to_string(port_), "127.0.0.1"s, ""s}) {
@@ -226,6 +256,14 @@ TEST_F(Console, lets_in_only_its_own_names_and_origins_and_those_that_were_named
         << known;
   }
   EXPECT_TRUE(WebClient(port_).upgrade(host(), "", "chat").starts_with("HTTP/1.1 400 "));
+  for (const std::string& more : {"Host: evil.example\r\n"s, "Host: " + host() + "\r\n"}) {
+    EXPECT_TRUE(WebClient(port_).get("/", host(), more).starts_with("HTTP/1.1 400 ")) << more;
+    EXPECT_TRUE(WebClient(port_).upgrade(host(), more).starts_with("HTTP/1.1 400 ")) << more;
+  }
+  EXPECT_TRUE(
+      WebClient(port_)
+          .request("GET / HTTP/1.1\r\nHost: " + host() + "\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n")
+          .starts_with("HTTP/1.1 400 "));
 }
 
 // Of JSON Schema what messages.schema.json uses of it for what is told; the page's check has a whole
@@ -459,6 +497,44 @@ TEST_F(OwnHand, that_is_cut_off_while_it_pushes_has_let_go) {
   EXPECT_LT(moved_m, 1e-6) << "a stopped needle stays";
 }
 
+// A process, of another user if that is not 0, that listens by a name in the abstract namespace until this
+// ends.
+class Listener {
+ public:
+  explicit Listener(const std::string& name, uid_t user = 0) {
+    int ready[2];
+    EXPECT_EQ(pipe(ready), 0);
+    process_ = fork();
+    if (process_ == 0) {
+      const int socket = ::socket(AF_UNIX, SOCK_SEQPACKET, 0);
+      sockaddr_un address{};
+      address.sun_family = AF_UNIX;
+      name.copy(address.sun_path + 1, sizeof address.sun_path - 1);
+      const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + name.size());
+      const bool listens = (user == 0 || setuid(user) == 0) &&
+                           bind(socket, reinterpret_cast<const sockaddr*>(&address), size) == 0 &&
+                           listen(socket, 1) == 0;
+      if (listens && write(ready[1], "", 1) == 1) {
+        pause();
+      }
+      _exit(1);
+    }
+    close(ready[1]);
+    char byte = 0;
+    EXPECT_EQ(read(ready[0], &byte, 1), 1) << "nobody listens";
+    close(ready[0]);
+  }
+  ~Listener() {
+    kill(process_, SIGKILL);
+    waitpid(process_, nullptr, 0);
+  }
+  Listener(const Listener&) = delete;
+  Listener& operator=(const Listener&) = delete;
+
+ private:
+  pid_t process_ = 0;
+};
+
 // A certificate that stands for itself, and its key, in files.
 struct Certificate {
   explicit Certificate(const fs::path& folder, const char* name = "server")
@@ -546,8 +622,24 @@ TEST_F(SafeConsole, listens_for_other_machines_with_TLS_and_private_tokens_alone
   EXPECT_EQ(code({"0.0.0.0", "--tokens", file}, tls), 2);
   EXPECT_NE(said_.find("0600"), std::string::npos) << said_;
   chmod(own.key.c_str(), 0600);
+  const std::string pipe = fs::path(words()).replace_filename("pipe");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  for (const Words& waits : {Words{"--certificate", pipe, "--key", own.key},
+                             Words{"--certificate", own.certificate, "--key", pipe}}) {
+    EXPECT_EQ(code({"0.0.0.0", "--tokens", file}, waits), 2);
+    EXPECT_NE(said_.find("not a file"), std::string::npos) << said_;
+  }
+  if (geteuid() == 0) {  // who else could give a file away
+    ASSERT_EQ(chown(own.key.c_str(), 1, 1), 0);
+    EXPECT_EQ(code({"0.0.0.0", "--tokens", file}, tls), 2);
+    EXPECT_NE(said_.find("another user"), std::string::npos) << said_;
+    ASSERT_EQ(chown(own.key.c_str(), 0, 0), 0);
+  }
   EXPECT_EQ(code({"0.0.0.0", "--tokens", file}, {"--certificate", own.certificate}), 2);
-  EXPECT_EQ(code({"127.0.0.1", "--tokens", tokens(0644)}, {}), 2) << "on the loopback, too";
+  EXPECT_EQ(code({"127.0.0.1", "--tokens", tokens(0644)}, tls), 2) << "on the loopback, too";
+  EXPECT_NE(said_.find("0600"), std::string::npos) << said_;
+  EXPECT_EQ(code({"127.0.0.1", "--tokens", tokens()}, {}), 2) << "TLS on the loopback, too";
+  EXPECT_NE(said_.find("--tokens: refused without TLS"), std::string::npos) << said_;
 
   chmod(file.c_str(), 0600);
   start_console(station_.name(), {"--port", "0", "--address", "0.0.0.0", "--tokens", file, "--certificate",
@@ -664,16 +756,19 @@ TEST_F(SafeConsole, answers_whoever_it_refuses_whatever_the_other_is_called) {
   const std::string second = std::string(40, 'p');
   std::ofstream(path) << "operate " << operate_ << " J\xf6rg\noperate " << second << " ada\n";
   chmod(path.c_str(), 0600);
-  start_console(station_.name(), {"--port", "0", "--tokens", path});
+  const Certificate own(path.parent_path());
+  start_console(station_.name(),
+                {"--port", "0", "--tokens", path, "--certificate", own.certificate, "--key", own.key});
   begin_to_tick();
-  token_ = operate_;
-  const auto first = operator_client();
-  token_ = second;
-  const auto ada = operator_client();
-  EXPECT_EQ(control(*first), "");
-  EXPECT_NE(control(*ada).find("rg (127.0.0.1"), std::string::npos);
-  EXPECT_EQ(control(*first, false), "");
-  EXPECT_EQ(control(*ada), "");
+  WebClient first(port_), ada(port_);
+  for (auto& [web, token] : {std::pair{&first, operate_}, std::pair{&ada, second}}) {
+    ASSERT_TRUE(web->encrypt(own.certificate));
+    ASSERT_TRUE(web->upgrade(host(), "", with_token(token)).starts_with("HTTP/1.1 101 "));
+  }
+  EXPECT_EQ(control(first), "");
+  EXPECT_NE(control(ada).find("rg (127.0.0.1"), std::string::npos);
+  EXPECT_EQ(control(first, false), "");
+  EXPECT_EQ(control(ada), "");
 }
 
 TEST_F(SafeConsole, moves_the_hand_for_whoever_has_control_and_lets_go_with_it) {
@@ -709,6 +804,38 @@ TEST_F(SafeConsole, moves_the_hand_for_whoever_has_control_and_lets_go_with_it) 
   EXPECT_TRUE(in_queue().empty());
 }
 
+TEST_F(SafeConsole, logs_who_asked_for_what_in_the_unit_that_was_asked_for) {
+  start_console(station_.name());
+  begin_to_tick();
+  auto ada = operator_client(kState);
+  const auto eve = client();
+  ASSERT_TRUE(is_told(*ada, "core", "ticking"));
+  const auto ada_sets = [&](const char* name, double value) {
+    return in_control(*ada, [&] { return set(*ada, name, value); });
+  };
+  EXPECT_EQ(ada_sets("depth_limit", 20), "");
+  EXPECT_EQ(ada_sets("force_scale", 0.5), "");
+  EXPECT_EQ(control(*ada), "");
+  EXPECT_EQ(control(*ada, false), "");
+  for (int i = 0; i < 20; ++i) {
+    EXPECT_EQ(problem(*eve, 1, "{}"), "");
+  }
+  EXPECT_EQ(problem(*ada, 1, "{}"), "");
+  end_console();
+  const std::string log = console_->output();
+  const auto lines_with = [&log](const std::string& wanted) {
+    const std::regex line("(^|\n)" + wanted);
+    return std::distance(std::sregex_iterator(log.begin(), log.end(), line), std::sregex_iterator());
+  };
+  const std::string of_ada = R"(operator \(127\.0\.0\.1:\d+\) )", of_eve = R"(visitor \(127\.0\.0\.1:\d+\) )";
+  EXPECT_EQ(lines_with(of_ada + R"(asked for depth_limit = 20 um at [\d.]+ s: sent\n)"), 1) << log;
+  EXPECT_EQ(lines_with(of_ada + R"(asked for force_scale = 0\.5 at [\d.]+ s: sent\n)"), 1) << log;
+  EXPECT_GE(lines_with(of_ada + "has given control back\n"), 1) << log;
+  EXPECT_EQ(lines_with(of_ada + R"(asked for a stop at [\d.]+ s: sent\n)"), 1) << log;
+  const auto stops = lines_with(of_eve + R"(asked for a stop at [\d.]+ s: sent\n)");
+  EXPECT_TRUE(stops >= 1 && stops < 20) << log;
+}
+
 TEST_F(SafeConsole, ends_the_control_of_a_client_that_is_silent_or_gone) {
   start_console(station_.name());
   auto ada = operator_client(kState);
@@ -737,7 +864,15 @@ TEST_F(Console, refuses_with_one_line_what_it_cannot_do) {
   EXPECT_EQ(code_of({"--station", station_.name(), "--origin", "evil"}), 2);
   {
     FakeStation another(station_.name() + "-another");
+    // Names that are none, and one that another user has taken.
+    const Listener odd("punctum." + std::to_string(geteuid()) + ".a\x1b]0;odd"),
+        foreign("punctum." + std::to_string(geteuid()) + "." + station_.name() + "-foreign",
+                geteuid() == 0 ? 65534 : 0);
     EXPECT_EQ(code_of({}), 2) << "two of them run";
+    EXPECT_EQ(said_.find('\x1b'), std::string::npos) << said_;
+    if (geteuid() == 0) {
+      EXPECT_EQ(said_.find("-foreign"), std::string::npos) << said_;
+    }
     EXPECT_NE(said_.find(station_.name() + ", " + another.name()), std::string::npos) << said_;
   }
   start_console(station_.name());
@@ -755,6 +890,8 @@ TEST_F(Console, tells_what_it_can_do_and_then_what_the_station_does) {
   EXPECT_EQ(info["op"], "serverInfo");
   EXPECT_EQ(info["capabilities"], Json{"services"});
   EXPECT_EQ(info["metadata"]["wire"], "1");
+  const std::chrono::nanoseconds said(std::stoll(info["metadata"]["time_ns"].get<std::string>()));
+  EXPECT_LT(std::chrono::abs(std::chrono::system_clock::now().time_since_epoch() - said), 60s);
   const Json channels = Json::parse(one->read().payload)["channels"];
   ASSERT_EQ(channels.size(), 11U);
   EXPECT_EQ(channels[0]["schemaName"], "punctum.v1.Telemetry");
@@ -867,6 +1004,19 @@ TEST_F(Console, parts_with_a_client_that_sends_too_much) {
     one->text(R"({"op":"unsubscribe","subscriptionIds":[]})");
   }
   EXPECT_EQ(one->closed_with(), 1008);
+  // Frames that make no message count as well: of one that never ends, and of the protocol itself.
+  for (const std::string& frame : {"\x00\x80\0\0\0\0"s, "\x89\x80\0\0\0\0"s, "\x8a\x80\0\0\0\0"s}) {
+    const auto other = client();
+    if (frame[0] == '\0') {
+      other->send("\x01\x81\0\0\0\0{"s);
+    }
+    std::string many;
+    for (int i = 0; i < 500; ++i) {
+      many += frame;
+    }
+    other->send(many);
+    EXPECT_EQ(other->closed_with(), 1008) << static_cast<int>(frame[0]);
+  }
   EXPECT_TRUE(alive(console_->pid()));
 }
 
@@ -928,6 +1078,107 @@ TEST_F(Console, drops_the_oldest_of_a_client_that_does_not_read_and_nobody_else_
   });
   EXPECT_TRUE(is_of(newer, 10));
   EXPECT_TRUE(alive(console_->pid()));
+}
+
+TEST_F(Console, tells_what_holds_until_the_next_change_also_whoever_did_not_read_for_a_while) {
+  start_console(station_.name());
+  // Samples and ticks fill what waits for it within seconds.
+  const auto stalled =
+      client(R"({"op":"subscribe","subscriptions":[{"id":10,"channelId":0},{"id":15,"channelId":5},)"
+             R"({"id":16,"channelId":6},{"id":17,"channelId":7}]})",
+             4096);
+  const auto quick = client(kAll);
+  std::jthread core([&](const std::stop_token& done) {
+    for (; !done.stop_requested(); std::this_thread::sleep_for(500us)) {
+      station_.tick();
+    }
+  });
+  const auto wait = [&quick](int messages) {
+    for (int i = 0; i < messages; ++i) {
+      ASSERT_TRUE(is_of(quick->until([](const auto& f) { return is_of(f, 10); }), 10)) << i;
+    }
+  };
+  wait(600);
+  rt::Event changed;
+  changed.kind = rt::Event::command;
+  changed.what = rt::Command::depth_limit;
+  changed.value = 20e-6;
+  station_.core().events.push(changed);
+  wait(1500);
+  const auto depth_um = [](const WebClient::Frame& f) {
+    const Json all = Json::parse(f.payload.substr(13));
+    for (const Json& p : all["parameters"]) {
+      if (p["name"] == "depth_limit") {
+        return p["value"].get<double>();
+      }
+    }
+    return 0.0;
+  };
+  int dropped = 0;
+  const auto told = stalled->until([&](const auto& f) {
+    if (is_of(f, 15)) {
+      dropped = Json::parse(f.payload.substr(13))["dropped"];
+    }
+    return (is_of(f, 16) && depth_um(f) < 21) || dropped > 1000;
+  });
+  EXPECT_TRUE(is_of(told, 16)) << dropped;
+  const auto words = stalled->until([](const auto& f) {
+    return is_of(f, 15) && Json::parse(f.payload.substr(13)).value("dropped", 0) > 0;
+  });
+  EXPECT_TRUE(is_of(words, 15)) << "messages were dropped, but not this one";
+}
+
+class OverASlowLine : public SafeConsole {
+ protected:
+  void expect_fewer_samples_but_no_old_ones(WebClient& slow);
+};
+
+void OverASlowLine::expect_fewer_samples_but_no_old_ones(WebClient& slow) {
+  slow.text(kAll);
+  std::jthread core([&](const std::stop_token& done) {
+    for (; !done.stop_requested(); std::this_thread::sleep_for(1ms)) {
+      station_.tick();
+    }
+  });
+  constexpr double kLine_bytes_s = 30e3;
+  const auto begun = std::chrono::steady_clock::now();
+  double told_bytes = 0, age_s = 0;
+  std::uint64_t last = 0, skipped = 0;
+  while (std::chrono::steady_clock::now() - begun < 8s) {
+    const auto f = slow.read();
+    ASSERT_GE(f.opcode, 0);
+    told_bytes += static_cast<double>(f.payload.size());
+    std::this_thread::sleep_until(begun + std::chrono::duration_cast<std::chrono::nanoseconds>(
+                                              std::chrono::duration<double>(told_bytes / kLine_bytes_s)));
+    v1::Telemetry t;
+    if (!is_of(f, 10) || !t.ParseFromString(f.payload.substr(13))) {
+      continue;
+    }
+    skipped = std::max(skipped, t.tick() - std::exchange(last, t.tick()));
+    const auto told_ns = static_cast<std::int64_t>(
+        number_at(f.payload, 5) | static_cast<std::uint64_t>(number_at(f.payload, 9)) << 32U);
+    age_s = std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch() -
+                                          std::chrono::nanoseconds(told_ns))
+                .count();
+  }
+  EXPECT_LT(age_s, 0.8);
+  EXPECT_GT(skipped, 100U);
+}
+
+TEST_F(OverASlowLine, fewer_samples_are_told_but_no_old_ones) {
+  start_console(station_.name());
+  const auto slow = client("", 4096);
+  expect_fewer_samples_but_no_old_ones(*slow);
+}
+
+TEST_F(OverASlowLine, fewer_samples_are_told_but_no_old_ones_with_TLS_as_well) {
+  const Certificate own(fs::path(words()).parent_path());
+  start_console(station_.name(),
+                {"--port", "0", "--tokens", tokens(), "--certificate", own.certificate, "--key", own.key});
+  WebClient slow(port_, 4096);
+  ASSERT_TRUE(slow.encrypt(own.certificate));
+  ASSERT_TRUE(slow.upgrade(host(), "", with_token(view_)).starts_with("HTTP/1.1 101 "));
+  expect_fewer_samples_but_no_old_ones(slow);
 }
 
 TEST_F(Console, tells_a_client_that_is_behind_no_pictures_and_so_all_the_rest) {

@@ -1,6 +1,7 @@
 #include "tools/console/gateway.hpp"
 
 #include <fmt/format.h>
+#include <netinet/tcp.h>
 
 #include <algorithm>
 #include <array>
@@ -23,6 +24,7 @@
 #include "tools/console/allow_list.hpp"
 #include "tools/console/client_message.hpp"
 #include "tools/console/control_lease.hpp"
+#include "tools/console/frame_counter.hpp"
 #include "tools/console/outbox.hpp"
 #include "tools/console/page_files.hpp"
 #include "tools/console/tls_front.hpp"
@@ -60,11 +62,20 @@ constexpr std::array<Offered, 5> kServices = {
      {replay_service, "/punctum/replay", "punctum.v1.ReplayRequest"},
      {hand_service, "/punctum/hand", "punctum.v1.HandRequest"}}};
 constexpr int kSendBuffer_bytes = 64 * 1024;  // what the kernel keeps for a client that does not read
+// Of it, what has not left yet: what waits there cannot be left out any more, and is old when it arrives.
+constexpr int kUnsent_bytes = 8 * 1024;
 
 // A client that is so far behind is told no pictures: they would only push out what is newer.
 constexpr std::size_t kBehind_bytes = kOutboxBytes / 4;
+// And so far, nothing of which only the newest counts: what waits behind it would be old when it arrives. The
+// page takes for fresh what is twice as old.
+constexpr double kBehind_s = 0.25;
+constexpr bool only_the_newest_counts(ChannelId channel) {
+  return channel == telemetry || channel == observation || channel == surface;
+}
 
 constexpr std::size_t kMostReasonBytes = 120;  // of a close frame
+constexpr double kStopTold_s = 1;  // one line in the log for all the stops that a client asks for within it
 // Whoever asked for a stop waits for the word that it is latched.
 constexpr double kQuickPoll_s = 0.002, kQuickFor_s = 0.5;
 
@@ -119,6 +130,7 @@ std::string server_info(const std::string& station) {
                {{"station", station},
                 {"wire", kWireVersion},
                 {"effects", effects},
+                {"time_ns", std::to_string(StationFeed::now_ns())},
                 {"version", tools::version_line("punctum-console")}}},
               {"sessionId", station}}
       .dump();
@@ -165,6 +177,61 @@ std::string services() {
   }
   return json{{"op", "advertiseServices"}, {"services", std::move(list)}}.dump();
 }
+
+// A connection that says how many frames of a WebSocket came. Beast keeps to itself those that are empty or
+// carry no message.
+class Stream : public beast::basic_stream<asio::generic::stream_protocol> {
+ public:
+  using Base = beast::basic_stream<asio::generic::stream_protocol>;
+  using Base::Base;
+
+  // Called with the number of frames that have just begun.
+  void on_frames(std::function<void(int)> call) { call_ = std::move(call); }
+  template <class Buffers, class Handler>
+  void async_read_some(const Buffers& buffers, Handler&& handler) {
+    Base::async_read_some(buffers, [this, buffers, handler = std::forward<Handler>(handler)](
+                                       error_code failed, std::size_t n) mutable {
+      if (call_) {
+        count(buffers, n);
+      }
+      handler(failed, n);
+    });
+  }
+
+  template <class Handler>
+  friend void async_teardown(beast::role_type role, Stream& stream, Handler&& handler) {
+    async_teardown(role, static_cast<Base&>(stream), std::forward<Handler>(handler));
+  }
+
+ private:
+  template <class Buffers>
+  void count(const Buffers& buffers, std::size_t n) {
+    int begun = 0;
+    for (auto one = asio::buffer_sequence_begin(buffers); n > 0 && one != asio::buffer_sequence_end(buffers);
+         ++one) {
+      const asio::const_buffer piece = asio::buffer(asio::const_buffer(*one), n);
+      begun += frames_.count({static_cast<const char*>(piece.data()), piece.size()});
+      n -= piece.size();
+    }
+    call_(begun);
+  }
+  std::function<void(int)> call_;
+  FrameCounter frames_;
+};
+
+// An HTTP response while it is sent.
+template <class Body>
+struct Answer {
+  Answer(http::response<Body> all, bool only_head) : response(std::move(all)), head_only(only_head) {
+    serializer.split(head_only);
+  }
+  [[nodiscard]] bool is_sent() { return head_only ? serializer.is_header_done() : serializer.is_done(); }
+
+  http::response<Body> response;
+  http::response_serializer<Body> serializer{response};
+  bool head_only;
+  std::chrono::steady_clock::time_point until = std::chrono::steady_clock::now() + Seconds(kAnswer_s);
+};
 
 }  // namespace
 
@@ -252,24 +319,29 @@ class Gateway::Server::Client : public std::enable_shared_from_this<Client> {
   void send(http::response<http::span_body<const char>> response);
   template <class Body>
   void write(http::response<Body> response);
+  template <class Body>
+  void write_more(const std::shared_ptr<Answer<Body>>& answer);
   void begin_websocket();
   void read_message();
   void read_more();
+  void count(int frames);
   void obey(const ClientMessage& message);
   void subscribe(const Subscribe& wanted);
+  void put(const Told& news, std::uint32_t subscription);
   void call(const ServiceCall& request);
   [[nodiscard]] tl::expected<void, std::string> serve(const ServiceCall& request);
+  [[nodiscard]] tl::expected<void, std::string> stop();
   [[nodiscard]] tl::expected<void, std::string> control(std::string_view request);
   [[nodiscard]] tl::expected<void, std::string> set(std::string_view request);
   [[nodiscard]] tl::expected<void, std::string> replay_wish(std::string_view request);
   [[nodiscard]] tl::expected<void, std::string> move_hand(std::string_view request);
+  void say_asked(std::string_view what, const tl::expected<void, std::string>& asked) const;
   [[nodiscard]] std::string who() const { return fmt::format("{} ({})", person_.name, from_); }
   void send_text(std::string text);
   void send_text(const json& message) { send_text(words(message)); }
   void send_next();
   void close(websocket::close_code code, std::string_view why);
 
-  using Stream = beast::basic_stream<asio::generic::stream_protocol>;
   Server& server_;
   Stream http_;
   std::string from_;      // address of the other side
@@ -284,6 +356,7 @@ class Gateway::Server::Client : public std::enable_shared_from_this<Client> {
   Outbox outbox_{kOutboxMessages, kOutboxBytes};
   TokenBucket bucket_{kMostMessages, kMessagesPer_s};
   double begun_s_ = now_s();
+  double stop_told_s_ = -kStopTold_s;  // in the log
 };
 
 void Gateway::Server::Client::abandon() {
@@ -317,6 +390,10 @@ void Gateway::Server::Client::answer() {
     const auto value = request[field];
     return std::string_view(value.data(), value.size());
   };
+  // Of two names another program on the way may have looked at the other one; a request has no body.
+  if (request.count(http::field::host) > 1 || request.count(http::field::transfer_encoding) > 0) {
+    return refuse(http::status::bad_request, "two Host headers, or a Transfer-Encoding");
+  }
   if (!server_.allowed_.host(text(http::field::host))) {
     return refuse(http::status::misdirected_request, "this name is not one of this gateway");
   }
@@ -365,24 +442,23 @@ void Gateway::Server::Client::write(http::response<Body> response) {
   response.set("Cross-Origin-Opener-Policy", "same-origin");
   response.set(http::field::cache_control, "no-store");
   response.prepare_payload();
-  const bool goes_on = response.keep_alive();
   const bool head_only = request_->get().method() == http::verb::head;
-  const auto kept = std::make_shared<http::response<Body>>(std::move(response));
-  const auto serializer = std::make_shared<http::response_serializer<Body>>(*kept);
-  http_.expires_after(Seconds(kHandshake_s));
-  const auto written = mine([this, kept, serializer, goes_on](error_code failed, std::size_t) {
-    if (!failed && goes_on) {
-      read_request();
-    } else {
-      failed = http_.socket().shutdown(tcp::socket::shutdown_send, failed);
-    }
-  });
-  if (head_only) {
-    serializer->split(true);
-    http::async_write_header(http_, *serializer, written);
-  } else {
-    http::async_write(http_, *serializer, written);
-  }
+  write_more(std::make_shared<Answer<Body>>(std::move(response), head_only));
+}
+
+// Piece by piece: whoever takes some of it within kHandshake_s has as long again, but not for ever.
+template <class Body>
+void Gateway::Server::Client::write_more(const std::shared_ptr<Answer<Body>>& answer) {
+  http_.expires_at(std::min(std::chrono::steady_clock::now() + Seconds(kHandshake_s), answer->until));
+  http::async_write_some(http_, answer->serializer, mine([this, answer](error_code failed, std::size_t) {
+                           if (!failed && !answer->is_sent()) {
+                             write_more(answer);
+                           } else if (!failed && answer->response.keep_alive()) {
+                             read_request();
+                           } else {
+                             failed = http_.socket().shutdown(tcp::socket::shutdown_send, failed);
+                           }
+                         }));
 }
 
 void Gateway::Server::Client::begin_websocket() {
@@ -405,6 +481,7 @@ void Gateway::Server::Client::begin_websocket() {
   person_ = std::move(*known);
   http_.expires_never();  // the WebSocket has time limits of its own
   socket_.emplace(std::move(http_));
+  socket_->next_layer().on_frames([this](int frames) { count(frames); });
   websocket::stream_base::timeout limits{};
   limits.handshake_timeout = Seconds(kHandshake_s);
   limits.idle_timeout = Seconds(kIdle_s);
@@ -447,9 +524,6 @@ void Gateway::Server::Client::read_more() {
         if (!socket_->is_message_done()) {
           return read_more();
         }
-        if (!bucket_.take(now_s() - begun_s_)) {
-          return close(websocket::close_code::policy_error, "too many messages");
-        }
         const std::string_view bytes(static_cast<const char*>(buffer_.data().data()), buffer_.size());
         const auto message = socket_->got_text() ? read_text(bytes) : read_binary(bytes);
         if (!message) {
@@ -462,12 +536,26 @@ void Gateway::Server::Client::read_more() {
       }));
 }
 
+// In the middle of a reading, which goes on until the other side has seen why it is parted with.
+void Gateway::Server::Client::count(int frames) {
+  const double now = now_s() - begun_s_;
+  while (frames > 0 && bucket_.take(now)) {
+    --frames;
+  }
+  if (frames > 0 && is_open_ && !is_closing_) {
+    is_closing_ = true;
+    asio::post(socket_->get_executor(),
+               mine([this] { close(websocket::close_code::policy_error, "too many messages"); }));
+  }
+}
+
 void Gateway::Server::Client::obey(const ClientMessage& message) {
   if (const auto* wanted = std::get_if<Subscribe>(&message)) {
     subscribe(*wanted);
   } else if (const auto* no_more = std::get_if<Unsubscribe>(&message)) {
     for (const std::uint32_t id : no_more->ids) {
       subscriptions_.erase(id);
+      outbox_.forget(id);
     }
   } else if (const auto* request = std::get_if<ServiceCall>(&message)) {
     call(*request);
@@ -489,14 +577,7 @@ void Gateway::Server::Client::subscribe(const Subscribe& wanted) {
     std::vector<Told> missed;
     server_.feed_.catch_up(static_cast<ChannelId>(one.channel), missed);
     for (const Told& news : missed) {
-      std::string head(1, '\x01');
-      append(head, one.id, 4);
-      append(head, news.time_ns, 8);
-      if (news.channel == state) {
-        outbox_.push({std::move(head) + own_state(*news.message), nullptr, false});
-      } else {
-        outbox_.push({std::move(head), news.message, false});
-      }
+      put(news, one.id);
     }
   }
   send_next();
@@ -512,6 +593,7 @@ tl::expected<void, std::string> Gateway::Server::Client::control(std::string_vie
     if (server_.control_.holder() == number_) {
       server_.control_.give_back(number_);
       server_.feed_.let_go_of_hand();
+      tools::say(fmt::format("{} has given control back\n", who()));
     }
     return {};
   }
@@ -547,8 +629,22 @@ tl::expected<void, std::string> Gateway::Server::Client::set(std::string_view re
     return tl::unexpected(command.error());
   }
   auto asked = server_.feed_.ask(*command, person_.name);
-  tools::say(fmt::format("{} asked for {} = {:g} at {:.3f} s: {}\n", who(), wanted->name, command->value,
-                         server_.feed_.run_s(), asked ? "sent" : asked.error()));
+  say_asked(parameters.in_words(wanted->name, *command), asked);
+  return asked;
+}
+
+void Gateway::Server::Client::say_asked(std::string_view what,
+                                        const tl::expected<void, std::string>& asked) const {
+  tools::say(fmt::format("{} asked for {} at {:.3f} s: {}\n", who(), what, server_.feed_.run_s(),
+                         asked ? "sent" : asked.error()));
+}
+
+tl::expected<void, std::string> Gateway::Server::Client::stop() {
+  auto asked = server_.stop(who());
+  if (const double now = now_s(); now - stop_told_s_ > kStopTold_s) {
+    stop_told_s_ = now;
+    say_asked("a stop", asked);
+  }
   return asked;
 }
 
@@ -575,7 +671,7 @@ tl::expected<void, std::string> Gateway::Server::Client::move_hand(std::string_v
 tl::expected<void, std::string> Gateway::Server::Client::serve(const ServiceCall& request) {
   switch (request.service) {
     case stop_service:
-      return server_.stop(person_.name);
+      return stop();
     case control_service:
       return control(request.request);
     case set_service:
@@ -603,7 +699,7 @@ void Gateway::Server::Client::call(const ServiceCall& request) {
   append(response, kEncoding.size(), 4);
   response += kEncoding;
   response += "{}";
-  outbox_.push({std::move(response), nullptr, false});
+  outbox_.push({.head = std::move(response), .since_s = now_s()});
   send_next();
 }
 
@@ -611,20 +707,33 @@ void Gateway::Server::Client::tell(const Told& news) {
   if (news.channel == picture && outbox_.bytes() > kBehind_bytes) {
     return;
   }
+  const bool is_behind = only_the_newest_counts(news.channel) && outbox_.behind_s(now_s()) > kBehind_s;
   for (const auto& [id, channel] : subscriptions_) {
     if (channel != news.channel) {
       continue;
     }
-    std::string head(1, '\x01');
-    append(head, id, 4);
-    append(head, news.time_ns, 8);
-    if (news.channel == state) {  // the one message that is of this client's own
-      outbox_.push({std::move(head) + own_state(*news.message), nullptr, false});
+    if (is_behind) {
+      outbox_.leave_out();
     } else {
-      outbox_.push({std::move(head), news.message, false});
+      put(news, id);
     }
   }
   send_next();
+}
+
+void Gateway::Server::Client::put(const Told& news, std::uint32_t subscription) {
+  Outgoing message{.head = "\x01", .since_s = now_s()};
+  append(message.head, subscription, 4);
+  append(message.head, news.time_ns, 8);
+  if (news.channel == state) {  // the one message that is of this client's own
+    message.head += own_state(*news.message);
+  } else {
+    message.body = news.message;
+  }
+  if (news.holds) {
+    message.holds_for = subscription;
+  }
+  outbox_.push(std::move(message));
 }
 
 std::string Gateway::Server::Client::own_state(std::string common) const {
@@ -649,7 +758,7 @@ ChannelSet Gateway::Server::Client::wanted() const {
 }
 
 void Gateway::Server::Client::send_text(std::string text) {
-  outbox_.push({std::move(text), nullptr, true});
+  outbox_.push({.head = std::move(text), .text = true, .since_s = now_s()});
   send_next();
 }
 
@@ -690,8 +799,12 @@ tl::expected<std::unique_ptr<Gateway::Server>, std::string> Gateway::Server::ope
   if (failed) {
     return tl::unexpected(fmt::format("{}: not an address", settings.address));
   }
-  const bool encrypted = !settings.certificate.empty();
-  if (!address.is_loopback() && (!encrypted || !settings.tokens.made().empty())) {
+  const bool encrypted = !settings.certificate.empty(), from_file = settings.tokens.made().empty();
+  if (from_file && !encrypted) {  // they are good for later gateways, too, and whoever has this port next
+                                  // would be shown them
+    return tl::unexpected(std::string("--tokens: refused without TLS; give --certificate and --key, too"));
+  }
+  if (!address.is_loopback() && !from_file) {
     return tl::unexpected(fmt::format("{}: refused without TLS and a file of tokens", settings.address));
   }
   std::optional<TlsFront> tls;
@@ -748,6 +861,8 @@ void Gateway::Server::accept() {
       error_code ignored;
       ignored = socket.set_option(tcp::no_delay(true), ignored);
       ignored = socket.set_option(asio::socket_base::send_buffer_size(kSendBuffer_bytes), ignored);
+      ignored = socket.set_option(
+          asio::detail::socket_option::integer<IPPROTO_TCP, TCP_NOTSENT_LOWAT>(kUnsent_bytes), ignored);
       const tcp::endpoint at = socket.remote_endpoint(ignored);
       const std::string from = fmt::format("{}:{}", bracketed(at.address()), at.port());
       if (tls_) {

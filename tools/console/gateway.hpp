@@ -22,6 +22,8 @@ inline constexpr std::size_t kMostMessageBytes = 16 * 1024;  // from a client
 inline constexpr double kMostMessages = 64, kMessagesPer_s = 80;
 inline constexpr std::size_t kOutboxMessages = 512, kOutboxBytes = 1024 * 1024;
 inline constexpr int kHandshake_s = 5, kIdle_s = 20;  // a ping goes out after half of that
+inline constexpr int kAnswer_s =
+    120;  // for a file of the page, as long as some of it is taken every kHandshake_s
 
 struct GatewaySettings {
   std::string address = "127.0.0.1";  // IPv4 or IPv6

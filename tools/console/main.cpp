@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "hal/ipc/rendezvous.hpp"
 #include "tools/console/allow_list.hpp"
 #include "tools/console/gateway.hpp"
 #include "tools/console/station_feed.hpp"
@@ -35,7 +36,8 @@ int bad(const std::string& text) {
   return exit_bad_input;
 }
 
-// Stations of this user, by the names of their sockets (hal/ipc/rendezvous.hpp).
+// Stations of this user, by the names of their sockets (hal/ipc/rendezvous.hpp), which another user may have
+// taken.
 std::vector<std::string> running_stations() {
   const std::string prefix = fmt::format("@punctum.{}.", geteuid());
   std::set<std::string> names;  // a visitor's connection has the name, too
@@ -45,6 +47,7 @@ std::vector<std::string> running_stations() {
       names.insert(line.substr(at + prefix.size()));
     }
   }
+  std::erase_if(names, [](const std::string& name) { return !hal::runs(name); });
   return {names.begin(), names.end()};
 }
 
@@ -84,9 +87,10 @@ int main_or_throw(int argc, char** argv) {
       app.add_option("--key", settings.key, "of the certificate, PEM, mode 0600")->type_name("FILE");
   certificate->needs(key);
   key->needs(certificate);
-  app.add_option(
-         "--tokens", tokens,
-         "mode 0600; lines `view TOKEN [NAME]` or `operate TOKEN [NAME]`: without a token nobody is let in")
+  app.add_option("--tokens", tokens,
+                 "mode 0600; lines `view TOKEN [NAME]` or `operate TOKEN [NAME]`: without a token nobody is "
+                 "let in; needs "
+                 "--certificate and --key")
       ->type_name("FILE");
   app.add_option("--host", settings.hosts, "another name of this machine, for pages; may be repeated")
       ->type_name("NAME")

@@ -79,6 +79,14 @@ tl::expected<rt::Command, std::string> Parameters::undo(std::string_view name) c
   return rt::Command{p->kind, p->before, p->target};
 }
 
+std::string Parameters::in_words(std::string_view name, const rt::Command& command) const {
+  const Parameter* p = find(name);
+  if (p == nullptr) {
+    return std::string(name);
+  }
+  return fmt::format("{} = {:g}{}", p->name, command.value / p->unit_SI, p->unit == "1" ? "" : " " + p->unit);
+}
+
 bool Parameters::took(const rt::Event& event, const std::string& who) {
   if (event.kind != rt::Event::command) {
     return false;

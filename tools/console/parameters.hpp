@@ -36,6 +36,8 @@ class Parameters {
   [[nodiscard]] tl::expected<rt::Command, std::string> command(std::string_view name, double value) const;
   // Back to what it was before its last change.
   [[nodiscard]] tl::expected<rt::Command, std::string> undo(std::string_view name) const;
+  // What a command asks for, in the parameter's own unit.
+  [[nodiscard]] std::string in_words(std::string_view name, const rt::Command& command) const;
   // True if this event of the core changes one. `who`: whoever asked for it.
   [[nodiscard]] bool took(const rt::Event& event, const std::string& who);
 

@@ -23,14 +23,16 @@
 namespace punctum::console {
 namespace {
 
-std::uint64_t wall_ns() {
-  return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::nanoseconds>(
-                                        std::chrono::system_clock::now().time_since_epoch())
-                                        .count());
-}
-
 std::int64_t monotonic_ns() {
   return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+// Since 1970 as the clock said when this was first asked for, and steady from then on: the page tells by it
+// how old a message is, whatever sets the clock meanwhile.
+std::uint64_t wall_ns() {
+  static const std::int64_t begin_ns =
+      std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count() - monotonic_ns();
+  return static_cast<std::uint64_t>(begin_ns + monotonic_ns());
 }
 
 template <class Message, class Struct>
@@ -167,6 +169,8 @@ tl::expected<void, std::string> StationFeed::join_replay(const hal::Joined& join
   replay_wishes_ = std::move(*wishes);
   return {};
 }
+
+std::uint64_t StationFeed::now_ns() { return wall_ns(); }
 
 bool StationFeed::is_over() const { return has_ended(parent_); }
 
@@ -468,7 +472,7 @@ void StationFeed::poll(double now_s, ChannelSet wanted, std::vector<Told>& out) 
   }
   if (parameters_changed_ && wanted[parameters]) {
     parameters_changed_ = false;
-    out.push_back({parameters, wall_ns(), std::make_shared<const std::string>(parameters_.json())});
+    out.push_back({parameters, wall_ns(), std::make_shared<const std::string>(parameters_.json()), true});
   }
   if (wanted[state]) {
     // What changes with every tick does not count as a change.
@@ -502,19 +506,19 @@ void StationFeed::catch_up(ChannelId channel, std::vector<Told>& out) {
       surface_ = 0;
       break;
     case parameters:
-      out.push_back({parameters, wall_ns(), std::make_shared<const std::string>(parameters_.json())});
+      out.push_back({parameters, wall_ns(), std::make_shared<const std::string>(parameters_.json()), true});
       break;
     case picture:
       viewed_ = 0;
       break;
     case replay:
       if (replay_) {
-        out.push_back({replay, wall_ns(), std::make_shared<const std::string>(replay_in_words(true))});
+        out.push_back({replay, wall_ns(), std::make_shared<const std::string>(replay_in_words(true)), true});
       }
       break;
     case fixtures:
       if (!fixtures_.empty()) {
-        out.push_back({fixtures, wall_ns(), std::make_shared<const std::string>(fixtures_)});
+        out.push_back({fixtures, wall_ns(), std::make_shared<const std::string>(fixtures_), true});
       }
       break;
     case telemetry:

@@ -65,6 +65,7 @@ struct Told {
   ChannelId channel;
   std::uint64_t time_ns;  // since 1970, when it was read
   std::shared_ptr<const std::string> message;
+  bool holds = false;  // until the next one that does: it is told once per change
 };
 
 class StationFeed {
@@ -100,6 +101,8 @@ class StationFeed {
   [[nodiscard]] std::string refusal() const;
   [[nodiscard]] const Parameters& parameters_now() const { return parameters_; }
 
+  // The clock that a message's time is of.
+  [[nodiscard]] static std::uint64_t now_ns();
   [[nodiscard]] double run_s() const { return newest_.t_s; }
   [[nodiscard]] const std::string& station() const { return station_; }
   // Its parent has ended, and with it the station.

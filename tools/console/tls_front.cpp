@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <openssl/ssl.h>
-#include <sys/stat.h>
 
 #include <array>
 #include <boost/asio/local/connect_pair.hpp>
@@ -10,10 +9,10 @@
 #include <boost/asio/ssl.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/write.hpp>
-#include <cerrno>
 #include <chrono>
-#include <cstring>
 #include <utility>
+
+#include "tools/console/private_file.hpp"
 
 namespace punctum::console {
 namespace {
@@ -25,6 +24,7 @@ using Local = asio::local::stream_protocol::socket;
 
 constexpr int kSend_s = 20;                      // a peer that takes nothing for so long is left
 constexpr std::size_t kPiece_bytes = 16 * 1024;  // a TLS record
+constexpr int kPlain_bytes = 8 * 1024;  // what waits between the gateway and here: no more than it knows of
 
 }  // namespace
 
@@ -44,19 +44,20 @@ class TlsFront::Connection : public std::enable_shared_from_this<Connection> {
 
   void begin(int limit_s, std::function<void(Plain)> begun) {
     expire_after(limit_s);
-    encrypted_.async_handshake(asio::ssl::stream_base::server,
-                               [self = shared_from_this(), begun = std::move(begun)](error_code failed) {
-                                 if (!failed) {
-                                   failed = asio::local::connect_pair(self->plain_, self->other_, failed);
-                                 }
-                                 if (failed) {
-                                   return self->end();
-                                 }
-                                 self->limit_.cancel();
-                                 begun(Plain(std::move(self->other_)));
-                                 self->pump_in();
-                                 self->pump_out();
-                               });
+    encrypted_.async_handshake(asio::ssl::stream_base::server, [self = shared_from_this(),
+                                                                begun = std::move(begun)](error_code failed) {
+      if (!failed) {
+        failed = asio::local::connect_pair(self->plain_, self->other_, failed);
+      }
+      if (failed) {
+        return self->end();
+      }
+      self->limit_.cancel();
+      failed = self->other_.set_option(asio::socket_base::send_buffer_size(kPlain_bytes), failed);
+      begun(Plain(std::move(self->other_)));
+      self->pump_in();
+      self->pump_out();
+    });
   }
 
  private:
@@ -122,12 +123,13 @@ TlsFront& TlsFront::operator=(TlsFront&&) noexcept = default;
 TlsFront::~TlsFront() = default;
 
 tl::expected<TlsFront, std::string> TlsFront::open(const std::string& certificate, const std::string& key) {
-  struct stat facts{};
-  if (stat(key.c_str(), &facts) != 0) {
-    return tl::unexpected(fmt::format("{}: {}", key, std::strerror(errno)));
+  const auto secret = read_file(key, Readers::owner);
+  if (!secret) {
+    return tl::unexpected(secret.error());
   }
-  if ((facts.st_mode & 077U) != 0) {
-    return tl::unexpected(fmt::format("{}: others may read or write it; allowed: mode 0600", key));
+  const auto shown = read_file(certificate, Readers::everybody);
+  if (!shown) {
+    return tl::unexpected(shown.error());
   }
   auto context = std::make_unique<Context>();
   asio::ssl::context& tls = context->tls;
@@ -137,10 +139,10 @@ tl::expected<TlsFront, std::string> TlsFront::open(const std::string& certificat
   // Nobody sits here to type a passphrase.
   failed =
       tls.set_password_callback([](std::size_t, asio::ssl::context::password_purpose) { return ""; }, failed);
-  if (failed = tls.use_certificate_chain_file(certificate, failed); failed) {
+  if (failed = tls.use_certificate_chain(asio::buffer(*shown), failed); failed) {
     return tl::unexpected(fmt::format("{}: {}", certificate, failed.message()));
   }
-  if (failed = tls.use_private_key_file(key, asio::ssl::context::pem, failed); failed) {
+  if (failed = tls.use_private_key(asio::buffer(*secret), asio::ssl::context::pem, failed); failed) {
     return tl::unexpected(fmt::format("{}: {}", key, failed.message()));
   }
   if (SSL_CTX_check_private_key(tls.native_handle()) != 1) {

@@ -1,44 +1,16 @@
 #include "tools/console/tokens.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/random.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <cstring>
 #include <sstream>
 
-#include "hal/ipc/segment.hpp"
+#include "tools/console/private_file.hpp"
 
 namespace punctum::console {
 namespace {
-
-constexpr std::size_t kMostTokenFile_bytes = 64UL * 1024;
-
-tl::expected<std::string, std::string> read_private(const std::string& path) {
-  const hal::Descriptor file(open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-  if (!file) {
-    return tl::unexpected(fmt::format("{}: {}", path, std::strerror(errno)));
-  }
-  struct stat facts{};
-  if (fstat(file.number(), &facts) != 0 || !S_ISREG(facts.st_mode)) {
-    return tl::unexpected(path + ": not a file");
-  }
-  if ((facts.st_mode & 077U) != 0 || (facts.st_uid != geteuid() && facts.st_uid != 0)) {
-    return tl::unexpected(fmt::format("{}: others may read or write it; allowed: mode 0600", path));
-  }
-  std::string text(kMostTokenFile_bytes + 1, '\0');
-  const ssize_t n = read(file.number(), text.data(), text.size());
-  if (n < 0 || static_cast<std::size_t>(n) > kMostTokenFile_bytes) {
-    return tl::unexpected(path + ": cannot be read, or is longer than 64 kB");
-  }
-  text.resize(static_cast<std::size_t>(n));
-  return text;
-}
 
 bool is_token(std::string_view token) {
   return token.size() >= Tokens::kLeast && token.size() <= Tokens::kMost &&
@@ -60,7 +32,7 @@ bool is_same_token(std::string_view a, std::string_view b) {
 }  // namespace
 
 tl::expected<Tokens, std::string> Tokens::read(const std::string& path) {
-  const auto text = read_private(path);
+  const auto text = read_file(path, Readers::owner);
   if (!text) {
     return tl::unexpected(text.error());
   }

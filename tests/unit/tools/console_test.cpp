@@ -23,6 +23,7 @@
 #include "tools/console/client_message.hpp"
 #include "tools/console/control_lease.hpp"
 #include "tools/console/fixtures.hpp"
+#include "tools/console/frame_counter.hpp"
 #include "tools/console/outbox.hpp"
 #include "tools/console/parameters.hpp"
 #include "tools/console/station_feed.hpp"
@@ -322,6 +323,56 @@ TEST(Outbox, drops_the_oldest_when_it_is_full_and_counts_it) {
   EXPECT_EQ(box.bytes(), 0U);
 }
 
+std::string sent_from(Outbox& box) {
+  std::string sent;
+  while (const Outgoing* next = box.begin_sending()) {
+    sent += next->head;
+    box.sent();
+  }
+  return sent;
+}
+
+TEST(Outbox, keeps_what_holds_until_the_next_of_its_kind_and_of_that_the_newest_alone) {
+  const auto holding = [](const std::string& text, std::uint32_t kind) {
+    return Outgoing{.head = text, .holds_for = kind};
+  };
+  Outbox box(4, 1000);
+  box.push(holding("P", 7));
+  box.push(holding("F", 8));
+  box.push(holding("Q", 7));
+  for (const char* text : {"a", "b", "c", "d", "e"}) {
+    box.push(outgoing(text));
+  }
+  EXPECT_EQ(box.dropped(), 3U) << "what a newer one replaced is not missed";
+  EXPECT_EQ(sent_from(box), "FQde");
+  EXPECT_EQ(box.bytes(), 0U);
+  // The one under way stays; nobody who has gone is told; one that alone is too much is still sent.
+  box.push(holding("1", 7));
+  EXPECT_EQ(box.begin_sending()->head, "1");
+  box.push(holding("2", 7));
+  box.push(holding("x", 8));
+  box.forget(8);
+  box.forget(9);
+  box.sent();
+  EXPECT_EQ(sent_from(box), "2");
+  box.push(holding(std::string(2000, 'z'), 7));
+  box.push(outgoing("y"));
+  EXPECT_EQ(sent_from(box).size(), 2001U);
+  EXPECT_EQ(box.bytes(), 0U);
+}
+
+TEST(Outbox, says_for_how_long_the_oldest_has_waited) {
+  Outbox box(10, 1000);
+  EXPECT_EQ(box.behind_s(100), 0);
+  box.push({.head = "a", .since_s = 100});
+  box.push({.head = "b", .since_s = 101});
+  EXPECT_EQ(box.behind_s(102), 2);
+  (void)box.begin_sending();
+  EXPECT_EQ(box.behind_s(102), 2) << "one that is on its way for long is behind, too";
+  box.sent();
+  EXPECT_EQ(box.behind_s(102), 1);
+}
+
 TEST(Outbox, keeps_the_one_under_way_where_it_is) {
   Outbox box(2, 1000);
   box.push(outgoing("first"));
@@ -375,6 +426,36 @@ TEST(Outbox, is_bounded_in_bytes_and_counts_a_shared_body_too) {
   EXPECT_EQ(box.dropped(), 8U);
   box.push({std::string(500, 'y'), nullptr, false});
   EXPECT_EQ(box.messages(), 1U) << "one that is too large alone is still sent";
+}
+
+TEST(FrameCounter, counts_frames_of_every_length_however_they_are_cut) {
+  const std::string mask(4, 'm');
+  std::string bytes;
+  int frames = 0;
+  for (const std::size_t length : {0UL, 1UL, 125UL, 126UL, 127UL, 65535UL, 65536UL, 0UL, 0UL}) {
+    for (const bool masked : {true, false}) {
+      const auto bit = static_cast<char>(masked ? 0x80 : 0);
+      bytes += '\x80';
+      const std::size_t more = length < 126 ? 0 : length < 65536 ? 2 : 8;
+      bytes += static_cast<char>((more == 0   ? length
+                                  : more == 2 ? 126
+                                              : 127) |
+                                 static_cast<unsigned char>(bit));
+      for (std::size_t i = more; i-- > 0;) {
+        bytes += static_cast<char>(length >> (8 * i) & 0xFFU);
+      }
+      bytes += (masked ? mask : "") + std::string(length, '\x89');
+      ++frames;
+    }
+  }
+  for (const std::size_t step : {1UL, 2UL, 3UL, 7UL, 1000UL, bytes.size()}) {
+    FrameCounter counter;
+    int counted = 0;
+    for (std::size_t at = 0; at < bytes.size(); at += step) {
+      counted += counter.count(std::string_view(bytes).substr(at, step));
+    }
+    EXPECT_EQ(counted, frames) << step;
+  }
 }
 
 std::string call(std::uint32_t service, std::uint32_t id, const std::string& encoding,

@@ -303,12 +303,83 @@ async function all() {
     await page.waitForFunction(() => punctum.drawn.plots.gaps > 0);
   });
 
+  await step('a message is as old as it took longer than the quickest; clocks that run apart are no age, a line that stays late is', async () => {
+    const {text: code} = (await build({entryPoints: [join(here, 'src/delay.ts')], bundle: true, format: 'esm', write: false, logLevel: 'error'})).outputFiles[0];
+    const {Delay} = await import(`data:text/javascript,${encodeURIComponent(code)}`);
+    const kHour_ms = 3600e3, kEpoch_ms = 1.9e12, near = (is, should) => assert.ok(Math.abs(is - should) < 2, `${is}, ${should}`);
+    for (const ppm of [-150, 0, 150]) {
+      const delay = new Delay();
+      let most = 0;
+      for (let t = 1000; t < 5 * kHour_ms; t += 500) most = Math.max(most, delay.age_ms(kEpoch_ms + t * (1 + ppm * 1e-6), t + 20));
+      assert.ok(most < 1, `${ppm} ppm: ${most} ms`);
+    }
+    const delay = new Delay();
+    near(delay.age_ms(kEpoch_ms, 1030), 0);
+    near(delay.age_ms(kEpoch_ms + 100, 1110), 0);  // quicker by 20 ms
+    near(delay.age_ms(kEpoch_ms + 200, 1810), 600);
+    // A line that is slower than what is told: each message later than the one before.
+    let age = 0;
+    for (let t = 0; t < 4000; t += 20) age = delay.age_ms(kEpoch_ms + 300 + t, 1310 + 2 * t);
+    near(age, 3979);
+    for (let t = 10e3; t < kHour_ms; t += 500) assert.ok(delay.age_ms(kEpoch_ms + t, 1010 + 4000 + t) > 3000, 'for an hour');
+  });
+
+  await step('what comes late over a slow line is grey, although it comes all the time; it is fresh again when the line is', async () => {
+    const far = await browser.newPage();
+    far.setDefaultTimeout(kSlow_ms);
+    await far.addInitScript(() => {
+      globalThis.late_ms = 0;
+      globalThis.WebSocket = class extends WebSocket {
+        set onmessage(take) { super.onmessage = (event) => (late_ms > 0 ? setTimeout(() => take(event), late_ms) : take(event)); }
+      };
+    });
+    const isGrey = () => far.evaluate(() => document.body.classList.contains('stale'));
+    await far.goto(url);
+    await far.waitForFunction(() => punctum.link.connected && punctum.newest?.tick > 0);
+    await until('it is fresh', async () => !await isGrey());
+    const before = await far.evaluate(() => { late_ms = 3000; return punctum.newest.tick; });
+    await far.waitForFunction((tick) => punctum.newest.tick > tick + 3500, before);
+    for (let i = 0; i < 20; i++) {
+      assert.ok(await isGrey(), 'ticks come, 3 s late');
+      await far.waitForTimeout(50);
+    }
+    assert.ok(Number(/([\d.]+) s old/.exec(await far.locator('#time').innerText())?.[1]) > 2.5);
+    await far.evaluate(() => { late_ms = 0; });
+    await until('it is fresh again', async () => !await isGrey());
+    // A line that is slow from the start: the first words came before anything waited.
+    await far.addInitScript(() => {
+      Object.defineProperty(WebSocket.prototype, 'onmessage', {set(take) {
+        this.addEventListener('message', (event) => (typeof event.data === 'string' ? take(event) : setTimeout(() => take(event), 3000)));
+      }});
+    });
+    await far.reload();
+    await far.waitForFunction(() => punctum.newest?.tick > 0);
+    for (let i = 0; i < 20; i++) {
+      assert.ok(await isGrey(), 'ticks come, 3 s late from the first on');
+      await far.waitForTimeout(50);
+    }
+    await far.close();
+  });
+
   await step('a gateway that is killed: the page says so, the core goes on, and a new gateway is found', async () => {
     const before = await page.evaluate(() => punctum.newest.tick);
     process.kill(Number(execFileSync('pgrep', ['-P', String(run.pid), 'punctum-consol']).toString()), 'SIGKILL');
     await page.waitForFunction(() => !punctum.link.connected);
     assert.ok(await isStale());
     assert.match(await text('banner-title'), /No connection/);
+    // Somebody else takes the port, answers, and lets nobody in.
+    const tokens = [];
+    const squatter = createServer((_, answer) => answer.end('<!doctype html>'));
+    squatter.on('upgrade', (request, socket) => {
+      tokens.push(/punctum\.token/.test(request.headers['sec-websocket-protocol']));
+      socket.end('HTTP/1.1 401 Unauthorized\r\nContent-Length: 0\r\nConnection: close\r\n\r\n');
+    });
+    squatter.listen(Number(port), '127.0.0.1');
+    await until('the page has tried again and again', () => tokens.length > 4);
+    squatter.close();
+    squatter.closeAllConnections();
+    assert.ok(tokens.slice(1).every((shown) => !shown), `a token that was refused is not shown again: ${tokens}`);
+    assert.ok(!await page.evaluate(() => Object.values(sessionStorage).some((kept) => /^[0-9a-f]{64}$/.test(kept))));
     start('punctum-console', ['--station', station, '--port', port]);
     await page.waitForFunction((ticks) => punctum.link.connected && punctum.state?.core === 'ticking' && punctum.newest?.tick > ticks, before);
     await until('it is fresh', async () => !await isStale());

@@ -1,6 +1,8 @@
 // The connection to punctum-console: `foxglove.websocket.v1`. It comes back by itself.
+import {Delay} from './delay';
 
-export type Listener = (topic: string, message: DataView) => void;
+// age_ms: how much longer it was under way than the quickest message.
+export type Listener = (topic: string, message: DataView, age_ms: number) => void;
 export interface LinkState { connected: boolean; reason: string; station: string; effects: string[] }
 
 const kFirstPause_ms = 250, kLongestPause_ms = 4000;
@@ -12,6 +14,7 @@ const kOnDemand: readonly string[] = ['/punctum/ticks', '/punctum/picture'];
 export class Link {
   readonly state: LinkState = {connected: false, reason: 'connecting', station: '', effects: []};
   private socket?: WebSocket;
+  private delay = new Delay();
   private topics = new Map<number, string>();  // by subscription
   private services = new Map<string, number>();
   private channels = new Map<string, number>();
@@ -19,17 +22,28 @@ export class Link {
   private calls = 0;
   private pause_ms = kFirstPause_ms;
   private answers = new Map<number, (problem: string) => void>();
-  private tokenRefused = false;
 
-  // token: says who this is; empty: whoever has none.
-  constructor(private url: string, private token: string, private told: Listener, private changed: () => void) {
+  // token: says who this is; empty: whoever has none. refused: it is not shown again.
+  constructor(private url: string, private token: string, private told: Listener, private changed: () => void, private refused: () => void) {
     this.connect();
   }
 
+  private again(): void {
+    setTimeout(() => void this.connectAgain(), this.pause_ms);
+    this.pause_ms = Math.min(2 * this.pause_ms, kLongestPause_ms);
+  }
+  // A browser does not say why a WebSocket was not let in: whether a gateway is there is asked first, without the token.
+  private async connectAgain(): Promise<void> {
+    const there = this.token === '' || await fetch('/', {method: 'HEAD', cache: 'no-store'}).then((answer) => answer.ok, () => false);
+    if (there) this.connect();
+    else this.again();
+  }
+
   private connect(): void {
-    const shown = this.token !== '' && !this.tokenRefused;
+    const shown = this.token !== '';
     const socket = new WebSocket(this.url, ['foxglove.websocket.v1', ...shown ? ['punctum.token.' + this.token] : []]);
     this.socket = socket;
+    this.delay = new Delay();
     let opened = false;
     socket.onopen = () => { opened = true; };
     socket.binaryType = 'arraybuffer';
@@ -44,8 +58,10 @@ export class Link {
     };
     socket.onclose = (event) => {
       this.state.connected = false;
-      // A browser does not say why it was not let in. A token holds for one gateway: the next may let whoever has none look.
-      if (!opened) this.tokenRefused = shown;
+      if (shown && !opened) {  // it was of another gateway; this one may let whoever has none look
+        this.token = '';
+        this.refused();
+      }
       this.state.reason = event.reason || 'no connection to punctum-console, or not let in without a token';
       this.services.clear();
       this.topics.clear();
@@ -53,14 +69,14 @@ export class Link {
       for (const answer of this.answers.values()) answer('the connection was lost');
       this.answers.clear();
       this.changed();
-      setTimeout(() => this.connect(), this.pause_ms);
-      this.pause_ms = Math.min(2 * this.pause_ms, kLongestPause_ms);
+      this.again();
     };
   }
 
   private text(message: {op?: string} & Record<string, any>): void {
     if (message.op === 'serverInfo') {
       if (message.metadata?.wire !== '1') throw new Error('this page is of another version than punctum-console: load it again');
+      this.delay.age_ms(Number(message.metadata.time_ns) / 1e6, performance.now());  // before anything can wait for the line
       this.state.connected = true;
       this.state.reason = '';
       this.state.station = message.metadata.station;
@@ -97,7 +113,8 @@ export class Link {
     const kind = message.getUint8(0);
     if (kind === 1) {
       const topic = this.topics.get(message.getUint32(1, true));
-      if (topic) this.told(topic, new DataView(message.buffer, message.byteOffset + 13, message.byteLength - 13));
+      const age_ms = this.delay.age_ms(Number(message.getBigUint64(5, true)) / 1e6, performance.now());
+      if (topic) this.told(topic, new DataView(message.buffer, message.byteOffset + 13, message.byteLength - 13), age_ms);
     } else if (kind === 3) {
       const call = message.getUint32(5, true);
       this.answers.get(call)?.('');

@@ -107,7 +107,7 @@ type Panel = (typeof kPanels)[number];
 let panel: Panel | undefined;
 let newest: Telemetry | undefined, state: State | undefined;
 let opened = false;  // the injector, since the membranes gave way
-let tick = -1, tickAt = -Infinity;  // when a new tick last came
+let tick = -1, tickAt = -Infinity;  // when the newest tick was told, however late it came
 let stopAsked = -1, stopProblem = '';
 let warnedAt = -Infinity, wasStale = true;
 let unreadable = 0;
@@ -117,20 +117,20 @@ let coreStatus: Status | undefined;
 function isStale(): boolean { return !replay.paused && performance.now() - tickAt > kStale_ms; }
 
 // ---- what comes ----
-function onTelemetry(t: Telemetry): void {
+function onTelemetry(t: Telemetry, age_ms: number): void {
   const before = newest;
   newest = t;
   opened = t.injector_open || opened && (t.phase === 3 || t.phase === 4);
   if (t.tick !== tick) {
     tick = t.tick;
-    tickAt = performance.now();
+    tickAt = performance.now() - age_ms;
   }
   if (before && t.tick < before.tick) {  // another run, or a recording that was turned back: what was listed is still to come
     for (const line of [...by('events').children] as HTMLElement[]) if (Number(line.dataset['t']) > t.t_s) line.remove();
   }
   plots.add(t, replay.now?.speed ?? 1);
   view?.telemetry(t);
-  sound.force(t.force_N ? Math.hypot(t.force_N.x, t.force_N.y, t.force_N.z) : 0);
+  if (!isStale()) sound.force(t.force_N ? Math.hypot(t.force_N.x, t.force_N.y, t.force_N.z) : 0);
   if (before && before.phase !== t.phase) {
     if (t.phase === 1) sound.cue('contact');
     else if (t.phase === 3) sound.cue('puncture');
@@ -170,9 +170,9 @@ function onEvent(e: Event): void {
   while (list.childElementCount > kMostEvents) list.lastElementChild!.remove();
 }
 
-const link = new Link(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/`, sessionStorage.getItem(kToken) ?? '', (topic, message) => {
+const link = new Link(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/`, sessionStorage.getItem(kToken) ?? '', (topic, message, age_ms) => {
   try {
-    if (topic === '/punctum/telemetry') onTelemetry(decode<Telemetry>('Telemetry', message));
+    if (topic === '/punctum/telemetry') onTelemetry(decode<Telemetry>('Telemetry', message), age_ms);
     else if (topic === '/punctum/observation') {
       const found = decode<Observation>('Observation', message);
       view?.observation(found);
@@ -207,7 +207,7 @@ const link = new Link(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${loca
     view?.fixtures(kNotTold);
   }
   show();
-});
+}, () => sessionStorage.removeItem(kToken));
 
 const replay = new Replay(link, by('replay'), layout.has('t') ? Number(layout.get('t')) : undefined, (t_s) => keep('t', t_s.toFixed(3)));
 const parameters = new Parameters(link, by('control'), by('control-note'), by('parameter-list'));

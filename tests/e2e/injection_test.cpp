@@ -48,6 +48,26 @@ TEST_F(Programs, an_injection_goes_through_its_phases_in_order) {
   }
 }
 
+// Its lens resolves no more than that of the usual camera.
+TEST_F(Programs, an_injection_is_seen_as_well_by_a_camera_with_finer_pixels) {
+  const Strings fine = {"--set", "camera.width_px=1454",   "--set", "camera.height_px=970",
+                        "--set", "camera.pixel_um=0.4125", "--set", "sim.camera.psf_px=2.4"};
+  Strings explain = {"explain", "icsi"},
+          run = {"run", "icsi", "--clock", "virtual", "--no-figure", "--no-frames"};
+  for (Strings* words : {&explain, &run}) {
+    words->insert(words->end(), fine.begin(), fine.end());
+  }
+  EXPECT_EQ(punctum(explain), 0);
+  EXPECT_NE(said_.find("2 x 2 pixels are looked at as one"), std::string::npos) << said_;
+  ASSERT_EQ(punctum(run), 0) << said_;
+  const auto r = json();
+  EXPECT_EQ(r["outcome"], "done");
+  EXPECT_EQ(r["stale_observations"], 0);
+  EXPECT_LT(r["contour_error_um"]["rms"].get<double>(), 0.2);
+  EXPECT_LT(std::abs(r["contact_delay_ms"].get<double>()), 150);
+  EXPECT_LT(r["puncture_delay_ms"].get<double>(), 250);
+}
+
 TEST_F(Programs, a_force_sensor_tells_the_modulus_of_the_cell) {
   for (const double E_kPa : {17.9, 42.2}) {
     ASSERT_EQ(punctum({"run", "icsi", "--clock", "virtual", "--no-figure", "--no-frames", "--set",

@@ -14,6 +14,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -63,6 +64,19 @@ cv::Mat with_bright_speck(const cv::Mat& picture, const Point& at) {
       out.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(out.at<std::uint8_t>(y, x) + more);
     }
   }
+  return out;
+}
+
+constexpr int kSlipped = 15;  // frames out of focus, while the needle waits in the membrane
+cv::Mat out_of_focus(const cv::Mat& picture, double noise, unsigned seed) {
+  constexpr double kBlur_px = 3;
+  cv::Mat out, grain(picture.size(), CV_32F);
+  cv::GaussianBlur(picture, out, {}, kBlur_px);
+  cv::RNG random(seed);
+  random.fill(grain, cv::RNG::NORMAL, 0, noise);
+  out.convertTo(out, CV_32F);
+  out += grain;
+  out.convertTo(out, CV_8U);
   return out;
 }
 
@@ -296,6 +310,18 @@ TEST_P(ForeignFrames, show_both_membranes_where_they_are) {
     expect_near_truth("depth of the dimple with the pose", told_depth_px, 0.26);
     expect_near_truth("depth of the dimple beside a speck, with the pose", speck_depth_px,
                       GetParam().halo > 0 ? 1.6 : 0.9);
+  }
+  if (sharp) {
+    ASSERT_TRUE(begun["puncture"]);
+    const int deepest = *begun["puncture"] - 1;
+    Tracker refocused(config, drawn(folder, 0).cols, drawn(folder, 0).rows);
+    for (int k = 0; k < deepest + kSlipped; ++k) {
+      cv::Mat picture = drawn(folder, std::min(k, deepest));
+      if (k > deepest) {
+        picture = out_of_focus(picture, GetParam().noise, static_cast<unsigned>(k));
+      }
+      EXPECT_FALSE(refocused.process(frame_of(picture, static_cast<std::uint64_t>(k))).punctured) << k;
+    }
   }
 }
 

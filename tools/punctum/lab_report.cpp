@@ -61,7 +61,7 @@ fs::path no_file_in(const fs::path& folder) {
                            "events.csv", "obs.csv"}) {
     std::error_code ec;
     const fs::file_status there = fs::status(folder / name, ec);
-    if (fs::exists(there) && !fs::is_regular_file(there)) {
+    if (fs::exists(there) && !fs::is_regular_file(there) && !fs::is_directory(there)) {
       return folder / name;
     }
   }

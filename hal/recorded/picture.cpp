@@ -55,7 +55,7 @@ class LibraryWarnings {
   LibraryWarnings() : alone_(mutex()), before_(stderr) {
     static std::FILE* const stream = ::fmemopen(text().data(), text().size(), "w");
     if (stream != nullptr) {
-      std::rewind(stream);
+      (void)std::fseek(stream, 0, SEEK_SET);
       text().fill('\0');
       stderr = stream;
     }

@@ -54,9 +54,8 @@ void tell_in_fine_pixels(Result& r, const Binning& binning) {
     if (*net) {
       Section origin = Section::Zero();
       origin.head<2>().setConstant(0.5 * (k - 1));
-      for (Section& section : (*net)->control) {
-        section = k * section + origin;
-      }
+      std::for_each_n((*net)->control.begin(), (*net)->size,
+                      [&](Section& section) { section = k * section + origin; });
     }
   }
 }

@@ -81,7 +81,7 @@ class Outbox {
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
 
  private:
-  void erase(std::deque<Outgoing>::iterator one) {
+  void erase(const std::deque<Outgoing>::const_iterator& one) {
     bytes_ -= one->size();
     waiting_.erase(one);
   }

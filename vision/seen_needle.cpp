@@ -226,6 +226,7 @@ void SeenNeedle::learn(const ClearedPicture& picture, const NeedlePose& now,
   if (!seen_.ok) {
     return;
   }
+  specks_.learn(picture.field, picture.noise, now, gap_px.value_or(std::numeric_limits<double>::infinity()));
   if (!gap_px || *gap_px > kEndShows_px) {
     pipette_.learn(picture.field, seen_, picture.noise,
                    gap_px.value_or(std::numeric_limits<double>::infinity()));

@@ -11,6 +11,7 @@
 #include "vision/membrane/membrane_on_needle.hpp"
 #include "vision/pipettes/gathered_frames.hpp"
 #include "vision/pipettes/injection_pipette.hpp"
+#include "vision/pipettes/still_specks.hpp"
 #include "vision/pipettes/tip_by_stage.hpp"
 
 namespace punctum::vision {
@@ -35,6 +36,8 @@ class SeenNeedle {
   // forgotten.
   [[nodiscard]] bool recognised(const ClearedPicture& picture);
 
+  // Takes specks off the picture that lie still on its way.
+  void clear_way(ClearedPicture& picture) { picture.grey = specks_.without(picture.grey); }
   // Once per frame, before anything else. stage: as in Tracker::process.
   void begin(const std::optional<Point>& stage);
   // at_once: where it is missing, all of its search is done in this frame.
@@ -91,6 +94,7 @@ class SeenNeedle {
   double wall_px_ = 0, gone_odds_ = 0;
   std::optional<Point> last_on_membrane_;
   TipOnMembrane tip_on_membrane_;
+  StillSpecks specks_;
   TipMotion motion_;
 };
 

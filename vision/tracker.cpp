@@ -154,6 +154,7 @@ const Result& Tracker::Impl::process(const hal::Frame& frame, const std::optiona
     return result;
   }
   const bool starting = cell.must_start();
+  needle.clear_way(picture);
   needle.begin(stage);
   holder.begin();
   picture.compute_gradient(area_to_search(starting));

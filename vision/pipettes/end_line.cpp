@@ -22,11 +22,15 @@ constexpr double kOfWalls = 2, kOfWallsInRelief = 1, kOfUnlike = 0.2, kNoises = 
 constexpr double kLeft = 0.2,
                  kEven = 0.35;       // of the line: what is left beside it, and how unlike its halves are
 constexpr double kNoisesLeft = 3.5;  // of a row, that either may be more
-constexpr double kSteepest = 0.2;    // px along per px of the half-width: of a blunt end
+// A line goes on to the outside of the needle, and is thin: a speck is round.
+constexpr double kAcross = 0.5, kLeftOfThick = 0.5;
+constexpr int kThick_px = 5;
+constexpr double kSteepest = 0.2;  // px along per px of the half-width: of a blunt end
 
 // Across the needle, grey levels.
 struct Row {
   double low, high;  // both halves of the needle, over what lies beside it
+  double rim;        // both, near its outside
   double walls;      // over what lies beside them and between them
   double unlike;     // half of what one wall has over the other
   double apart;      // by which one side of the needle differs from the other
@@ -42,7 +46,7 @@ double half_width_at(const NeedlePose& needle, double s) {
 
 // `s` px behind the tip. Empty beside the picture.
 std::optional<Row> row_at(const GradientField& field, const NeedlePose& needle, double s) {
-  constexpr double kBeside_px = 3, kBesideTo_px = 6, kCore = 0.7, kLumen = 0.4;
+  constexpr double kBeside_px = 3, kBesideTo_px = 6, kCore = 0.7, kLumen = 0.4, kRim = 0.85, kRimTo = 0.6;
   constexpr double kWallTo_px = 1, kWallFrom_px = 3;  // inside of the outer flank
   const double w = half_width_at(needle, s), far = w + kBesideTo_px;
   if (!field.area.contains(needle.at(s, far)) || !field.area.contains(needle.at(s, -far))) {
@@ -59,8 +63,11 @@ std::optional<Row> row_at(const GradientField& field, const NeedlePose& needle, 
                medium = 0.5 * (left + right), lumen = mean(-kLumen * w, kLumen * w),
                low_wall = mean(-w + kWallTo_px, -w + kWallFrom_px),
                high_wall = mean(w - kWallFrom_px, w - kWallTo_px);
-  return Row{mean(-kCore * w, 0) - medium, mean(0, kCore * w) - medium,
-             0.5 * (low_wall + high_wall - medium - lumen), 0.5 * (low_wall - high_wall),
+  return Row{mean(-kCore * w, 0) - medium,
+             mean(0, kCore * w) - medium,
+             0.5 * (mean(-kRim * w, -kRimTo * w) + mean(kRimTo * w, kRim * w)) - medium,
+             0.5 * (low_wall + high_wall - medium - lumen),
+             0.5 * (low_wall - high_wall),
              std::abs(left - right)};
 }
 
@@ -142,6 +149,12 @@ bool is_alone(const Vector<Row>& rows, std::size_t i, double row_noise) {
                most = kLeft * std::abs(line) + kNoisesLeft * row_noise;
   const double uneven = rows[i].low - rows[i].high - 0.5 * (shaft.low - shaft.high);
   if (line * rows[i].core() < 0 || std::abs(uneven) > kEven * std::abs(line) + kNoisesLeft * row_noise) {
+    return false;
+  }
+  if (std::copysign(1.0, line) * (rows[i].rim - 0.5 * shaft.rim) <
+          kAcross * std::abs(line) - kNoisesLeft * row_noise ||
+      std::min(std::abs(rows[i - kThick_px].core() - shaft.core()), std::abs(rows[i + kThick_px].core())) >
+          kLeftOfThick * std::abs(line)) {
     return false;
   }
   const double walls_left = kWallsLeft * std::abs(shaft.unlike) + kNoisesLeft * row_noise;

@@ -21,10 +21,11 @@ namespace {
 
 constexpr double kLeastScore = 0.3;                  // of the centred correlation
 constexpr int kNearAlong_px = 4, kNearAside_px = 2;  // from where it is expected
-constexpr double kJump_px = 4;        // along the axis, from what motion and correlation predict
-constexpr int kJumpsMax = 3;          // frames in a row; then it is where it is seen
-constexpr double kAside_px = 2;       // across the axis; further aside the shaft must lie there, too
-constexpr double kShortest_px = 4;    // of a wall that an edge is averaged over
+constexpr double kJump_px = 4;      // along the axis, from what motion and correlation predict
+constexpr int kGoesOnMax = 2;       // frames in a row in which its walls go on beyond what is seen as its end
+constexpr int kJumpsMax = 3;        // frames in a row; then it is where it is seen
+constexpr double kAside_px = 2;     // across the axis; further aside the shaft must lie there, too
+constexpr double kShortest_px = 4;  // of a wall that an edge is averaged over
 constexpr double kElsewhere_px = 8;   // along the axis: what is seen as its end is something else
 constexpr double kFollowed_px = 24;   // of a faint one while it is followed: it may bend
 constexpr std::size_t kGathered = 4;  // frames that tell an end which one of them does not
@@ -34,6 +35,7 @@ constexpr int kLooksFar = 3;          // frames
 // Frames in a row; then it is looked for from the border, too, in every other frame.
 constexpr int kLostMax = 3;
 constexpr const char* kEndNotClear = "the end of the needle is not clear";
+constexpr const char* kEndNotSeen = "end of the needle not seen";
 constexpr const char* kNotRecognised = "tip not recognised";
 constexpr int kWiderMost = 6;  // frames in a row; then the window for its tip grows no more
 
@@ -197,7 +199,7 @@ void InjectionPipette::begin() {
   last_.ok = true;
   last_.score = 1;
   velocity_ = {};
-  lost_ = 0;
+  lost_ = goes_on_ = 0;
   looks_far_ = kLooksFar;
   started_ = true;
   reason_.clear();
@@ -335,11 +337,14 @@ NeedlePose InjectionPipette::follow(const GradientField& field, double noise) {
     p = search(wide_x, wide_y);
   }
   needle.score = p ? p->score : 0;
-  if (!p || p->score < kLeastScore) {
-    needle.reason = kNotRecognised;
+  const auto not_seen = [&](const char* reason) {
+    needle.reason = reason;
     velocity_ = {};
     search_next_ = ++lost_ > kLostMax;
     return needle;
+  };
+  if (!p || p->score < kLeastScore) {
+    return not_seen(kNotRecognised);
   }
   // Across the needle the correlation tells its place.
   Point correlated = p->at + Point(window.x, window.y) + tip_in_template_;
@@ -354,11 +359,13 @@ NeedlePose InjectionPipette::follow(const GradientField& field, double noise) {
     needle.taper = last_.taper;
     end = end_.find(field, noise, longest_, needle);
   }
-  if (end == LearntEnd::Seen::no) {
-    needle.reason = "end of the needle not seen";
-    velocity_ = {};
-    search_next_ = ++lost_ > kLostMax;
-    return needle;
+  const bool further = end != LearntEnd::Seen::no && go_beyond_speck(field, noise, needle);
+  if (end == LearntEnd::Seen::no || goes_on_ > kGoesOnMax) {
+    return not_seen(kEndNotSeen);
+  }
+  lost_ += further ? 1 : 0;
+  if (lost_ <= kLostMax && ends_before(field, noise, needle, last_.tip + velocity_)) {
+    return not_seen("something ahead of it looks like its end");
   }
   const bool near = end == LearntEnd::Seen::near;
   if (!near && narrow) {
@@ -380,6 +387,27 @@ NeedlePose InjectionPipette::follow(const GradientField& field, double noise) {
   last_ = needle;
   end_.was_seen(field, needle);
   return needle;
+}
+
+// Where its walls go on, a speck was taken for its end. Granules may look like walls in single frames, with
+// no end to them.
+bool InjectionPipette::go_beyond_speck(const GradientField& field, double noise, NeedlePose& needle) {
+  constexpr double kSpeck_px = 6, kBeyond_px = 16;
+  constexpr int kSpecks = 2;
+  NeedlePose there = needle;
+  int specks = 0;
+  while (walls_go_on(field, noise, there, kSpeck_px, kBeyond_px, kShortest_px)) {
+    there.tip = there.at(-kBeyond_px, 0);
+    LearntEnd end = end_;
+    if (specks++ == kSpecks || end.find(field, noise, longest_, there) == LearntEnd::Seen::no) {
+      ++goes_on_;
+      return false;
+    }
+    end_ = std::move(end);
+  }
+  goes_on_ = 0;
+  needle = there;
+  return specks > 0;
 }
 
 // How far across the predicted needle it is, px, when its tip is recognised `correlated` px across. Granules

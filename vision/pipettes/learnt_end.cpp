@@ -182,6 +182,7 @@ bool LearntEnd::learn_by_glass(const GradientField& field, double noise, NeedleP
 // How the needle is cut, and how far ahead the glass ends. It is put where they are when that is far from the
 // end of the walls.
 std::optional<CutGlass> LearntEnd::go_to_cut(const GradientField& field, double noise, NeedlePose& last) {
+  constexpr double kShortest_px = 4;
   NeedlePose needle = last;
   auto cut = cut_seen(field, noise, needle);
   const auto middle_ahead = [&] {
@@ -191,7 +192,12 @@ std::optional<CutGlass> LearntEnd::go_to_cut(const GradientField& field, double 
   for (int round = 0; round < kFurther && cut &&
                       std::abs(middle_ahead()) > (cut->end.sd > kEndKnown_px ? kNear_px : kFar_px);
        ++round) {
-    needle.tip += middle_ahead() * needle.axis;
+    const double ahead = middle_ahead();
+    if (ahead > kFar_px && !in_relief_ && !lit_from_aside(field, needle) &&
+        !walls_go_on(field, noise, needle, kNear_px, ahead - kNear_px, kShortest_px)) {
+      return std::nullopt;  // a speck ahead of it
+    }
+    needle.tip += ahead * needle.axis;
     cut = cut_seen(field, noise, needle);
     further = true;
   }

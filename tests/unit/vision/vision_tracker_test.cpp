@@ -17,6 +17,7 @@
 #include "tests/support/pictures.hpp"
 #include "tools/vision/live_tracker.hpp"
 #include "vision/overlay.hpp"
+#include "vision/pipettes/still_specks.hpp"
 #include "vision/tracker.hpp"
 
 namespace {
@@ -631,6 +632,145 @@ TEST(Tracker, finds_a_needle_on_and_beside_which_specks_lie) {
     }
   }
   EXPECT_GE(found, looked - 1);
+}
+
+// On the sensor or in the dish, wider than the needle and narrower, on its axis and beside it.
+TEST(Tracker, sees_a_tip_pass_a_speck_that_lies_still_on_its_way) {
+  const double surface = kCentre.x + kR, at = surface + 20;
+  for (const Speck& speck : {Speck{{at, kCentre.y}, 3, -60},
+                             {{at, kCentre.y}, 3, 50},
+                             {{at, kCentre.y - 4}, 4, -40},
+                             {{at, kCentre.y}, 6, -60}}) {
+    Tracker tracker({}, kW, kH);
+    std::uint64_t n = 0;
+    int first_contact = 100;
+    for (int depth = -44; depth <= 6; ++depth) {
+      const Drawing drawn{.tip = surface - depth,
+                          .dent = std::max(depth, 0) * 1.0,
+                          .noise = 4,
+                          .seed = static_cast<unsigned>(n) + 1,
+                          .specks = {speck}};
+      const Result& r = tracker.process(frame_of(draw(drawn), n++));
+      ASSERT_TRUE(r.needle.ok) << speck.grey << ' ' << speck.r << ' ' << depth << r.verdict;
+      EXPECT_NEAR(r.needle.tip.x, drawn.tip, 1.6) << speck.grey << ' ' << speck.r << ' ' << depth;
+      EXPECT_FALSE(r.punctured);
+      first_contact = r.contact ? std::min(first_contact, depth) : first_contact;
+    }
+    EXPECT_NEAR(first_contact, 0, 1) << speck.grey << ' ' << speck.r;
+  }
+}
+
+// So near that it cannot be told from the needle at first: its walls are soon seen to go on.
+TEST(Tracker, does_not_stay_at_a_speck_that_the_needle_has_passed) {
+  constexpr int kFrom = 430, kSpeck = 421, kPast_px = 36;
+  for (const Speck& speck : {Speck{{kSpeck, kCentre.y}, 3, -60}, {{kSpeck, kCentre.y}, 4, -40}}) {
+    Tracker tracker({}, kW, kH);
+    std::uint64_t n = 0;
+    for (int tip = kFrom; tip > kSpeck - kPast_px - 22; --tip) {
+      const Drawing drawn{.tip = static_cast<double>(tip),
+                          .noise = 4,
+                          .seed = static_cast<unsigned>(n) + 1,
+                          .specks = {speck}};
+      const NeedlePose& needle = tracker.process(frame_of(draw(drawn), n++)).needle;
+      if (needle.ok) {
+        EXPECT_NEAR(needle.tip.x, tip, tip < kSpeck - kPast_px ? 2 : kPast_px) << speck.grey << ' ' << tip;
+      } else {
+        EXPECT_GT(tip, kSpeck - kPast_px) << needle.reason;
+      }
+    }
+  }
+}
+
+// A picture drawn without the speck is what is left of one with it.
+class PictureWithoutSpecks : public testing::Test {
+ protected:
+  Drawing drawn_{.tip = 440, .noise = 3};
+  StillSpecks specks_;
+
+  // The next frame, another noise; the specks move on by that much.
+  cv::Mat next(double moved_px) {
+    for (Speck& s : drawn_.specks) {
+      s.at.y += moved_px;
+    }
+    ++drawn_.seed;
+    return draw(drawn_);
+  }
+  void look(const cv::Mat& picture) {
+    GradientField field;
+    field.compute(specks_.without(picture), {0, 0, kW, kH}, 1.2);
+    NeedlePose needle;
+    needle.ok = true;
+    needle.tip = Point(drawn_.tip, kCentre.y);
+    needle.half_width = kNeedle;
+    needle.taper = 0.03;
+    specks_.learn(field, drawn_.noise, needle, drawn_.tip - kCentre.x - kR);
+  }
+  // Of what is left in the picture, grey levels, over the speck and its blur.
+  double left(const cv::Mat& picture, const Point& at) {
+    Drawing bare = drawn_;
+    bare.specks.clear();
+    bare.noise = 0;
+    cv::Mat off, square;
+    const cv::Rect round(static_cast<int>(at.x) - 6, static_cast<int>(at.y) - 6, 13, 13);
+    cv::subtract(specks_.without(picture)(round), draw(bare)(round), off, cv::noArray(), CV_32F);
+    cv::GaussianBlur(off, off, cv::Size(0, 0), 1);
+    cv::multiply(off, off, square);
+    return std::sqrt(cv::mean(square)[0]);
+  }
+};
+
+TEST_F(PictureWithoutSpecks, is_the_same_picture_where_there_are_none) {
+  for (int k = 0; k < 9; ++k) {
+    const cv::Mat m = next(0);
+    look(m);
+    EXPECT_EQ(specks_.without(m).data, m.data);
+  }
+}
+
+TEST_F(PictureWithoutSpecks, shows_medium_and_glass_where_one_lies) {
+  const Point at(400, kCentre.y);
+  for (const double grey : {-60.0, -30.0, 50.0}) {
+    specks_ = {};
+    drawn_.tip = 440;
+    drawn_.specks = {{at, 3, grey}};
+    for (int k = 0; k < 12; ++k) {
+      look(next(0));
+    }
+    const cv::Mat before = next(0);
+    StillSpecks none;
+    std::swap(none, specks_);
+    const double whole = left(before, at);
+    std::swap(none, specks_);
+    EXPECT_GT(whole, 0.2 * std::abs(grey));
+    EXPECT_LT(left(before, at), 0.1 * whole + 1) << grey;
+    drawn_.tip = 395;  // the glass lies over it
+    EXPECT_LT(left(next(0), at), 0.15 * whole + 1) << grey;
+  }
+}
+
+TEST_F(PictureWithoutSpecks, forgets_one_that_is_there_no_more) {
+  drawn_.specks = {{{400, kCentre.y}, 3, -60}};
+  for (int k = 0; k < 12; ++k) {
+    look(next(0));
+  }
+  drawn_.specks.clear();
+  drawn_.tip = 390;  // pushed away by the needle
+  for (int k = 0; k < 3; ++k) {
+    (void)specks_.without(next(0));
+  }
+  const cv::Mat m = next(0);
+  EXPECT_EQ(specks_.without(m).data, m.data);
+}
+
+TEST_F(PictureWithoutSpecks, shows_little_of_one_that_drifts) {
+  drawn_.specks = {{{400, kCentre.y - 4}, 3, -60}};
+  for (int k = 0; k < 16; ++k) {
+    const cv::Mat m = next(0.3);
+    if (k > 0) {
+      EXPECT_LT(left(m, drawn_.specks.front().at), 9) << k;  // 20 of it are seen
+    }
+    look(m);
+  }
 }
 
 // Not every frame shows the end of a faint needle well enough.

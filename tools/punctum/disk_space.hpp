@@ -21,6 +21,11 @@ struct ExpectedRecording {
 // Bytes that a run writes into its folder, at most or nearly so.
 [[nodiscard]] double bytes_written(const Scene& scene, const ExpectedRecording& recording);
 
+// Of them, what to hold for samples.csv from the start so that pictures and logs cannot fill its place: all that it
+// may need, or half of what is free. 0 where nobody knows.
+[[nodiscard]] std::int64_t room_for_samples(const std::string& folder, const Scene& scene,
+                                            const ExpectedRecording& recording);
+
 // The error, one line: not even the report itself finds room. The value, one line: what may not find room;
 // empty where everything does, or where nobody knows.
 [[nodiscard]] tl::expected<std::string, std::string> look_for_space(const std::string& folder,

@@ -65,6 +65,12 @@ Recorder::Recorder(RowFile file, const std::string& folder, const Scene& scene, 
   }
 }
 
+void Recorder::hold_room(std::int64_t for_samples) const {
+  constexpr std::int64_t kEvents_bytes = 64 * 1024;  // some thousand of them
+  samples_.file.hold_room(for_samples);
+  events_table_.file.hold_room(kEvents_bytes);
+}
+
 std::uint64_t Recorder::drain(std::uint64_t until) {
   std::uint64_t taken = 0;
   while (taken < kMostTicksPerRound && telemetry_.position() < until &&
@@ -219,6 +225,8 @@ void Recorder::finish() {
   flush(samples_, measures_.last_s);
   flush(fault_, measures_.last_s);
   flush(events_table_, measures_.last_s);
+  samples_.file.give_back_room();
+  events_table_.file.give_back_room();
 }
 
 }  // namespace punctum::tools

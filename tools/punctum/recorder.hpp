@@ -30,6 +30,9 @@ class Recorder {
                                                     const rt::CoreSegment& core, sim::Bench* bench,
                                                     std::uint64_t every);
 
+  // Room on the disk for the tables, until finish(): so many bytes for samples.csv.
+  void hold_room(std::int64_t for_samples) const;
+
   // Takes what is there of the first `until` ticks; returns the number of ticks taken.
   std::uint64_t drain(std::uint64_t until = UINT64_MAX);
   [[nodiscard]] std::uint64_t position() const noexcept { return telemetry_.position(); }

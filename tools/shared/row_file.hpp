@@ -28,6 +28,12 @@ class RowFile {
   }
   ~RowFile();
 
+  // Room on the disk for a table of so many bytes, which nobody else can fill; the file is no longer for it. Where
+  // the file system cannot do so, there is none.
+  void hold_room(std::int64_t bytes) const noexcept;
+  // What of it no row has taken. Closing the file does it, too.
+  void give_back_room() const noexcept;
+
   // One row or several, each with its line end. They are in the file after flush(), or when enough have come.
   void append(std::string_view rows);
   void flush();

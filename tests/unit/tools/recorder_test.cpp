@@ -280,6 +280,39 @@ TEST_F(RecorderTest, samples_that_cannot_be_written_are_noticed_while_the_run_go
   EXPECT_LE(lines("samples.csv"), r.rows() + 1);
 }
 
+// As the kernel counts the blocks of a file.
+TEST_F(RecorderTest, tables_own_the_room_for_their_rows_from_the_start_and_give_back_what_is_left) {
+  const auto taken = [this](const char* file) {
+    struct stat is{};
+    EXPECT_EQ(::stat((folder_ / file).c_str(), &is), 0);
+    return static_cast<std::int64_t>(is.st_blocks) * 512;
+  };
+  constexpr std::int64_t kRoom = 8 << 20;
+  Recorder r = recorder();
+  r.hold_room(kRoom);
+  EXPECT_GE(taken("samples.csv"), kRoom);
+  EXPECT_GE(taken("events.csv"), 1000);
+  EXPECT_EQ(lines("samples.csv"), 0U) << "a reader sees rows alone";
+  tick(3000);
+  r.drain();
+  EXPECT_LE(taken("samples.csv"), kRoom + 64 * 1024) << "rows take the room that is theirs";
+  r.finish();
+  EXPECT_EQ(lines("samples.csv"), 3001U);
+  EXPECT_LT(taken("samples.csv"), kRoom / 2);
+  EXPECT_TRUE(r.not_kept().empty());
+}
+
+TEST_F(RecorderTest, samples_ask_for_the_room_of_a_whole_run_but_leave_half_of_what_is_free) {
+  const Scene scene = *load_scene("icsi");
+  EXPECT_EQ(room_for_samples(folder_.string(), scene, {.seconds = 2}),
+            room_for_samples(folder_.string(), scene, {.seconds = 2, .frames = true}));
+  EXPECT_GT(room_for_samples(folder_.string(), scene, {.seconds = 2}), 2000 * 300);
+  const auto half = static_cast<double>(fs::space(folder_).available) / 2;
+  const auto asked = static_cast<double>(room_for_samples(folder_.string(), scene, {.seconds = 1e12}));
+  EXPECT_NEAR(asked, half, 0.1 * half) << "others write on that disk, too";
+  EXPECT_EQ(room_for_samples("/nowhere", scene, {.seconds = 2}), 0);
+}
+
 TEST_F(RecorderTest, what_is_left_in_the_buffer_at_the_end_is_noticed_too) {
   Recorder r = recorder();
   full_beyond(1000);

@@ -214,6 +214,8 @@ class Holes {
   Hole longest_;
 };
 
+std::string so_many_rows(std::uint64_t n) { return n == 1 ? "1 row" : fmt::format("{} rows", n); }
+
 // Rows of a table that has been damaged: what they told is missing, however short the time.
 struct Damage {
   std::uint64_t unreadable = 0, not_rising = 0;
@@ -222,15 +224,12 @@ struct Damage {
 
   [[nodiscard]] bool any() const { return unreadable + not_rising > 0; }
   void tell(std::vector<NotKept>& not_kept) const {
-    const auto rows = [](std::uint64_t n) {
-      return n == 1 ? std::string("1 row") : fmt::format("{} rows", n);
-    };
     if (unreadable > 0) {
-      not_kept.push_back({"samples.csv", unreadable_s, rows(unreadable) + " cannot be read"});
+      not_kept.push_back({"samples.csv", unreadable_s, so_many_rows(unreadable) + " cannot be read"});
     }
     if (not_rising > 0) {
       not_kept.push_back(
-          {"samples.csv", not_rising_s, rows(not_rising) + " left out: their times do not rise"});
+          {"samples.csv", not_rising_s, so_many_rows(not_rising) + " left out: their times do not rise"});
     }
   }
 };
@@ -347,7 +346,8 @@ Json rebuilt_facts(const std::string& folder) {
     ++rows;
   }
   measures.finish();
-  const auto events = read_events(folder + "/events.csv");
+  const EventTable event_table = read_events(folder + "/events.csv");
+  const Json events = event_table.list;
   const double told_s = last_time(events);
   const bool cut = told_s > measures.last_s + kApart_s;
   const bool inner = scene.sim && scene.sim->cell && scene.sim->cell->inner;
@@ -366,6 +366,10 @@ Json rebuilt_facts(const std::string& folder) {
          fmt::format("its rows go on at {:.3f} s: the longest of its holes", hole->to_s)});
   }
   damage.tell(result.not_kept);
+  if (event_table.unreadable > 0) {
+    result.not_kept.push_back({"events.csv", event_table.unreadable_s,
+                               so_many_rows(event_table.unreadable) + " cannot be read"});
+  }
   const bool all_rows = !cut && !hole && !damage.any();
   const auto no_core = std::make_unique<rt::CoreStatus>();
   Json j = report_facts(scene, result, measures, EventList{}, *no_core, read_pictures(folder + "/obs.csv"));
@@ -427,6 +431,9 @@ Json rebuilt_facts(const std::string& folder) {
                   {"every", nullptr},
                   {"lost", nullptr},
                   {"gaps", nullptr}};
+  j["event_rows"] = {{"rows", events.size()},
+                     {"cut_off", event_table.cut_off},
+                     {"unreadable", event_table.unreadable}};
   if (truth.any) {
     j["peak_force_N"] = truth.peak_force_N;
     j["max_depth_um"] = truth.max_depth_m * 1e6;

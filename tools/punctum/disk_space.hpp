@@ -21,8 +21,8 @@ struct ExpectedRecording {
 // Bytes that a run writes into its folder, at most or nearly so.
 [[nodiscard]] double bytes_written(const Scene& scene, const ExpectedRecording& recording);
 
-// Of them, what to hold for samples.csv from the start so that pictures and logs cannot fill its place: all that it
-// may need, or half of what is free. 0 where nobody knows.
+// Of them, what to hold for samples.csv from the start so that pictures and logs cannot fill its place: all
+// that it may need, or half of what is free. 0 where nobody knows.
 [[nodiscard]] std::int64_t room_for_samples(const std::string& folder, const Scene& scene,
                                             const ExpectedRecording& recording);
 

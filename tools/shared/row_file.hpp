@@ -28,8 +28,8 @@ class RowFile {
   }
   ~RowFile();
 
-  // Room on the disk for a table of so many bytes, which nobody else can fill; the file is no longer for it. Where
-  // the file system cannot do so, there is none.
+  // Room on the disk for a table of so many bytes, which nobody else can fill; the file is no longer for it.
+  // Where the file system cannot do so, there is none.
   void hold_room(std::int64_t bytes) const noexcept;
   // What of it no row has taken. Closing the file does it, too.
   void give_back_room() const noexcept;

@@ -426,9 +426,16 @@ TEST(Rebuilt, rows_that_are_missing_between_others_are_told) {
   const Json facts = rebuilt_facts(folder.path());
   ASSERT_EQ(facts["not_kept"].size(), 1U);
   EXPECT_NEAR(facts["not_kept"][0]["t_s"].get<double>(), 0.299, 1e-9);
-  EXPECT_TRUE(contains(facts["not_kept"][0]["why"].get<std::string>(), "0.900 s"));
+  EXPECT_EQ(facts["not_kept"][0]["why"], "its rows go on at 0.900 s: its only hole");
   EXPECT_TRUE(facts["alarms_s"].is_null() && facts["dose"]["asked_s"].is_null() && facts["phases"].empty());
   EXPECT_EQ(facts["outcome"], "done") << "what the cell got is not known";
+  const std::size_t again = rows.find("\n1.000000,") + 1, end = rows.find("\n1.150000,") + 1;
+  folder.put("samples.csv", rows.substr(0, from) + rows.substr(to, again - to) + rows.substr(end));
+  const Json two = rebuilt_facts(folder.path());
+  ASSERT_EQ(two["not_kept"].size(), 1U);
+  EXPECT_EQ(
+      two["not_kept"][0]["why"],
+      "its rows go on at 0.900 s: the longest of its 2 holes, which are 0.752 s together");  // .601 + .151
   folder.put("samples.csv", RecordedInjection::rows(7));
   EXPECT_TRUE(rebuilt_facts(folder.path())["not_kept"].empty()) << "every seventh row, and changes of phase";
 }

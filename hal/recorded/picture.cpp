@@ -144,6 +144,7 @@ tl::expected<Picture, std::string> decode(Bytes file, int bits) {
     }
     return out;
   }
+  out.deep = true;
   out.bits = bits >= 8 && bits <= 16 ? bits : bits_of(picture);
   for (int y = 0; y < picture.rows; ++y) {
     const auto* const row = picture.ptr<std::uint16_t>(y);

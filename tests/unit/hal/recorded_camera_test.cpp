@@ -179,6 +179,26 @@ TEST_F(Recorded, later_pictures_are_scaled_in_the_same_way_as_the_first) {
   }
 }
 
+TEST_F(Recorded, a_first_picture_that_is_dark_does_not_scale_those_that_follow) {
+  const auto plain = [](int grey) { return encoded(cv::Mat(2, 2, CV_16UC1, cv::Scalar(grey)), ".png"); };
+  for (const int pictures : {3, 40}) {
+    for (int i = 0; i < pictures; ++i) {
+      write(std::to_string(i) + ".png", plain(i == 0 ? 0x00f0 : 0x0800));  // of a 12-bit camera
+    }
+    write("2.png", {});             // one that cannot be read tells nothing
+    write("3.png", plain(0xff00));  // a flash
+    auto camera = recorded::Camera::open(folder.string());
+    ASSERT_TRUE(camera) << camera.error();
+    hal::Frame frame;
+    for (int i = 0; i < pictures; ++i) {
+      ASSERT_EQ(camera->next(frame, 0), i == 2 ? hal::Status::fault : hal::Status::ok) << i;
+      if (i != 2) {
+        EXPECT_EQ(frame.pixels[0], i == 0 ? 0x0f : i == 3 ? 0xff : 0x80) << i;
+      }
+    }
+  }
+}
+
 TEST_F(Recorded, a_bad_picture_is_a_fault_and_the_next_one_follows) {
   write("1.png", encoded(disc(40, 30), ".png"));
   Bytes cut = encoded(disc(40, 30), ".png");

@@ -1,6 +1,7 @@
 // What the devices say, and how it is judged.
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cmath>
 #include <cstdint>
 
@@ -101,6 +102,28 @@ TEST(DeviceInputs, keeps_the_last_good_value_of_a_silent_device_until_its_time_i
   in.hand.status = Status::ok;
   EXPECT_EQ(in.read().device_faults.first, Fault::stage_lost);
   EXPECT_NEAR(in.read().between_hand_s, 1e-3, 1e-12);
+}
+
+TEST(DeviceInputs, tells_which_of_the_devices_gives_nothing) {
+  Inputs in;
+  in.settle();
+  EXPECT_EQ(in.inputs.readings().unusable, 0U);
+  const auto silent = [&in](Status& status, DeviceBit device) {
+    status = Status::no_data;
+    const Readings& r = in.read();
+    EXPECT_EQ(r.alarms, alarm_sensor) << kDeviceNames[std::countr_zero(unsigned{device})];
+    EXPECT_EQ(r.unusable, device);
+    status = Status::ok;
+    EXPECT_EQ(in.read().unusable, 0U);
+  };
+  silent(in.hand.status, device_haptic);
+  silent(in.stage.status, device_stage);
+  silent(in.estop.status, device_estop);
+  silent(in.vacuum.status, device_vacuum);
+  silent(in.injector.status, device_injector);
+  silent(in.sensor.status, device_force_sensor);
+  in.hand.status = in.sensor.status = Status::no_data;
+  EXPECT_EQ(in.read().unusable, device_haptic | device_force_sensor);
 }
 
 TEST(DeviceInputs, takes_each_sample_of_a_slow_hand_once_and_measures_time_by_the_samples) {
@@ -776,6 +799,7 @@ TEST(DeviceInputs, calls_a_switch_that_is_lost_or_silent_a_fault_and_takes_no_pr
     in.enabling.status = c.status;
     EXPECT_EQ(in.ticks_to(Fault::enabling_fault), c.within);
     EXPECT_NE(in.inputs.readings().alarms & alarm_sensor, 0U);
+    EXPECT_EQ(in.inputs.readings().unusable, device_enabling);
     EXPECT_FALSE(in.enabled());
     in.enabling.status = Status::ok;
     in.hold(true);

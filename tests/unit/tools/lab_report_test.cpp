@@ -723,6 +723,16 @@ TEST_F(LiveLine, says_phase_force_depth_vision_and_what_time_is_left) {
   EXPECT_FALSE(contains(s, "\033")) << s;
 }
 
+TEST_F(LiveLine, names_the_devices_that_give_nothing) {
+  EXPECT_FALSE(contains(line({}), "usable")) << line({});
+  sample.alarms = rt::alarm_sensor;
+  sample.unusable = rt::device_stage;
+  EXPECT_TRUE(contains(line({}), "  stage without usable data")) << line({});
+  EXPECT_TRUE(contains(line({.columns = 80}), "stage without usable data")) << line({.columns = 80});
+  sample.unusable = rt::device_stage | rt::device_force_sensor;
+  EXPECT_TRUE(contains(line({}), "  stage, force_sensor without usable data")) << line({});
+}
+
 TEST_F(LiveLine, tells_a_persons_own_hand_what_to_do_next) {
   EXPECT_FALSE(contains(line({}), ">")) << line({});
   scene = *load_scene("hands-on");

@@ -99,4 +99,37 @@ void SpaceReserve::give_back() noexcept {
   }
 }
 
+RoomForRows::RoomForRows(const std::string& folder, std::int64_t bytes) {
+  const std::string name = folder + "/room";
+  file_ = open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+  if (file_ < 0) {
+    return;
+  }
+  (void)unlink(name.c_str());
+  // Not posix_fallocate, which writes it all where the file system cannot.
+  if (fallocate(file_, 0, 0, bytes) == 0) {
+    bytes_ = bytes;
+  } else {
+    give_back();
+  }
+}
+
+bool RoomForRows::give() noexcept {
+  constexpr std::int64_t kStep = 256 * 1024;
+  const std::int64_t left = std::max<std::int64_t>(bytes_ - kStep, 0);
+  if (bytes_ == 0 || ftruncate(file_, left) != 0) {
+    return false;
+  }
+  bytes_ = left;
+  return true;
+}
+
+void RoomForRows::give_back() noexcept {
+  if (file_ >= 0) {
+    (void)close(file_);
+  }
+  file_ = -1;
+  bytes_ = 0;
+}
+
 }  // namespace punctum::tools

@@ -829,7 +829,7 @@ int run_scene(const Scene& scene, const RunSettings& settings) {
   if (!recorder) {
     return refuse_and_leave_nothing(recorder.error());
   }
-  recorder->hold_room(room_for_samples(folder, scene, expected));
+  recorder->keep_room(room_for_samples(folder, scene, expected));
   if (stop_signal::count() > 0) {
     terminal.complain("stopped before anything was started");
     reserve.give_back();

@@ -32,21 +32,7 @@ tl::expected<RowFile, std::string> RowFile::open(const std::string& path, Begin 
 RowFile::~RowFile() {
   if (file_ >= 0) {
     flush();
-    give_back_room();
     (void)::close(file_);
-  }
-}
-
-void RowFile::hold_room(std::int64_t bytes) const noexcept {
-  if (file_ >= 0 && bytes > 0) {
-    (void)::fallocate(file_, FALLOC_FL_KEEP_SIZE, 0, bytes);
-  }
-}
-
-// To the size that it has: blocks beyond it are free again.
-void RowFile::give_back_room() const noexcept {
-  if (struct stat now{}; file_ >= 0 && ::fstat(file_, &now) == 0 && S_ISREG(now.st_mode)) {
-    (void)!::ftruncate(file_, now.st_size);
   }
 }
 
@@ -66,8 +52,8 @@ void RowFile::flush() {
     const ssize_t n = ::write(file_, waiting_.data() + written, waiting_.size() - written);
     if (n >= 0) {
       written += static_cast<std::size_t>(n);
-    } else if (errno != EINTR) {
-      failure_ = std::strerror(errno);
+    } else if (const int why = errno; why != EINTR && !(why == ENOSPC && more_room_ && more_room_())) {
+      failure_ = std::strerror(why);
       cut_off_after(std::string_view(waiting_).substr(0, written));
     }
   }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <tl/expected.hpp>
@@ -28,11 +29,8 @@ class RowFile {
   }
   ~RowFile();
 
-  // Room on the disk for a table of so many bytes, which nobody else can fill; the file is no longer for it.
-  // Where the file system cannot do so, there is none.
-  void hold_room(std::int64_t bytes) const noexcept;
-  // What of it no row has taken. Closing the file does it, too.
-  void give_back_room() const noexcept;
+  // Asked while the disk is full: whether there is a little room now, so that it is worth another try.
+  void when_full(std::function<bool()> more_room) { more_room_ = std::move(more_room); }
 
   // One row or several, each with its line end. They are in the file after flush(), or when enough have come.
   void append(std::string_view rows);
@@ -44,12 +42,14 @@ class RowFile {
  private:
   void swap(RowFile& other) noexcept {
     std::swap(file_, other.file_);
+    std::swap(more_room_, other.more_room_);
     std::swap(waiting_, other.waiting_);
     std::swap(failure_, other.failure_);
   }
   void cut_off_after(std::string_view written);
 
   int file_ = -1;
+  std::function<bool()> more_room_;
   std::string waiting_;
   std::string failure_;
 };

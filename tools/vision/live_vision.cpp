@@ -356,6 +356,9 @@ ExitCode LiveVision::run() {
       }
       if (live_) {
         look_for_camera();
+        if (opens_still_) {
+          break;
+        }
         continue;
       }
       complain("the camera is gone");

@@ -54,7 +54,8 @@ struct VisionConfig {
   bool inner = true;                   // the inner membrane is followed too
   bool surface = false;                // the surfaces of the membranes are reconstructed
   SnakeParams snake;
-  int contour_points = 256;  // of a closed contour, at least 128
+  static constexpr int kLeastContourPoints = 128, kMostContourPoints = 1024;
+  int contour_points = 256;  // of a closed contour
   int dilation_px = 4;  // rows of the vertical element that dilates needle and cell before they are labelled;
                         // the tracker takes one more, so that the element has a middle
   double puncture_px = 1.5;  // least recoil of the contact points against the needle at a puncture
@@ -79,7 +80,8 @@ constexpr auto keys_of(const VisionConfig*) {
                    hal::flag("needle", &VisionConfig::needle),
                    hal::choice("needle_from", &VisionConfig::needle_from, "automatic", "left", "right"),
                    hal::flag("inner", &VisionConfig::inner), hal::flag("surface", &VisionConfig::surface),
-                   hal::whole("contour_points", &VisionConfig::contour_points, 128, 4096),
+                   hal::whole("contour_points", &VisionConfig::contour_points,
+                              VisionConfig::kLeastContourPoints, VisionConfig::kMostContourPoints),
                    hal::whole("dilation_px", &VisionConfig::dilation_px, 0, 40),
                    hal::real("puncture_px", &VisionConfig::puncture_px, 0.1, 50),
                    hal::micro("radius_min_um", &VisionConfig::R_min_m, 1, 5000),

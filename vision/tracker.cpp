@@ -29,7 +29,8 @@ Side opposite(Side side) { return side == Side::right ? Side::left : Side::right
 cv::Rect2d square_round(const Point& p, double half) { return {p.x - half, p.y - half, 2 * half, 2 * half}; }
 
 VisionConfig checked(VisionConfig config) {
-  config.contour_points = std::clamp(config.contour_points, 128, 1024);
+  config.contour_points =
+      std::clamp(config.contour_points, VisionConfig::kLeastContourPoints, VisionConfig::kMostContourPoints);
   return config;
 }
 

@@ -10,32 +10,50 @@ namespace punctum::aravis {
 
 // The camera's clock onto the station's. A frame arrives some time after its stamp: the least of these times
 // within the last ten seconds tells how far apart the clocks are; the rest is jitter. So a time is late by
-// the transfer of the fastest frame, and by less than 1 ms if the clocks drift by less than 100 ppm.
+// the transfer of the fastest frame, and by less than 1 ms if the clocks drift by less than 100 ppm. A least
+// time far below all others is of a stamp that jumped ahead, until a second frame says the same.
 class CameraClock {
  public:
   static constexpr std::int64_t kWindow_ns = 5'000'000'000;
   static constexpr std::int64_t kRestart_ns = 1'000'000'000;  // no frame takes as long: its clock was set
+  static constexpr std::int64_t kAlone_ns = 20'000'000;       // half a frame at 25 Hz
 
   [[nodiscard]] std::int64_t on_station_ns(std::int64_t stamp_ns, std::int64_t arrival_ns) {
     const std::int64_t apart_ns = arrival_ns - stamp_ns;
-    if (!begun_ || std::abs(apart_ns - least_ns_) > kRestart_ns) {
+    if (!begun_ || std::abs(apart_ns - between_ns_) > kRestart_ns) {
       begun_ = true;
-      least_ns_ = before_ns_ = apart_ns;
+      now_ = before_ = {};
       window_began_ns_ = arrival_ns;
     }
     if (arrival_ns - window_began_ns_ > kWindow_ns) {
-      before_ns_ = least_ns_;
-      least_ns_ = apart_ns;
+      before_ = now_;
+      now_ = {};
       window_began_ns_ = arrival_ns;
     }
-    least_ns_ = std::min(least_ns_, apart_ns);
-    return stamp_ns + std::min(least_ns_, before_ns_);
+    now_.take(apart_ns);
+    Least both = before_;
+    both.take(now_.first_ns);
+    both.take(now_.second_ns);
+    between_ns_ = both.believed_ns();
+    return stamp_ns + between_ns_;
   }
 
  private:
+  struct Least {  // and the one after it
+    static constexpr std::int64_t kNone_ns = std::numeric_limits<std::int64_t>::max();
+    std::int64_t first_ns = kNone_ns, second_ns = kNone_ns;
+
+    void take(std::int64_t apart_ns) {
+      second_ns = std::min(second_ns, std::max(first_ns, apart_ns));
+      first_ns = std::min(first_ns, apart_ns);
+    }
+    [[nodiscard]] std::int64_t believed_ns() const {
+      return second_ns != kNone_ns && second_ns - first_ns > kAlone_ns ? second_ns : first_ns;
+    }
+  };
   bool begun_ = false;
-  std::int64_t least_ns_ = 0, before_ns_ = 0;  // of this window, and of the one before
-  std::int64_t window_began_ns_ = 0;
+  Least now_, before_;  // of this window, and of the one before
+  std::int64_t between_ns_ = 0, window_began_ns_ = 0;
 };
 
 // How long ago something was that the library noted on the wall clock. For a while after the wall clock was

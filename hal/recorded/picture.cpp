@@ -3,7 +3,7 @@
 #include <sys/stat.h>
 
 #include <algorithm>
-#include <array>
+#include <atomic>
 #include <cstddef>
 #include <cstdio>
 #include <exception>
@@ -14,8 +14,8 @@
 #include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
 #include <optional>
+#include <streambuf>
 #include <string>
-#include <string_view>
 #include <utility>
 
 #include "hal/recorded/modules.hpp"
@@ -30,60 +30,102 @@ constexpr const char* kDamaged = "the picture's data are damaged or incomplete";
 
 tl::unexpected<std::string> wrong(std::string what) { return tl::unexpected<std::string>(std::move(what)); }
 
-// Silences the library, which writes its errors to the standard error stream; here an error is a value.
+// What OpenCV writes to std::cerr is not shown while one of these lives: here an error is a value. What other
+// threads write goes on.
 class NoErrorOutput {
  public:
-  NoErrorOutput() : before_(std::cerr.rdbuf(nullptr)) {
+  NoErrorOutput() {
+    [[maybe_unused]] static std::streambuf* const once =
+        std::cerr.rdbuf(new Others(std::cerr.rdbuf()));  // there as long as std::cerr
+    silent = true;
     cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   }
-  ~NoErrorOutput() {
-    std::cerr.rdbuf(before_);
-    std::cerr.clear();
-  }
+  ~NoErrorOutput() { silent = false; }
   NoErrorOutput(const NoErrorOutput&) = delete;
   NoErrorOutput& operator=(const NoErrorOutput&) = delete;
 
  private:
-  std::streambuf* before_;
+  class Others : public std::streambuf {
+   public:
+    explicit Others(std::streambuf* to) : to_(to) {}
+
+   protected:
+    int overflow(int c) override {
+      return silent || c == traits_type::eof() ? traits_type::not_eof(c)
+                                               : to_->sputc(traits_type::to_char_type(c));
+    }
+    std::streamsize xsputn(const char* text, std::streamsize n) override {
+      return silent ? n : to_->sputn(text, n);
+    }
+    int sync() override { return to_->pubsync(); }
+
+   private:
+    std::streambuf* to_;
+  };
+  static thread_local bool silent;
 };
+thread_local bool NoErrorOutput::silent = false;
 
 // Takes what the JPEG library writes to the standard error stream: it says there alone, and through nothing
-// that OpenCV lets through, that it has filled up what is missing. The stream that takes it is never closed,
-// since another thread may write to it.
+// that OpenCV lets through, that it has filled up what is missing. It writes in the thread that decodes; what
+// other threads write meanwhile goes on. The stream between is never closed, since one of them may still have
+// it.
 class LibraryWarnings {
  public:
-  LibraryWarnings() : alone_(mutex()), before_(stderr) {
-    static std::FILE* const stream = ::fmemopen(text().data(), text().size(), "w");
+  LibraryWarnings() : alone_(mutex()) {
+    static std::FILE* const stream = between();
+    before() = stderr;
     if (stream != nullptr) {
-      (void)std::fseek(stream, 0, SEEK_SET);
-      text().fill('\0');
       stderr = stream;
     }
+    text_.reserve(kEnough);  // nothing is thrown through the library
+    taken = &text_;
   }
-  ~LibraryWarnings() { stderr = before_; }
+  ~LibraryWarnings() {
+    taken = nullptr;
+    stderr = before();
+  }
   LibraryWarnings(const LibraryWarnings&) = delete;
   LibraryWarnings& operator=(const LibraryWarnings&) = delete;
 
   // Bytes that belong to nothing do no harm: some cameras fill up their files.
   [[nodiscard]] bool tell_of_damage() const {
-    (void)std::fflush(stderr);
-    const std::string_view all(text().data(), text().size());
-    return all.find("Corrupt JPEG data") != std::string_view::npos &&
-           all.find("extraneous bytes") == std::string_view::npos;
+    return text_.find("Corrupt JPEG data") != std::string::npos &&
+           text_.find("extraneous bytes") == std::string::npos;
   }
 
  private:
+  static constexpr std::size_t kEnough = 1024;
+
   static std::mutex& mutex() {
     static std::mutex one;
     return one;
   }
-  static std::array<char, 1024>& text() {
-    static std::array<char, 1024> bytes{};
-    return bytes;
+  static std::atomic<std::FILE*>& before() {
+    static std::atomic<std::FILE*> stream{stderr};
+    return stream;
   }
+  // Without a buffer: each line arrives in the thread that writes it.
+  static std::FILE* between() {
+    std::FILE* const stream = ::fopencookie(nullptr, "w", {nullptr, take, nullptr, nullptr});
+    if (stream != nullptr) {
+      (void)std::setvbuf(stream, nullptr, _IONBF, 0);
+    }
+    return stream;
+  }
+  static ssize_t take(void* /*cookie*/, const char* text, std::size_t n) {
+    if (taken == nullptr) {
+      return static_cast<ssize_t>(std::fwrite(text, 1, n, before()));
+    }
+    taken->append(text, std::min(n, kEnough - std::min(kEnough, taken->size())));
+    return static_cast<ssize_t>(n);
+  }
+
   std::lock_guard<std::mutex> alone_;
-  std::FILE* before_;
+  std::string text_;
+  static thread_local std::string* taken;  // null: this thread decodes nothing
 };
+thread_local std::string* LibraryWarnings::taken = nullptr;
 
 // Bits per sample that the brightest pixel needs: 8, 10 .. 16.
 int bits_of(const cv::Mat& picture) {
@@ -144,6 +186,7 @@ tl::expected<Picture, std::string> decode(Bytes file, int bits) {
     }
     return out;
   }
+  out.deep = true;
   out.bits = bits >= 8 && bits <= 16 ? bits : bits_of(picture);
   for (int y = 0; y < picture.rows; ++y) {
     const auto* const row = picture.ptr<std::uint16_t>(y);

@@ -20,7 +20,8 @@ struct Picture {
   std::vector<std::uint8_t> pixels;
   int width = 0;
   int height = 0;
-  int bits = 8;  // of the grey values that were scaled to 8: 8, 10, 12, 14 or 16
+  int bits = 8;       // of the grey values that were scaled to 8: 8, 10, 12, 14 or 16
+  bool deep = false;  // its samples had 16 bits
 };
 
 // PNG, JPEG, TIFF, BMP, PGM or PPM. Colour becomes grey; 16-bit samples are scaled from `bits`, or, when that

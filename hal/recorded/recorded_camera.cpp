@@ -10,6 +10,7 @@
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
+#include <functional>
 #include <opencv2/core.hpp>
 #include <opencv2/core/utils/logger.hpp>
 #include <system_error>
@@ -179,6 +180,25 @@ struct Camera::Impl {
     return accept(std::move(*one));
   }
 
+  // The first of 16-bit pictures may be dark. Some of the others are looked at, from the first to the last;
+  // what one alone needs may be a flash.
+  void scale_as_most_need() {
+    constexpr std::int64_t kLooks = 16;
+    std::vector<int> bits{picture.bits};
+    const std::int64_t looks = std::min(kLooks, count);
+    for (std::int64_t look = 1; look < looks; ++look) {
+      if (const auto one = read_picture(files[static_cast<std::size_t>(look * (count - 1) / (looks - 1))])) {
+        bits.push_back(one->bits);
+      }
+    }
+    std::sort(bits.begin(), bits.end(), std::greater());
+    if (bits.size() > 1 && bits[1] > picture.bits) {
+      if (auto first = read_picture(files[0], bits[1])) {
+        picture = std::move(*first);
+      }
+    }
+  }
+
   hal::Status read_video() {
     name = source + ":" + std::to_string(position);
     cv::Mat raw;
@@ -303,6 +323,9 @@ tl::expected<Camera, std::string> Camera::open(const std::string& source, double
   }
   if (impl->read() != hal::Status::ok) {
     return tl::unexpected(impl->error.empty() ? source + ": no picture in it" : impl->error);
+  }
+  if (impl->picture.deep) {
+    impl->scale_as_most_need();
   }
   impl->first_is_waiting = true;
   return Camera(std::move(impl));

@@ -72,6 +72,7 @@ DeviceInputs::DeviceInputs(const ServoConfig& config, const Devices& devices) NO
 const Readings& DeviceInputs::read(const TickTime& time, const LastOutput& last) NONBLOCKING {
   // Every device is read on every tick; the most urgent cause comes first.
   readings_.alarms = 0;
+  readings_.unusable = 0;
   readings_.estop_fault = read_estop(time);
   readings_.device_faults = read_hand(time, last);
   readings_.device_faults.add(judge_enabling(time, last));
@@ -105,7 +106,7 @@ Fault DeviceInputs::read_estop(const TickTime& time) NONBLOCKING {
     readings_.estop.contact_b_closed = readings_.estop.contact_b_closed && read.contact_b_closed;
   }
   if (!readings_.estop_readable) {
-    readings_.alarms |= alarm_sensor;
+    unusable(device_estop);
   }
   if ((!answered && status != hal::Status::no_data) || estop_clock_.timed_out()) {
     return Fault::estop_lost;
@@ -132,10 +133,10 @@ Fault DeviceInputs::read_hand(const TickTime& time, const LastOutput& last) NONB
   const SampleIs sample = answered ? hand_clock_.take(read.sample_ns, time.now_ns) : SampleIs::untimely;
   const bool contradicts = sample == SampleIs::repeated && read.position_m != newest_hand_m_;
   if (sample == SampleIs::untimely || contradicts) {
-    readings_.alarms |= alarm_sensor;
+    unusable(device_haptic);
   }
   if ((!answered && status != hal::Status::no_data) || hand_clock_.timed_out()) {
-    readings_.alarms |= alarm_sensor;
+    unusable(device_haptic);
     release_buttons();
     return Fault::hand_lost;
   }
@@ -148,19 +149,19 @@ Fault DeviceInputs::read_hand(const TickTime& time, const LastOutput& last) NONB
     }
   }
   if (hand_is_ == HandCheck::Is::ignored && readings_.hand_seen) {
-    readings_.alarms |= alarm_sensor;
+    unusable(device_haptic);
     if (readings_.hand_age_s > config_.hand_timeout_s + kRounding_s) {
       hand_check_.distrust();
       hand_is_ = HandCheck::Is::invalid;
     }
   }
   if (hand_is_ == HandCheck::Is::invalid) {
-    readings_.alarms |= alarm_sensor;
+    unusable(device_haptic);
     release_buttons();
     return Fault::hand_invalid;
   }
   if (readings_.hand_stuck) {
-    readings_.alarms |= alarm_sensor;
+    unusable(device_haptic);
   }
   return Fault::none;
 }
@@ -187,7 +188,7 @@ void DeviceInputs::take_hand(const hal::HandState& read, const LastOutput& last)
   hand_watch_.step(read.position_m, felt_N, readings_.between_hand_s);
   readings_.hand_stuck = hand_watch_.stuck();
   if (readings_.hand_stuck) {
-    readings_.alarms |= alarm_sensor;
+    unusable(device_haptic);
   }
 }
 
@@ -228,7 +229,7 @@ Fault DeviceInputs::read_enabling_switch(const TickTime& time) NONBLOCKING {
   const bool answered = status == hal::Status::ok;
   const SampleIs sample = answered ? enabling_clock_.take(read.sample_ns, time.now_ns) : SampleIs::untimely;
   if (sample == SampleIs::untimely) {
-    readings_.alarms |= alarm_sensor;
+    unusable(device_enabling);
   }
   if (answered) {
     const bool a = read.contact_a_closed, b = read.contact_b_closed;
@@ -246,7 +247,7 @@ Fault DeviceInputs::read_enabling_switch(const TickTime& time) NONBLOCKING {
   if (!lost && !enabling_contacts_.discrepancy()) {
     return Fault::none;
   }
-  readings_.alarms |= alarm_sensor;
+  unusable(device_enabling);
   enabling_->read(hal::kButtonPanic, 0);
   return Fault::enabling_fault;
 }
@@ -268,11 +269,11 @@ Fault DeviceInputs::read_stage(const TickTime& time, const LastOutput& last) NON
   readings_.stage_fresh = false;
   readings_.stage_age_s = stage_clock_.age_s();
   if (status == hal::Status::fault || status == hal::Status::disconnected) {
-    readings_.alarms |= alarm_sensor;
+    unusable(device_stage);
     return status == hal::Status::fault ? Fault::stage_fault : Fault::stage_lost;
   }
   if (status == hal::Status::ok && !can_be_true(read)) {
-    readings_.alarms |= alarm_sensor;
+    unusable(device_stage);
     return Fault::stage_fault;
   }
   const bool answered = status == hal::Status::ok;
@@ -280,7 +281,7 @@ Fault DeviceInputs::read_stage(const TickTime& time, const LastOutput& last) NON
   const bool believed = answered && axis_can_be_true(told_axis, last);
   const SampleIs sample = believed ? stage_clock_.take(read.sample_ns, time.now_ns) : SampleIs::untimely;
   if (sample == SampleIs::untimely || stage_clock_.timed_out()) {
-    readings_.alarms |= alarm_sensor;
+    unusable(device_stage);
   }
   if (sample != SampleIs::fresh) {
     Fault fault = stage_clock_.timed_out() ? Fault::stage_lost : Fault::none;
@@ -369,7 +370,7 @@ Fault DeviceInputs::read_vacuum(const TickTime& time, const LastOutput& last) NO
   const bool read = sample != SampleIs::untimely && !vacuum_clock_.timed_out();
   const double still_s = config_.vacuum->still_s;
   if (!read || (still_s > 0 && vacuum_same_s_ > still_s)) {
-    readings_.alarms |= alarm_sensor;
+    unusable(device_vacuum);
   }
   const bool holds = read && readings_.vacuum_Pa >= config_.vacuum->min_Pa;
   // Counted up and down, so that single good readings do not hide a loss.
@@ -395,7 +396,7 @@ Fault DeviceInputs::read_injector(const TickTime& time, const LastOutput& last) 
   opened_unseen_ = opened_unseen_ || last.gate_open;
   readings_.injector_known = !injector_clock_.timed_out();
   if (sample == SampleIs::untimely || !readings_.injector_known) {
-    readings_.alarms |= alarm_sensor;
+    unusable(device_injector);
   } else {
     readings_.injected = readings_.injector_open && last.gate_open;
   }
@@ -417,7 +418,7 @@ void DeviceInputs::read_force_sensor(const TickTime& time) NONBLOCKING {
                               ? sensor_clock_.take(force.sample_ns, time.now_ns)
                               : SampleIs::untimely;
   if (sample == SampleIs::untimely) {
-    readings_.alarms |= alarm_sensor;
+    unusable(device_force_sensor);
   }
   if (sample == SampleIs::fresh) {
     const double since_s = 1e-9 * static_cast<double>(force.sample_ns - sensor_ns_);

@@ -16,6 +16,8 @@
 #include "rt/control/lasting_button.hpp"
 #include "rt/control/sample_clock.hpp"
 #include "rt/control/tick_timing.hpp"
+#include "rt/station/alarm.hpp"
+#include "rt/station/device.hpp"
 #include "rt/station/fault.hpp"
 
 namespace punctum::rt {
@@ -58,6 +60,7 @@ struct Readings {
   Fault estop_fault = Fault::none;
   Causes device_faults;  // of the other devices
   std::uint32_t alarms = 0;
+  std::uint8_t unusable = 0;  // DeviceBits: whose data alarm_sensor is about
 
   [[nodiscard]] bool button(std::uint32_t b) const NONBLOCKING { return (hand.buttons & b) != 0; }
   // The needle's position is known, or there is no stage to know it from.
@@ -94,6 +97,10 @@ class DeviceInputs {
   [[nodiscard]] Fault judge_enabling(const TickTime& time, const LastOutput& last) NONBLOCKING;
   [[nodiscard]] Fault read_enabling_switch(const TickTime& time) NONBLOCKING;
   [[nodiscard]] Fault read_stage(const TickTime& time, const LastOutput& last) NONBLOCKING;
+  void unusable(DeviceBit device) NONBLOCKING {
+    readings_.alarms |= alarm_sensor;
+    readings_.unusable |= device;
+  }
   void take_hand(const hal::HandState& read, const LastOutput& last) NONBLOCKING;
   void release_buttons() NONBLOCKING;
   [[nodiscard]] bool axis_can_be_true(const hal::Vec3& axis, const LastOutput& last) NONBLOCKING;

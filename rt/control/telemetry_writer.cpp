@@ -49,6 +49,8 @@ void TelemetryWriter::publish(const TickRecord& tick) NONBLOCKING {
   s.E_fit_sd_Pa = tick.modulus.sd_Pa;
   s.vacuum_Pa = readings.vacuum_Pa;
   s.injector_open = readings.injector_open ? 1 : 0;
+  s.unusable = static_cast<std::uint8_t>(
+      readings.unusable | ((tick.cell.alarms & alarm_sensor) != 0 ? unsigned{device_vision} : 0U));
   tell_events(last, tick.requested);
   station_.core.telemetry.push(s);
 

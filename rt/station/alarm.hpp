@@ -15,7 +15,7 @@ enum Alarm : std::uint32_t {
   alarm_model_invalid = 1U << 5,        // the membrane law is outside its assumptions
   alarm_phase_timeout = 1U << 6,        // a phase takes longer than it should
   alarm_overrun = 1U << 7,              // too many missed ticks (simulated actuators)
-  alarm_sensor = 1U << 8,               // a device returned no or unusable data this tick
+  alarm_sensor = 1U << 8,               // a device returned no or unusable data this tick; which: device.hpp
   alarm_degraded = 1U << 9,             // running without real-time rights
   alarm_stiffness_reduced = 1U << 10,   // the passivity guard renders less than was asked for
   alarm_vision_implausible = 1U << 11,  // the newest observation claims what cannot be, and is not used

@@ -32,7 +32,7 @@ using CommandQueue = hal::CommandQueue<Command, 64>;
 struct CoreSegment {
   static constexpr bool kOneWriter = true;
   static constexpr std::uint64_t kMagic = 0x00000065726f6350ULL;  // "Pcore"
-  static constexpr std::uint64_t kVersion = 5;                    // raise when a meaning changes
+  static constexpr std::uint64_t kVersion = 6;                    // raise when a meaning changes
   static const std::uint64_t kLayout;                             // version, sizes and offsets
 
   hal::SegmentHeader header;

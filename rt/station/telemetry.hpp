@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "rt/station/alarm.hpp"
+#include "rt/station/device.hpp"
 #include "rt/station/fault.hpp"
 #include "rt/station/phase.hpp"
 
@@ -54,7 +55,8 @@ struct TelemetrySample {
   std::uint64_t observations = 0;
   std::uint64_t stale_ticks = 0;  // ticks on which the newest observation was too old
   std::uint8_t injector_open = 0;
-  std::uint8_t pad[7] = {};
+  std::uint8_t unusable = 0;  // with alarm_sensor: whose data, rt/station/device.hpp
+  std::uint8_t pad[6] = {};
 
   // Standard deviations and what only vision knows; 0 where it is not known.
   double wd_sd_m = 0;         // of wd_m

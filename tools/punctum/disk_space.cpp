@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <system_error>
 
@@ -24,6 +25,10 @@ double frame_rate(const Scene& scene) {
                                     : 0;
 }
 
+double sample_bytes(const Scene& scene, const ExpectedRecording& recording) {
+  return recording.seconds * scene.servo.rate_Hz / static_cast<double>(recording.rows_every) * kRow_bytes;
+}
+
 double picture_bytes(const Scene& scene) {
   constexpr double kUsual = 640 * 480;  // of recorded ones nobody has looked
   if (scene.camera) {
@@ -37,12 +42,20 @@ double picture_bytes(const Scene& scene) {
 }  // namespace
 
 double bytes_written(const Scene& scene, const ExpectedRecording& recording) {
-  const double rows = recording.seconds * scene.servo.rate_Hz / static_cast<double>(recording.rows_every);
   const double frames = scene.vision ? recording.seconds * frame_rate(scene) : 0;
-  return kRest_bytes + rows * kRow_bytes + frames * kObservation_bytes +
+  return kRest_bytes + sample_bytes(scene, recording) + frames * kObservation_bytes +
          (recording.every_tick ? recording.seconds * scene.servo.rate_Hz * kRecordedTick_bytes : 0) +
          (recording.pictures ? frames * picture_bytes(scene) : 0) +
          (recording.frames ? frames / kFramesPerAnnotated * kFrame_bytes : 0);
+}
+
+std::int64_t room_for_samples(const std::string& folder, const Scene& scene,
+                              const ExpectedRecording& recording) {
+  std::error_code ec;
+  const std::filesystem::space_info space = std::filesystem::space(folder, ec);
+  return ec ? 0
+            : static_cast<std::int64_t>(
+                  std::min(sample_bytes(scene, recording), static_cast<double>(space.available) / 2));
 }
 
 tl::expected<std::string, std::string> look_for_space(const std::string& folder, double bytes_wanted) {
@@ -84,6 +97,39 @@ void SpaceReserve::give_back() noexcept {
     (void)unlink(file_.c_str());
     file_.clear();
   }
+}
+
+RoomForRows::RoomForRows(const std::string& folder, std::int64_t bytes) {
+  const std::string name = folder + "/room";
+  file_ = open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+  if (file_ < 0) {
+    return;
+  }
+  (void)unlink(name.c_str());
+  // Not posix_fallocate, which writes it all where the file system cannot.
+  if (fallocate(file_, 0, 0, bytes) == 0) {
+    bytes_ = bytes;
+  } else {
+    give_back();
+  }
+}
+
+bool RoomForRows::give() noexcept {
+  constexpr std::int64_t kStep = 256 * 1024;
+  const std::int64_t left = std::max<std::int64_t>(bytes_ - kStep, 0);
+  if (bytes_ == 0 || ftruncate(file_, left) != 0) {
+    return false;
+  }
+  bytes_ = left;
+  return true;
+}
+
+void RoomForRows::give_back() noexcept {
+  if (file_ >= 0) {
+    (void)close(file_);
+  }
+  file_ = -1;
+  bytes_ = 0;
 }
 
 }  // namespace punctum::tools

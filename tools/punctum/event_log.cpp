@@ -1,6 +1,8 @@
 #include "tools/punctum/event_log.hpp"
 
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
 
 #include "tools/shared/csv.hpp"
 #include "tools/shared/event_words.hpp"
@@ -9,6 +11,31 @@ namespace punctum::tools {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+// Nothing if the row was cut off or is damaged.
+std::optional<Json> event_of(const CsvReader& line) {
+  const auto t_s = line.number("t_s"), tick = line.number("tick");
+  if (!line.is_whole() || !t_s || !tick || !(*tick >= 0 && *tick < 1e18)) {
+    return std::nullopt;
+  }
+  Json row = {{"t_s", *t_s},
+              {"tick", static_cast<std::uint64_t>(*tick)},
+              {"event", line.text("event")},
+              {"what", line.text("what")}};
+  for (const char* name : {"cell", "value"}) {
+    if (const auto v = line.number(name)) {
+      row[name] = *v;
+    } else if (!line.text(name).empty()) {
+      return std::nullopt;
+    }
+  }
+  for (const char* name : {"target", "writer"}) {
+    if (!line.text(name).empty()) {
+      row[name] = line.text(name);
+    }
+  }
+  return row;
+}
 
 }  // namespace
 
@@ -28,29 +55,19 @@ Json event_row(const rt::Event& e) {
   return row;
 }
 
-std::vector<Json> read_events(const std::string& path) {
-  std::vector<Json> events;
+EventTable read_events(const std::string& path) {
+  EventTable events;
+  double last_s = 0;
   CsvReader line(path);
   while (line.next()) {
-    const auto t_s = line.number("t_s"), tick = line.number("tick");
-    if (!t_s || !tick || !(*tick >= 0 && *tick < 1e18)) {
-      continue;
+    if (auto row = event_of(line)) {
+      last_s = row->at("t_s").get<double>();
+      events.list.push_back(std::move(*row));
+    } else if (line.is_cut_off()) {
+      ++events.cut_off;
+    } else {
+      events.unreadable_s = events.unreadable++ == 0 ? last_s : events.unreadable_s;
     }
-    Json row = {{"t_s", *t_s},
-                {"tick", static_cast<std::uint64_t>(*tick)},
-                {"event", line.text("event")},
-                {"what", line.text("what")}};
-    for (const char* name : {"cell", "value"}) {
-      if (const auto v = line.number(name)) {
-        row[name] = *v;
-      }
-    }
-    for (const char* name : {"target", "writer"}) {
-      if (!line.text(name).empty()) {
-        row[name] = line.text(name);
-      }
-    }
-    events.push_back(std::move(row));
   }
   return events;
 }

@@ -184,35 +184,63 @@ struct Hole {
   double from_s = 0, to_s = 0;
 };
 
-// The longest distance of two rows, where it is far more than the usual one.
+// Distances of two rows that are far more than the usual one.
 class Holes {
  public:
   void take(std::uint64_t tick, double t_s) {
+    constexpr double kLeast_s = 0.1;
     if (any_) {
       const std::uint64_t apart = tick - last_tick_;
       least_ = std::min(least_, apart);
-      if (apart > most_) {
-        most_ = apart;
-        longest_ = {last_s_, t_s};
+      if (t_s - last_s_ > kLeast_s) {
+        wide_.push_back({{last_s_, t_s}, apart});
       }
     }
     any_ = true;
     last_tick_ = tick;
     last_s_ = t_s;
   }
-  [[nodiscard]] std::optional<Hole> longest() const {
+  // In the order of time.
+  [[nodiscard]] std::vector<Hole> all() const {
     constexpr std::uint64_t kUsual = 20;
-    constexpr double kLeast_s = 0.1;
-    const bool is_one = most_ > kUsual * least_ && longest_.to_s - longest_.from_s > kLeast_s;
-    return is_one ? std::optional(longest_) : std::nullopt;
+    std::vector<Hole> holes;
+    for (const Wide& w : wide_) {
+      if (w.ticks > kUsual * least_) {
+        holes.push_back(w.hole);
+      }
+    }
+    return holes;
   }
 
  private:
+  struct Wide {
+    Hole hole;
+    std::uint64_t ticks = 0;
+  };
   bool any_ = false;
-  std::uint64_t last_tick_ = 0, least_ = UINT64_MAX / 100, most_ = 0;
+  std::uint64_t last_tick_ = 0, least_ = UINT64_MAX / 100;
   double last_s_ = 0;
-  Hole longest_;
+  std::vector<Wide> wide_;
 };
+
+NotKept told(const std::vector<Hole>& holes) {
+  const auto length_s = [](const Hole& h) { return h.to_s - h.from_s; };
+  const Hole& longest = *std::max_element(
+      holes.begin(), holes.end(), [&](const Hole& a, const Hole& b) { return length_s(a) < length_s(b); });
+  const std::string after = fmt::format("its rows go on at {:.3f} s: ", longest.to_s);
+  if (holes.size() == 1) {
+    return {"samples.csv", longest.from_s, after + "its only hole"};
+  }
+  double sum_s = 0;
+  for (const Hole& h : holes) {
+    sum_s += length_s(h);
+  }
+  return {
+      "samples.csv", longest.from_s,
+      after + fmt::format("the longest of its {} holes, which are {:.3f} s together", holes.size(), sum_s)};
+}
+
+std::string so_many_rows(std::uint64_t n) { return n == 1 ? "1 row" : fmt::format("{} rows", n); }
 
 // Rows of a table that has been damaged: what they told is missing, however short the time.
 struct Damage {
@@ -222,15 +250,12 @@ struct Damage {
 
   [[nodiscard]] bool any() const { return unreadable + not_rising > 0; }
   void tell(std::vector<NotKept>& not_kept) const {
-    const auto rows = [](std::uint64_t n) {
-      return n == 1 ? std::string("1 row") : fmt::format("{} rows", n);
-    };
     if (unreadable > 0) {
-      not_kept.push_back({"samples.csv", unreadable_s, rows(unreadable) + " cannot be read"});
+      not_kept.push_back({"samples.csv", unreadable_s, so_many_rows(unreadable) + " cannot be read"});
     }
     if (not_rising > 0) {
       not_kept.push_back(
-          {"samples.csv", not_rising_s, rows(not_rising) + " left out: their times do not rise"});
+          {"samples.csv", not_rising_s, so_many_rows(not_rising) + " left out: their times do not rise"});
     }
   }
 };
@@ -347,7 +372,8 @@ Json rebuilt_facts(const std::string& folder) {
     ++rows;
   }
   measures.finish();
-  const auto events = read_events(folder + "/events.csv");
+  const EventTable event_table = read_events(folder + "/events.csv");
+  const Json events = event_table.list;
   const double told_s = last_time(events);
   const bool cut = told_s > measures.last_s + kApart_s;
   const bool inner = scene.sim && scene.sim->cell && scene.sim->cell->inner;
@@ -359,14 +385,16 @@ Json rebuilt_facts(const std::string& folder) {
   } else if (!damage.at_end) {
     result.needle = truth.needle(measures.whereabouts(), inner);
   }
-  const auto hole = holes.longest();
-  if (hole) {
-    result.not_kept.push_back(
-        {"samples.csv", hole->from_s,
-         fmt::format("its rows go on at {:.3f} s: the longest of its holes", hole->to_s)});
+  const std::vector<Hole> missing = holes.all();
+  if (!missing.empty()) {
+    result.not_kept.push_back(told(missing));
   }
   damage.tell(result.not_kept);
-  const bool all_rows = !cut && !hole && !damage.any();
+  if (event_table.unreadable > 0) {
+    result.not_kept.push_back(
+        {"events.csv", event_table.unreadable_s, so_many_rows(event_table.unreadable) + " cannot be read"});
+  }
+  const bool all_rows = !cut && missing.empty() && !damage.any();
   const auto no_core = std::make_unique<rt::CoreStatus>();
   Json j = report_facts(scene, result, measures, EventList{}, *no_core, read_pictures(folder + "/obs.csv"));
   j["rebuilt"] = true;
@@ -427,6 +455,8 @@ Json rebuilt_facts(const std::string& folder) {
                   {"every", nullptr},
                   {"lost", nullptr},
                   {"gaps", nullptr}};
+  j["event_rows"] = {
+      {"rows", events.size()}, {"cut_off", event_table.cut_off}, {"unreadable", event_table.unreadable}};
   if (truth.any) {
     j["peak_force_N"] = truth.peak_force_N;
     j["max_depth_um"] = truth.max_depth_m * 1e6;

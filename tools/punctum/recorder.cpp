@@ -65,6 +65,13 @@ Recorder::Recorder(RowFile file, const std::string& folder, const Scene& scene, 
   }
 }
 
+void Recorder::keep_room(std::int64_t bytes) {
+  room_ = std::make_unique<RoomForRows>(folder_, bytes);
+  for (Table* table : {&samples_, &events_table_}) {
+    table->file.when_full([room = room_.get()] { return room->give(); });
+  }
+}
+
 std::uint64_t Recorder::drain(std::uint64_t until) {
   std::uint64_t taken = 0;
   while (taken < kMostTicksPerRound && telemetry_.position() < until &&
@@ -157,6 +164,9 @@ void Recorder::keep_last_seconds() {
   if (!fault_.file.is_open() && !fault_.failed) {
     if (auto opened = RowFile::open(folder_ + "/" + fault_.name, RowFile::Begin::empty)) {
       fault_.file = std::move(*opened);
+      if (room_) {
+        fault_.file.when_full([room = room_.get()] { return room->give(); });
+      }
       fault_.file.append(sample_columns());
     } else {
       note_failure(fault_, opened.error(), before_.t_s);
@@ -219,6 +229,9 @@ void Recorder::finish() {
   flush(samples_, measures_.last_s);
   flush(fault_, measures_.last_s);
   flush(events_table_, measures_.last_s);
+  if (room_) {
+    room_->give_back();
+  }
 }
 
 }  // namespace punctum::tools

@@ -15,6 +15,7 @@
 #include "hal/ipc/exchange.hpp"
 #include "hal/sim/bench.hpp"
 #include "rt/station/station.hpp"
+#include "tools/punctum/disk_space.hpp"
 #include "tools/punctum/event_list.hpp"
 #include "tools/punctum/measures.hpp"
 #include "tools/punctum/not_kept.hpp"
@@ -29,6 +30,9 @@ class Recorder {
   static tl::expected<Recorder, std::string> create(const std::string& folder, const Scene& scene,
                                                     const rt::CoreSegment& core, sim::Bench* bench,
                                                     std::uint64_t every);
+
+  // So many bytes of the disk are kept back until finish(), for the tables alone when all else is full.
+  void keep_room(std::int64_t bytes);
 
   // Takes what is there of the first `until` ticks; returns the number of ticks taken.
   std::uint64_t drain(std::uint64_t until = UINT64_MAX);
@@ -73,6 +77,7 @@ class Recorder {
   void note_failure(Table& table, const std::string& why, double t_s);
 
   std::string folder_;
+  std::unique_ptr<RoomForRows> room_;
   Table samples_{.name = "samples.csv", .file = {}};
   Table fault_{.name = "fault.csv", .file = {}};  // open from the first fault on
   std::vector<NotKept> not_kept_;

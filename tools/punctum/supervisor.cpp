@@ -792,12 +792,12 @@ int run_scene(const Scene& scene, const RunSettings& settings) {
     return refuse(why);
   };
   const std::uint64_t every = rows_every(scene, settings);
-  const auto space = look_for_space(
-      folder, bytes_written(scene, {.seconds = scene.seconds > 0 ? scene.seconds : kOpenEnded_s,
-                                    .rows_every = every,
-                                    .frames = settings.frames && !is_long(scene),
-                                    .every_tick = settings.record,
-                                    .pictures = settings.pictures}));
+  const ExpectedRecording expected{.seconds = scene.seconds > 0 ? scene.seconds : kOpenEnded_s,
+                                   .rows_every = every,
+                                   .frames = settings.frames && !is_long(scene),
+                                   .every_tick = settings.record,
+                                   .pictures = settings.pictures};
+  const auto space = look_for_space(folder, bytes_written(scene, expected));
   if (!space) {
     return refuse_and_leave_nothing(space.error());
   }
@@ -829,6 +829,7 @@ int run_scene(const Scene& scene, const RunSettings& settings) {
   if (!recorder) {
     return refuse_and_leave_nothing(recorder.error());
   }
+  recorder->keep_room(room_for_samples(folder, scene, expected));
   if (stop_signal::count() > 0) {
     terminal.complain("stopped before anything was started");
     reserve.give_back();

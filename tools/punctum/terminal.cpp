@@ -77,6 +77,17 @@ Part bar(double filled, bool blocks) {
   return {s, kBar, colour, 4};
 }
 
+// By their tables in the scene.
+std::string silent_devices(unsigned bits) {
+  std::string names;
+  for (std::size_t i = 0; i < std::size(rt::kDeviceNames); ++i) {
+    if ((bits >> i & 1U) != 0) {
+      names += (names.empty() ? "" : ", ") + std::string(rt::kDeviceNames[i]);
+    }
+  }
+  return names.empty() ? "a device" : names;
+}
+
 Part vision_part(const Scene& scene, const rt::TelemetrySample& newest) {
   if (newest.obs_age_s < 0) {
     return part("vision starts", 6, Colour::warning);
@@ -339,7 +350,7 @@ std::string progress_line(const Scene& scene, const Measures& measures, const rt
     parts.push_back(vision_part(scene, newest));
   }
   if ((newest.alarms & rt::alarm_sensor) != 0) {
-    parts.push_back(part("a device gives no usable data", 8, Colour::warning));
+    parts.push_back(part(silent_devices(newest.unusable) + " without usable data", 8, Colour::warning));
   }
   if (core.missed.load() > 0) {
     parts.push_back(part(fmt::format("missed {}", core.missed.load()), 1, Colour::warning));

@@ -1,4 +1,4 @@
-// The messages of a recording, each as what it is.
+// The messages of a recording, each as what it is, force effects in the order of this build.
 #pragma once
 
 #include <fmt/format.h>
@@ -10,6 +10,7 @@
 #include <tl/expected.hpp>
 #include <utility>
 
+#include "tools/record/effect_order.hpp"
 #include "tools/record/mcap_reader.hpp"
 #include "tools/record/recording.hpp"
 #include "tools/wire/messages.hpp"
@@ -48,7 +49,11 @@ class RecordingReader {
                  : tl::unexpected(fmt::format("{}: was not finished; all of it up to byte {} is read", path_,
                                               file_.complete()));
     }
-    if (!give(m, take)) {
+    const bool known = give(m, take);
+    if (!refusal_.empty()) {
+      return tl::unexpected(path_ + ": " + refusal_);
+    }
+    if (!known) {
       return tl::unexpected(
           fmt::format("{}: a message of channel {} is none of its schema", path_, m.channel));
     }
@@ -81,10 +86,27 @@ class RecordingReader {
                              path_, lost, loss_.telemetry());
   }
 
+  template <class Message>
+  static void put_in_order(Message& /*message*/) {}
+  void put_in_order(v1::Telemetry& t) const { order_.apply(t); }
+  void put_in_order(v1::Event& e) const { order_.apply(e); }
+  void put_in_order(v1::Scene& s) {
+    auto order = EffectOrder::of(s);
+    if (order) {
+      order_ = std::move(*order);
+    } else {
+      refusal_ = order.error();
+    }
+  }
+
   template <class Message, class Take>
   [[nodiscard]] bool give(const mcap::Message& m, Message& message, Take& take) {
     if (m.data.size() > INT_MAX || !message.ParseFromArray(m.data.data(), static_cast<int>(m.data.size()))) {
       return false;
+    }
+    put_in_order(message);
+    if (!refusal_.empty()) {
+      return true;
     }
     if constexpr (requires { take.log_ns; }) {
       take.log_ns = m.log_ns;
@@ -119,7 +141,8 @@ class RecordingReader {
   }
 
   mcap::Reader file_;
-  std::string path_;
+  std::string path_, refusal_;
+  EffectOrder order_;
   v1::Scene scene_;
   v1::Telemetry telemetry_;
   v1::Truth truth_;

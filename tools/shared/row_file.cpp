@@ -52,8 +52,8 @@ void RowFile::flush() {
     const ssize_t n = ::write(file_, waiting_.data() + written, waiting_.size() - written);
     if (n >= 0) {
       written += static_cast<std::size_t>(n);
-    } else if (errno != EINTR) {
-      failure_ = std::strerror(errno);
+    } else if (const int why = errno; why != EINTR && !(why == ENOSPC && more_room_ && more_room_())) {
+      failure_ = std::strerror(why);
       cut_off_after(std::string_view(waiting_).substr(0, written));
     }
   }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <tl/expected.hpp>
@@ -28,6 +29,9 @@ class RowFile {
   }
   ~RowFile();
 
+  // Asked while the disk is full: whether there is a little room now, so that it is worth another try.
+  void when_full(std::function<bool()> more_room) { more_room_ = std::move(more_room); }
+
   // One row or several, each with its line end. They are in the file after flush(), or when enough have come.
   void append(std::string_view rows);
   void flush();
@@ -38,12 +42,14 @@ class RowFile {
  private:
   void swap(RowFile& other) noexcept {
     std::swap(file_, other.file_);
+    std::swap(more_room_, other.more_room_);
     std::swap(waiting_, other.waiting_);
     std::swap(failure_, other.failure_);
   }
   void cut_off_after(std::string_view written);
 
   int file_ = -1;
+  std::function<bool()> more_room_;
   std::string waiting_;
   std::string failure_;
 };

@@ -7,8 +7,8 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstdlib>
 #include <filesystem>
-#include <future>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
@@ -32,6 +32,7 @@
 #include "tools/shared/stop_signal.hpp"
 #include "tools/shared/truth_observer.hpp"
 #include "tools/shared/vision_lies.hpp"
+#include "tools/vision/camera_opening.hpp"
 #include "tools/vision/live_camera.hpp"
 #include "tools/vision/live_stage.hpp"
 #include "tools/vision/live_tracker.hpp"
@@ -85,6 +86,7 @@ class LiveVision {
 
   [[nodiscard]] Opened open();
   [[nodiscard]] ExitCode run();
+  [[nodiscard]] bool opens_still() const { return opens_still_; }
 
  private:
   struct Seen {
@@ -140,7 +142,8 @@ class LiveVision {
   std::optional<sim::BenchClock> bench_clock_;
   std::optional<sim::SimCamera> sim_camera_;
   std::optional<recorded::Camera> recorded_;
-  std::unique_ptr<hal::LiveCamera> live_;
+  std::shared_ptr<hal::LiveCamera> live_;
+  bool opens_still_ = false;  // the camera, on a thread that uses this object
   std::int64_t last_picture_ns_ = 0;
   bool silent_ = false;                                   // and said to be
   std::optional<sim::ExposureTaker> in_place_of_camera_;  // so that virtual time knows vision is there
@@ -269,8 +272,14 @@ Opened LiveVision::open_live_camera() {
     return tl::unexpected(made.error());
   }
   live_ = std::move(*made);
-  if (auto opened = live_->open(); !opened) {
-    return opened;
+  const auto opened = open_unless_stopped(
+      live_, std::chrono::nanoseconds(kFrameTimeout_ns), [] {}, [] { return stop_signal::count() > 0; });
+  opens_still_ = !opened;
+  if (!opened) {
+    return tl::unexpected(std::string("a signal asked it to stop while it opened the camera"));
+  }
+  if (!*opened) {
+    return *opened;
   }
   for (const std::string& note : live_->notes()) {
     complain(note);
@@ -347,6 +356,9 @@ ExitCode LiveVision::run() {
       }
       if (live_) {
         look_for_camera();
+        if (opens_still_) {
+          break;
+        }
         continue;
       }
       complain("the camera is gone");
@@ -398,18 +410,20 @@ void LiveVision::look_for_camera() {
   std::string why;
   while (stop_signal::count() == 0 && !plant_has_stopped()) {
     // It closes what is left of it first. Either may take seconds, and nobody shall believe that this hangs.
-    auto opening = std::async(std::launch::async, [this] { return live_->open(); });
-    while (opening.wait_for(std::chrono::nanoseconds(kFrameTimeout_ns)) != std::future_status::ready) {
-      go_round();
+    const auto opened = open_unless_stopped(
+        live_, std::chrono::nanoseconds(kFrameTimeout_ns), [this] { go_round(); },
+        [this] { return stop_signal::count() > 0 || plant_has_stopped(); });
+    opens_still_ = !opened;
+    if (!opened) {
+      return;
     }
-    const Opened opened = opening.get();
-    if (opened) {
+    if (*opened) {
       complain(fmt::format("the camera is back after {:.1f} s",
                            static_cast<double>(clock().now_ns() - gone_ns) * 1e-9));
       return;
     }
-    if (why != opened.error()) {
-      why = opened.error();
+    if (why != opened->error()) {
+      why = opened->error();
       complain(why);
     }
     wait_until(clock().now_ns() + kLookAgain_ns);
@@ -548,11 +562,15 @@ void LiveVision::go_on_without(rt::ObservationSegment::NotKept what, const std::
 
 int live(const LiveOptions& options) {
   LiveVision vision(options);
-  if (const auto opened = vision.open(); !opened) {
+  const auto opened = vision.open();
+  if (!opened) {
     complain(opened.error());
-    return exit_bad_input;
   }
-  return vision.run();
+  const ExitCode code = opened ? vision.run() : vision.opens_still() ? exit_not_done : exit_bad_input;
+  if (vision.opens_still()) {
+    std::_Exit(code);  // nothing is taken apart under the thread that opens the camera; all rows are written
+  }
+  return code;
 }
 
 }  // namespace punctum::tools

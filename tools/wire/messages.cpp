@@ -139,6 +139,7 @@ void to_wire(const rt::TelemetrySample& from, v1::Telemetry& to) {
   to.set_observations(from.observations);
   to.set_stale_ticks(from.stale_ticks);
   to.set_injector_open(from.injector_open != 0);
+  to.set_unusable(from.unusable);
   to.set_wd_sd_m(from.wd_sd_m);
   to.set_r_sd_m(from.R_sd_m);
   to.set_tip_force_sd_n(from.tip_force_sd_N);
@@ -356,6 +357,7 @@ bool from_wire(const v1::Telemetry& from, rt::TelemetrySample& to) {
   to.observations = from.observations();
   to.stale_ticks = from.stale_ticks();
   to.injector_open = from.injector_open() ? 1 : 0;
+  to.unusable = static_cast<std::uint8_t>(from.unusable());
   to.wd_sd_m = from.wd_sd_m();
   to.R_sd_m = from.r_sd_m();
   to.tip_force_sd_N = from.tip_force_sd_n();

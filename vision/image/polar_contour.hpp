@@ -9,6 +9,8 @@
 
 namespace punctum::vision {
 
+inline constexpr double kJoinedAngles = 10;  // that tell the same: the contour of a frame is smooth
+
 // The radii of a contour seen from `centre`. Where a wall overhangs, the outermost crossing counts. Empty if
 // fewer than half of the rays cross the contour.
 [[nodiscard]] Vector<double> polar_radii(std::span<const Point> contour, const Point& centre, int angles);

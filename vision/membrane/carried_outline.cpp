@@ -16,7 +16,6 @@ namespace {
 // first, within which it is learnt, and how fast.
 constexpr double kTurn_px = 0.15;
 constexpr double kDrift_px = 0.15, kLeastDrift_px = 0.02, kMostDrift_px = 0.3, kDriftLearnt = 0.1;
-constexpr double kJoined = 10;       // angles that tell the same: the contour of a frame is smooth
 constexpr double kBroken = 6;        // mean squared surprise, over its variance, that is none of noise
 constexpr double kBrokenPushed = 3;  // likewise, where a needle may change the shape
 constexpr double kFar = 9;           // a larger surprise is no noise
@@ -119,7 +118,7 @@ void CarriedOutline::move_with_cell(const Vector<double>& now, const SeenOutline
       }
       const cv::Vec3d& f = effect[i];
       const double e = now[i] - r_[i], off = std::abs(e - f.dot(motion)) / twice_sd[i];
-      const double w = 1 / (kJoined * variance[i] * std::max(1.0, off));
+      const double w = 1 / (kJoinedAngles * variance[i] * std::max(1.0, off));
       a += w * f * f.t();
       b += w * e * f;
     }

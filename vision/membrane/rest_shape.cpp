@@ -26,7 +26,6 @@ constexpr double kLeastMotion_px = 0.1;  // likewise, however certain its place 
 constexpr double kLeastDrift_px = 0.02;  // per frame: less may be noise
 constexpr double kSpin_px = 0.15;        // of the outline per frame, at its rim: sd, at first
 constexpr double kUnevenSpin_px = 0.01;  // by which that changes in a frame
-constexpr double kJoined = 10;           // angles that tell the same: a contour is smooth
 
 // Of a straight line through the last frames: by how much its end and its slope follow the newest.
 struct Gain {
@@ -64,7 +63,7 @@ Motion motion_between(std::span<const double> r, std::span<const double> now,
   const cv::Matx33d covariance = a.inv(cv::DECOMP_CHOLESKY);
   const cv::Vec3d motion = covariance * b;
   const double unexplained = std::max(0.0, square - motion.dot(b)) / std::max(weights, 1.0);
-  return {{motion[0], motion[1]}, motion[2], kJoined * unexplained * covariance(2, 2)};
+  return {{motion[0], motion[1]}, motion[2], kJoinedAngles * unexplained * covariance(2, 2)};
 }
 
 // The angle between them has a larger cosine.

@@ -48,6 +48,39 @@ TEST(AravisStamps, a_clock_that_is_set_anew_is_followed_at_once) {
   EXPECT_EQ(clock.on_station_ns(40'000'000, 50'130'000'000), 50'120'000'000);
 }
 
+// By up to a second ahead, in the middle of a run and as its first stamp. What is given for that one is
+// refused as ahead of the clock; here only that the others are right.
+TEST(AravisStamps, one_stamp_that_jumps_ahead_makes_no_other_frame_older) {
+  constexpr std::int64_t kApart_ns = 123'456'789'000, kFastest_ns = 2'000'000, kFrame_ns = 40'000'000;
+  for (const std::int64_t ahead_ns : {30'000'000, 300'000'000, 999'000'000, 1'500'000'000}) {
+    for (const int at : {0, 100}) {
+      CameraClock clock;
+      for (int i = 0; i < 600; ++i) {
+        const std::int64_t true_ns = 1'000'000'000'000 + i * kFrame_ns;
+        const std::int64_t late_ns = kFastest_ns + i % 3 * 1'000'000;
+        const std::int64_t seen_ns =
+            clock.on_station_ns(true_ns - kApart_ns + (i == at ? ahead_ns : 0), true_ns + late_ns);
+        if (i != at) {
+          EXPECT_GE(seen_ns, true_ns + kFastest_ns) << ahead_ns << ' ' << i;
+          EXPECT_LE(seen_ns, true_ns + late_ns) << ahead_ns << ' ' << i;
+        }
+      }
+    }
+  }
+}
+
+TEST(AravisStamps, a_clock_that_goes_on_ahead_is_followed_from_the_second_frame_on) {
+  CameraClock clock;
+  constexpr std::int64_t kFrame_ns = 40'000'000, kAhead_ns = 500'000'000;
+  for (int i = 0; i < 400; ++i) {
+    const std::int64_t arrival_ns = i * kFrame_ns;
+    const std::int64_t seen_ns = clock.on_station_ns(arrival_ns + (i >= 200 ? kAhead_ns : 0), arrival_ns);
+    if (i != 200) {
+      EXPECT_EQ(seen_ns, arrival_ns) << i;
+    }
+  }
+}
+
 // Set ahead by 200 ms while a frame waits for 3 ms, which would else count as 203 ms old: then for a second
 // every frame counts as of now, and after it by the wall clock again.
 TEST(AravisStamps, a_wall_clock_that_is_set_makes_no_frame_older) {

@@ -7,17 +7,22 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iostream>
 #include <iterator>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
 #include <random>
+#include <sstream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "hal/recorded/picture.hpp"
@@ -179,6 +184,26 @@ TEST_F(Recorded, later_pictures_are_scaled_in_the_same_way_as_the_first) {
   }
 }
 
+TEST_F(Recorded, a_first_picture_that_is_dark_does_not_scale_those_that_follow) {
+  const auto plain = [](int grey) { return encoded(cv::Mat(2, 2, CV_16UC1, cv::Scalar(grey)), ".png"); };
+  for (const int pictures : {3, 40}) {
+    for (int i = 0; i < pictures; ++i) {
+      write(std::to_string(i) + ".png", plain(i == 0 ? 0x00f0 : 0x0800));  // of a 12-bit camera
+    }
+    write("2.png", {});             // one that cannot be read tells nothing
+    write("3.png", plain(0xff00));  // a flash
+    auto camera = recorded::Camera::open(folder.string());
+    ASSERT_TRUE(camera) << camera.error();
+    hal::Frame frame;
+    for (int i = 0; i < pictures; ++i) {
+      ASSERT_EQ(camera->next(frame, 0), i == 2 ? hal::Status::fault : hal::Status::ok) << i;
+      if (i != 2) {
+        EXPECT_EQ(frame.pixels[0], i == 0 ? 0x0f : i == 3 ? 0xff : 0x80) << i;
+      }
+    }
+  }
+}
+
 TEST_F(Recorded, a_bad_picture_is_a_fault_and_the_next_one_follows) {
   write("1.png", encoded(disc(40, 30), ".png"));
   Bytes cut = encoded(disc(40, 30), ".png");
@@ -240,6 +265,35 @@ TEST(Picture, whose_coded_data_end_early_is_refused_and_the_library_stays_silent
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
   ASSERT_FALSE(picture);
   EXPECT_EQ(picture.error(), "the picture's data are damaged or incomplete");
+}
+
+TEST(Picture, keeps_nothing_that_other_threads_write_to_the_standard_error_streams) {
+  Bytes jpeg = encoded(disc(400, 300), ".jpg");
+  jpeg.resize(jpeg.size() / 2);
+  jpeg.insert(jpeg.end(), {0xff, 0xd9});
+  constexpr int kLines = 20'000;
+  testing::internal::CaptureStderr();
+  std::atomic<bool> written{false};
+  std::thread other([&] {
+    for (int i = 0; i < kLines; ++i) {
+      (void)std::fputs("by C\n", stderr);
+      std::cerr << "by C++\n";
+    }
+    written = true;
+  });
+  int refused = 0, decoded = 0;
+  for (; !written || decoded == 0; ++decoded) {
+    refused += recorded::decode(jpeg) ? 0 : 1;
+  }
+  other.join();
+  const std::string all = testing::internal::GetCapturedStderr();
+  EXPECT_EQ(refused, decoded) << "what the library itself says is heard";
+  std::size_t lines = 0;
+  std::istringstream in(all);
+  for (std::string line; std::getline(in, line); ++lines) {
+    EXPECT_TRUE(line == "by C" || line == "by C++") << line;
+  }
+  EXPECT_EQ(lines, 2U * kLines);
 }
 
 TEST_F(Recorded, a_bad_first_picture_is_an_error_of_open) {

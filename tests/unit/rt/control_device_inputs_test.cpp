@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <utility>
 
 #include "rt/control/device_inputs.hpp"
 #include "rt/station/alarm.hpp"
@@ -101,6 +102,27 @@ TEST(DeviceInputs, keeps_the_last_good_value_of_a_silent_device_until_its_time_i
   in.hand.status = Status::ok;
   EXPECT_EQ(in.read().device_faults.first, Fault::stage_lost);
   EXPECT_NEAR(in.read().between_hand_s, 1e-3, 1e-12);
+}
+
+TEST(DeviceInputs, tells_which_of_the_devices_gives_nothing) {
+  Inputs in;
+  in.settle();
+  const auto told = [&in](auto& value, auto silent, unsigned device) {
+    const auto before = std::exchange(value, silent);
+    EXPECT_EQ(in.read().unusable, device);
+    EXPECT_NE(in.inputs.readings().alarms & alarm_sensor, 0U) << device;
+    value = before;
+    in.settle();
+    EXPECT_EQ(in.inputs.readings().unusable, 0U) << device;
+  };
+  told(in.hand.status, Status::no_data, device_haptic);
+  told(in.stage.status, Status::no_data, device_stage);
+  told(in.estop.status, Status::no_data, device_estop);
+  told(in.vacuum.pressure, 1e6, device_vacuum);
+  told(in.injector.status, Status::no_data, device_injector);
+  told(in.sensor.force, 1e6, device_force_sensor);
+  in.hand.status = in.stage.status = Status::no_data;
+  EXPECT_EQ(in.read().unusable, device_haptic | device_stage);
 }
 
 TEST(DeviceInputs, takes_each_sample_of_a_slow_hand_once_and_measures_time_by_the_samples) {
@@ -776,6 +798,7 @@ TEST(DeviceInputs, calls_a_switch_that_is_lost_or_silent_a_fault_and_takes_no_pr
     in.enabling.status = c.status;
     EXPECT_EQ(in.ticks_to(Fault::enabling_fault), c.within);
     EXPECT_NE(in.inputs.readings().alarms & alarm_sensor, 0U);
+    EXPECT_EQ(in.inputs.readings().unusable, device_enabling);
     EXPECT_FALSE(in.enabled());
     in.enabling.status = Status::ok;
     in.hold(true);

@@ -333,6 +333,7 @@ TEST(Servo, pierces_no_cell_that_it_cannot_inject) {
   EXPECT_NEAR(b.stage.tip.x(), at_m, 1e-6);
   EXPECT_EQ(b.servo->fault(), Fault::none);
   EXPECT_NE(b.sample().alarms & alarm_sensor, 0U);
+  EXPECT_EQ(b.sample().unusable, device_injector);
   b.move(30e-6, 15e-6);
   b.run(0.5);
   EXPECT_GT(b.stage.tip.x(), at_m + 5e-6);

@@ -426,9 +426,16 @@ TEST(Rebuilt, rows_that_are_missing_between_others_are_told) {
   const Json facts = rebuilt_facts(folder.path());
   ASSERT_EQ(facts["not_kept"].size(), 1U);
   EXPECT_NEAR(facts["not_kept"][0]["t_s"].get<double>(), 0.299, 1e-9);
-  EXPECT_TRUE(contains(facts["not_kept"][0]["why"].get<std::string>(), "0.900 s"));
+  EXPECT_EQ(facts["not_kept"][0]["why"], "its rows go on at 0.900 s: its only hole");
   EXPECT_TRUE(facts["alarms_s"].is_null() && facts["dose"]["asked_s"].is_null() && facts["phases"].empty());
   EXPECT_EQ(facts["outcome"], "done") << "what the cell got is not known";
+  const std::size_t again = rows.find("\n1.000000,") + 1, end = rows.find("\n1.150000,") + 1;
+  folder.put("samples.csv", rows.substr(0, from) + rows.substr(to, again - to) + rows.substr(end));
+  const Json two = rebuilt_facts(folder.path());
+  ASSERT_EQ(two["not_kept"].size(), 1U);
+  EXPECT_EQ(
+      two["not_kept"][0]["why"],
+      "its rows go on at 0.900 s: the longest of its 2 holes, which are 0.752 s together");  // .601 + .151
   folder.put("samples.csv", RecordedInjection::rows(7));
   EXPECT_TRUE(rebuilt_facts(folder.path())["not_kept"].empty()) << "every seventh row, and changes of phase";
 }
@@ -467,6 +474,39 @@ TEST(Rebuilt, rows_that_are_damaged_are_counted_and_what_depends_on_them_is_unkn
   EXPECT_EQ(facts["needle_at_end"]["where"], "unknown") << "what came last cannot be read";
   EXPECT_EQ(report_folders({folder.path()}, ""), 1);
   EXPECT_EQ(report_folders({folder.path()}, ""), 1) << "from report.json, too";
+}
+
+TEST(Rebuilt, events_that_are_damaged_are_counted_and_the_others_are_told) {
+  const Folder folder;
+  folder.put("scene.toml", to_toml(*load_scene("icsi")));
+  folder.put("samples.csv", RecordedInjection::rows(1));
+  const std::string begin = std::string(kEventColumns) + "0.250000,250,phase,contact,0,,,\n";
+  const std::string end = "1.390000,1390,ended,done,,,,\n";
+  const auto rebuilt = [&](const std::string& between) {
+    folder.put("events.csv", begin + between + end);
+    Json facts = rebuilt_facts(folder.path());
+    EXPECT_EQ(facts["events"].size(), 2U) << between;
+    EXPECT_EQ(facts["outcome"], "injected in part") << "as the samples have it" << between;
+    return facts;
+  };
+  EXPECT_TRUE(rebuilt("")["not_kept"].empty());
+  const std::string zeroed = std::string("0.300000,300,ala") + '\0' + "m_on,vision_stale,,,,\n";
+  for (const std::string& damaged :
+       {std::string("0.3#0000,300,alarm_on,vision_stale,,,,\n"), std::string("0.300000,300,alarm_on\n"),
+        std::string("0.300000,300,phase,indentation,#,,,\n"), zeroed}) {
+    const Json facts = rebuilt(damaged);
+    ASSERT_EQ(facts["not_kept"].size(), 1U) << damaged;
+    EXPECT_EQ(facts["not_kept"][0]["file"], "events.csv");
+    EXPECT_EQ(facts["not_kept"][0]["why"], "1 row cannot be read");
+    EXPECT_NEAR(facts["not_kept"][0]["t_s"].get<double>(), 0.25, 1e-9);
+    EXPECT_EQ(facts["event_rows"]["unreadable"], 1);
+    EXPECT_FALSE(facts["phases"].empty()) << "the samples have them all";
+  }
+  EXPECT_EQ(rebuilt(zeroed + zeroed)["not_kept"][0]["why"], "2 rows cannot be read");
+  folder.put("events.csv", begin + "1.39");
+  const Json facts = rebuilt_facts(folder.path());
+  EXPECT_TRUE(facts["not_kept"].empty()) << "a crash may cut off the last one";
+  EXPECT_EQ(facts["event_rows"]["cut_off"], 1);
 }
 
 TEST(Rebuilt, what_a_run_began_as_is_said_to_be_unreadable) {
@@ -596,7 +636,7 @@ TEST(Rebuilt, an_event_comes_back_from_its_table_as_it_was_written) {
   command.target = rt::effect_damping;
   command.writer = 1;
   folder.put("events.csv", kEventColumns + event_line(phase) + event_line(command));
-  const auto events = read_events(folder.path() + "/events.csv");
+  const auto events = read_events(folder.path() + "/events.csv").list;
   ASSERT_EQ(events.size(), 2U);
   EXPECT_EQ(events[0], event_row(phase));
   EXPECT_EQ(events[1], event_row(command));
@@ -681,6 +721,16 @@ TEST_F(LiveLine, says_phase_force_depth_vision_and_what_time_is_left) {
     EXPECT_TRUE(contains(s, part)) << part << " in " << s;
   }
   EXPECT_FALSE(contains(s, "\033")) << s;
+}
+
+TEST_F(LiveLine, names_the_devices_that_give_nothing) {
+  EXPECT_FALSE(contains(line({}), "usable")) << line({});
+  sample.alarms = rt::alarm_sensor;
+  sample.unusable = rt::device_stage;
+  EXPECT_TRUE(contains(line({}), "  stage without usable data")) << line({});
+  EXPECT_TRUE(contains(line({.columns = 80}), "stage without usable data")) << line({.columns = 80});
+  sample.unusable = rt::device_stage | rt::device_force_sensor;
+  EXPECT_TRUE(contains(line({}), "  stage, force_sensor without usable data")) << line({});
 }
 
 TEST_F(LiveLine, tells_a_persons_own_hand_what_to_do_next) {

@@ -3,11 +3,17 @@
 #include "tools/punctum/recorder.hpp"
 
 #include <gtest/gtest.h>
+#include <sched.h>
+#include <sys/mount.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <memory>
 #include <string>
 #include <type_traits>
@@ -278,6 +284,89 @@ TEST_F(RecorderTest, samples_that_cannot_be_written_are_noticed_while_the_run_go
   EXPECT_EQ(r.measures().ticks, 8000U) << "it is measured all the same";
   EXPECT_LT(r.rows(), 4000U);
   EXPECT_LE(lines("samples.csv"), r.rows() + 1);
+}
+
+// A disk of 4 MB for this process alone; false: this machine lets nobody have one.
+bool mount_small_disk(const fs::path& at) {
+  const uid_t user = geteuid();
+  const gid_t group = getegid();
+  if (unshare(user == 0 ? CLONE_NEWNS : CLONE_NEWNS | CLONE_NEWUSER) != 0) {
+    return false;
+  }
+  if (user != 0) {
+    std::ofstream("/proc/self/setgroups") << "deny";
+    std::ofstream("/proc/self/uid_map") << "0 " << user << " 1";
+    std::ofstream("/proc/self/gid_map") << "0 " << group << " 1";
+  }
+  return mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
+         mount("small", at.c_str(), "tmpfs", 0, "size=4m") == 0;
+}
+
+void fill(const fs::path& disk) {
+  std::ofstream other(disk / "picture", std::ios::app);
+  for (const std::size_t size : {std::size_t{4096}, std::size_t{1}}) {
+    while (other << std::string(size, 'x') << std::flush) {
+    }
+    other.clear();
+  }
+}
+
+TEST_F(RecorderTest, rows_find_room_on_a_full_disk_until_what_was_kept_back_for_them_is_used_up) {
+  constexpr int kNoDisk = 77;
+  const pid_t child = fork();
+  if (child == 0) {
+    if (!mount_small_disk(folder_)) {
+      std::_Exit(kNoDisk);
+    }
+    {
+      Recorder r = recorder();
+      r.keep_room(2 << 20);
+      fill(folder_);
+      for (int i = 0; i < 3; ++i) {
+        tick(1000);
+        r.drain();
+      }
+      EXPECT_TRUE(r.not_kept().empty()) << "what others wrote stands in the way of no row";
+      EXPECT_GT(lines("samples.csv"), 2500U);
+      for (int i = 0; i < 10; ++i) {
+        tick(3000);
+        r.drain();
+      }
+      r.finish();
+      EXPECT_EQ(r.not_kept().size(), 1U) << "it is said when that is over";
+      EXPECT_GT(r.rows(), 5000U);
+      EXPECT_LT(r.rows(), 33'000U);
+      std::ifstream table(folder_ / "samples.csv");
+      const std::string all(std::istreambuf_iterator<char>(table), {});
+      EXPECT_EQ(all.back(), '\n') << "what was written stays whole";
+    }
+    fs::remove(folder_ / "samples.csv");
+    Recorder r = recorder();
+    r.keep_room(2 << 20);
+    fill(folder_);
+    EXPECT_EQ(fs::space(folder_).available, 0U);
+    r.finish();
+    EXPECT_GT(fs::space(folder_).available, 1U << 20) << "for the report";
+    std::_Exit(HasFailure() ? 1 : 0);
+  }
+  int status = 0;
+  ASSERT_EQ(waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status));
+  if (WEXITSTATUS(status) == kNoDisk) {
+    GTEST_SKIP() << "this machine lets no process mount a disk of its own";
+  }
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+}
+
+TEST_F(RecorderTest, samples_ask_for_the_room_of_a_whole_run_but_leave_half_of_what_is_free) {
+  const Scene scene = *load_scene("icsi");
+  EXPECT_EQ(room_for_samples(folder_.string(), scene, {.seconds = 2}),
+            room_for_samples(folder_.string(), scene, {.seconds = 2, .frames = true}));
+  EXPECT_GT(room_for_samples(folder_.string(), scene, {.seconds = 2}), 2000 * 300);
+  const auto half = static_cast<double>(fs::space(folder_).available) / 2;
+  const auto asked = static_cast<double>(room_for_samples(folder_.string(), scene, {.seconds = 1e12}));
+  EXPECT_NEAR(asked, half, 0.1 * half) << "others write on that disk, too";
+  EXPECT_EQ(room_for_samples("/nowhere", scene, {.seconds = 2}), 0);
 }
 
 TEST_F(RecorderTest, what_is_left_in_the_buffer_at_the_end_is_noticed_too) {

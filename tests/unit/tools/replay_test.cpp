@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <deque>
 #include <functional>
@@ -133,7 +134,7 @@ class ReplayTest : public FullDisk {
 
   // The run's messages again, each as `change` leaves it; false leaves it out.
   template <class Message>
-  std::string changed(const std::function<bool(Message&)>& change) {
+  std::string changed(const std::function<bool(Message&)>& change, const std::string& of = run()) {
     std::string path = (folder_ / (std::to_string(++copies_) + ".mcap")).string();
     auto file = mcap::Writer::create(path, "punctum test");
     EXPECT_TRUE(file) << file.error();
@@ -142,7 +143,7 @@ class ReplayTest : public FullDisk {
       copy.channels[i] = file->add_channel(file->add_schema(kTopics[i].schema, "protobuf", wire_schema()),
                                            kTopics[i].name, "protobuf");
     }
-    auto reader = RecordingReader::open(run());
+    auto reader = RecordingReader::open(of);
     EXPECT_TRUE(reader) << reader.error();
     EXPECT_EQ(reader->read_all(copy), "");
     file->finish();
@@ -280,6 +281,66 @@ TEST_F(ReplayTest, a_command_or_an_observation_that_was_another_is_found) {
   }));
   ASSERT_TRUE(observation && observation->differs);
   EXPECT_EQ(observation->differs->tick, seen + 7) << "when the core took it";
+}
+
+// A build before or after this one, which has the same effects in another order.
+TEST_F(ReplayTest, effects_are_known_by_their_names_in_whatever_order_they_were_recorded) {
+  const auto backwards = [](v1::Telemetry& t) {
+    std::reverse(t.mutable_effect_n()->begin(), t.mutable_effect_n()->end());
+    return true;
+  };
+  const std::string unnamed = changed<v1::Telemetry>(backwards);
+  const auto wrong = replay_inputs(unnamed);
+  ASSERT_TRUE(wrong && wrong->differs) << "the run has effects that differ";
+  EXPECT_EQ(wrong->differs->field.rfind("effect_N", 0), 0U) << wrong->differs->field;
+  const auto right = replay_inputs(changed<v1::Scene>(
+      [](v1::Scene& s) {
+        std::reverse(s.mutable_effect()->begin(), s.mutable_effect()->end());
+        return true;
+      },
+      unnamed));
+  ASSERT_TRUE(right) << right.error();
+  EXPECT_FALSE(right->differs) << right->differs->tick << ' ' << right->differs->field;
+  EXPECT_EQ(right->ticks, kTicks);
+}
+
+TEST_F(ReplayTest, a_commands_target_is_the_effect_of_that_name) {
+  struct {
+    std::vector<std::uint32_t> targets;
+    void operator()(const v1::Event& e) {
+      if (e.kind() == v1::Event::KIND_COMMAND) {
+        targets.push_back(e.target());
+      }
+    }
+  } saw;
+  const std::string gains = changed<v1::Event>([](v1::Event& e) {
+    if (e.kind() == v1::Event::KIND_COMMAND) {
+      e.set_command(v1::COMMAND_KIND_EFFECT_GAIN);
+      e.set_target(rt::effect_membrane);
+    }
+    return true;
+  });
+  const std::string path = changed<v1::Scene>(
+      [](v1::Scene& s) {
+        std::reverse(s.mutable_effect()->begin(), s.mutable_effect()->end());
+        return true;
+      },
+      gains);
+  ASSERT_EQ(RecordingReader::open(path)->read_all(saw), "");
+  ASSERT_FALSE(saw.targets.empty());
+  EXPECT_EQ(saw.targets[0], rt::effect_count - 1U) << "the first of the recording is the last of this build";
+}
+
+TEST_F(ReplayTest, an_effect_that_this_build_does_not_have_is_named_and_the_recording_refused) {
+  const std::string path = changed<v1::Scene>([](v1::Scene& s) {
+    s.set_effect(1, "magnet");
+    return true;
+  });
+  const auto replayed = replay_inputs(path);
+  ASSERT_FALSE(replayed);
+  EXPECT_EQ(replayed.error().rfind(path + ": its force effect \"magnet\" is none that this build knows", 0),
+            0U)
+      << replayed.error();
 }
 
 TEST_F(ReplayTest, another_scene_is_another_servo) {

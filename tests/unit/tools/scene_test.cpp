@@ -114,6 +114,8 @@ const std::vector<Broken>& broken() {
        "b.toml:2:9: scene.title: 7 is not text, allowed: text in quotes, at most 1000 characters"},
       {"half a node", kCell + "[vision.snake]\nnodes = 16.5\n",
        "b.toml:10:9: vision.snake.nodes: 16.5 is not a whole number, allowed: a whole number from 8 to 1024"},
+      {"more points of a contour than vision follows", kCell + "contour_points = 1025\n",
+       "b.toml:9:18: vision.contour_points: 1025 is out of range, allowed: a whole number from 128 to 1024"},
       {"a date", kLeast + "[damping]\nB1_Ns_m = 2024-01-01\n",
        "b.toml:6:11: damping.B1_Ns_m: a date or time is not a number, allowed: a number from 0 to 100"},
       {"a list for a number", kLeast + "[damping]\nB1_Ns_m = [1]\n",

@@ -141,6 +141,7 @@ TEST_F(WireTest, a_telemetry_sample_arrives_with_every_field) {
   s.observations = 44;
   s.stale_ticks = 55;
   s.injector_open = 1;
+  s.unusable = 72;
   v1::Telemetry message;
   to_wire(s, message);
   const Fields f = read_by_protoc("Telemetry", message);
@@ -157,6 +158,7 @@ TEST_F(WireTest, a_telemetry_sample_arrives_with_every_field) {
   EXPECT_EQ(one(f, "observations"), "44");
   EXPECT_EQ(one(f, "stale_ticks"), "55");
   EXPECT_EQ(one(f, "injector_open"), "true");
+  EXPECT_EQ(one(f, "unusable"), "72");
   const auto is = [&f](const std::string& name, const double& field) {
     EXPECT_EQ(number(f, name), field) << name;
   };
@@ -202,7 +204,7 @@ TEST_F(WireTest, a_telemetry_sample_arrives_with_every_field) {
   for (auto [at, end] = f.equal_range("contact_force_N.z"); at != end; ++at) {
     EXPECT_EQ(std::stod(at->second), s.contact_force_N[i++][2]);
   }
-  EXPECT_EQ(f.size(), 12U + 7 * 3 + 20 + rt::effect_count + 4 * 3)
+  EXPECT_EQ(f.size(), 13U + 7 * 3 + 20 + rt::effect_count + 4 * 3)
       << "every field of the message was looked at";
 }
 
@@ -396,6 +398,7 @@ TEST_F(WireTest, what_was_told_comes_back_bit_for_bit) {
   s.observations = 8;
   s.stale_ticks = 9;
   s.injector_open = 1;
+  s.unusable = 200;
   v1::Telemetry message;
   to_wire(s, message);
   rt::TelemetrySample back;

@@ -1,6 +1,7 @@
 // Results of punctum-jitter: distributions by hand, differences between random measurements whose truth is
 // known, machines made of files, and the loop itself for a moment.
 #include <gtest/gtest.h>
+#include <sched.h>
 #include <signal.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
@@ -310,6 +311,10 @@ TEST_F(FileMachine, is_told_what_is_not_ready_and_what_mends_it) {
   file("sys/devices/system/cpu/online", "0-63\n");
   EXPECT_NE(finding("no swap").remedy.find("swapoff"), std::string::npos);
   EXPECT_NE(finding("clock source").remedy.find("tsc"), std::string::npos);
+  EXPECT_EQ(finding("clock source").mend.boot, "")
+      << "the kernel has given it up, and no file may overrule that";
+  file("sys/devices/system/clocksource/clocksource0/available_clocksource", "tsc hpet acpi_pm \n");
+  EXPECT_EQ(finding("clock source").mend.boot, "clocksource=tsc");
   EXPECT_NE(finding("interrupts elsewhere", 3).remedy.find("irqaffinity=0-2,4-63"), std::string::npos);
   EXPECT_NE(finding("interrupts elsewhere", 32).remedy, "");
   EXPECT_EQ(finding("interrupts elsewhere", 4).remedy, "");
@@ -325,6 +330,19 @@ TEST_F(FileMachine, is_told_what_is_not_ready_and_what_mends_it) {
   EXPECT_NE(served.remedy.find("echo 0-3,5-63 > /proc/irq/NUMBER/smp_affinity_list"), std::string::npos)
       << served.remedy;
   EXPECT_NE(finding("interrupts elsewhere", -1).remedy, "");
+}
+
+TEST_F(FileMachine, keeps_interrupts_from_other_isolated_cpus_too) {
+  file("proc/irq/default_smp_affinity", "f\n");
+  file("sys/devices/system/cpu/online", "0-3\n");
+  file("sys/devices/system/cpu/isolated", "2-3\n");
+  EXPECT_EQ(finding("interrupts elsewhere", 3).mend.boot, "irqaffinity=0-1");
+  file("sys/devices/system/cpu/isolated", "0-2\n");
+  EXPECT_EQ(finding("interrupts elsewhere", 3).mend.boot, "irqaffinity=0-2") << "none else is left";
+}
+
+TEST_F(FileMachine, that_shows_no_cpus_is_not_taken_for_one_of_a_single_cpu) {
+  EXPECT_NE(finding("CPUs").remedy, "");
 }
 
 TEST_F(FileMachine, that_is_ready_needs_nothing) {
@@ -479,6 +497,10 @@ TEST_F(FilesOfDevices, are_mended_by_files_that_a_shell_can_read) {
        {"swapoff -a", "ethtool -C eth0", "chrt -f -p 85", "xhci_hcd", "kernel.sched_rt_runtime_us=-1"}) {
     EXPECT_NE(machine.find(word), std::string::npos) << word;
   }
+  const std::string& unit = files.at("etc/systemd/system/punctum-machine.service");
+  EXPECT_NE(unit.find("After=network.target punctum-bus@can0.service"), std::string::npos)
+      << "an interface that is down has no interrupt";
+  EXPECT_EQ(unit.find("RemainAfterExit"), std::string::npos) << "again with each run";
   const std::string& limits = files.at("etc/security/limits.d/punctum.conf");
   EXPECT_NE(limits.find("rtprio 95"), std::string::npos);
   EXPECT_NE(limits.find("memlock unlimited"), std::string::npos);
@@ -717,6 +739,13 @@ class Paused {
   pid_t pid_ = -1;
   int ask_ = -1;
 };
+
+TEST(Measurement, on_another_cpu_than_the_one_asked_for_is_refused) {
+  const auto result = measure({.seconds = 0.1, .cpu = CPU_SETSIZE - 1});
+  ASSERT_FALSE(result);
+  EXPECT_NE(result.error().find("--cpu"), std::string::npos);
+  EXPECT_EQ(sched_getscheduler(0) & ~SCHED_RESET_ON_FORK, SCHED_OTHER);
+}
 
 TEST(Measurement, tells_a_wake_up_later_than_many_periods_from_the_release_it_slept_for) {
   Paused paused;

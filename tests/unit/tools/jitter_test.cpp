@@ -941,6 +941,45 @@ TEST(CauseOfALateTick, is_silence_that_only_a_counter_names) {
       << "another tick's, perhaps";
 }
 
+// As Linux 7.3 with PREEMPT_RT traced it, while its own tracer hwlat kept interrupts off for 1 ms; timerlat's
+// stack of the same showed hwlatd's kthread_fn.
+TEST(CauseOfALateTick, is_silence_with_a_thread_that_is_named) {
+  Episode tick;
+  tick.release_ns = 4'576'568'858;
+  tick.wake_ns = tick.release_ns + 470'305;
+  tick.end_ns = tick.release_ns + 471'168;
+  tick.tid = 289;
+  const std::string before =
+      "  punctum-jitter-289     [000] d..2.     4.575680: sched_switch: prev_comm=punctum-jitter "
+      "prev_pid=289 "
+      "prev_prio=19 prev_state=S ==> next_comm=swapper/0 next_pid=0 next_prio=120\n"
+      "          <idle>-0       [000] d.h1.     4.576001: local_timer_entry: vector=236\n"
+      "          <idle>-0       [000] dNh1.     4.576007: local_timer_exit: vector=236\n";
+  const std::string to_hwlatd =
+      "       ktimers/0-15      [000] d..2.     4.576024: sched_switch: prev_comm=ktimers/0 prev_pid=15 "
+      "prev_prio=98 prev_state=S ==> next_comm=hwlatd next_pid=288 next_prio=120\n";
+  const auto woken = [](const std::string& who) {
+    return who + "     [000] d.h..     4.577027: local_timer_entry: vector=236\n" + who +
+           "     [000] d.h..     4.577028: hrtimer_expire_entry: hrtimer=000000000306ec40 "
+           "function=hrtimer_wakeup now=4577027819\n" +
+           who +
+           "     [000] d.h2.     4.577029: sched_waking: comm=punctum-jitter pid=289 prio=19 "
+           "target_cpu=000\n" +
+           who + "     [000] dNh..     4.577032: hrtimer_expire_exit: hrtimer=000000000306ec40\n" + who +
+           "     [000] dNh..     4.577033: local_timer_exit: vector=236\n" + who +
+           "     [000] d..2.     4.577036: sched_switch: prev_comm=x prev_pid=" +
+           who.substr(who.rfind('-') + 1) +
+           " prev_prio=120 prev_state=R+ ==> next_comm=punctum-jitter next_pid=289 next_prio=19\n";
+  };
+  const Verdict thread =
+      cause_of(tick, before + to_hwlatd + woken("          hwlatd-288"), at(4.57), at(4.58));
+  EXPECT_EQ(thread.cause, Cause::unknown) << "the firmware may have been there as well";
+  EXPECT_NE(thread.what.find("with hwlatd-288 on it"), std::string::npos) << thread.what;
+  const Verdict idle = cause_of(tick, before + woken("          <idle>-0"), at(4.57), at(4.58));
+  EXPECT_EQ(idle.cause, Cause::unknown);
+  EXPECT_EQ(idle.what.find("on it"), std::string::npos) << idle.what;
+}
+
 TEST(CauseOfALateTick, is_the_hypervisor_that_took_the_processor_during_an_interrupt) {
   const std::string trace =
       kAsleep +

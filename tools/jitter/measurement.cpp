@@ -287,7 +287,8 @@ tl::expected<Result, std::string> measure(const Wanted& wanted, const Work& work
   tell_place(0, result);
   if (wanted.cpu >= 0 && result.cpu != wanted.cpu) {  // another one's punctuality is not what was asked for
     rt::leave_real_time();
-    return tl::unexpected(fmt::format("--cpu: {}: the kernel does not let this process run there", wanted.cpu));
+    return tl::unexpected(
+        fmt::format("--cpu: {}: the kernel does not let this process run there", wanted.cpu));
   }
   for (const rt::RightFound& right : rights.table()) {
     if (right.required && !right.got) {

@@ -106,7 +106,7 @@ int compare(const jitter::Wanted& wanted, const std::vector<std::string>& tick) 
   }
   say("A: cyclictest, B: the loop of the core, in turns\n" +
       jitter::difference_text(*found, both->cyclictest, both->loop));
-  say(fmt::format("max{:>14.1f}{:>9.1f}\n", both->cyclictest.wake.max_us, both->loop.wake.max_us));
+  say(fmt::format("max{:>14.1f} {:>8.1f}\n", both->cyclictest.wake.max_us, both->loop.wake.max_us));
   return kDone;
 }
 

@@ -1146,6 +1146,25 @@ TEST(Summary, names_the_slot_of_a_late_tick) {
   EXPECT_NE(summary(r, 100).find("slot slow took 30000.0 us"), std::string::npos) << summary(r, 100);
 }
 
+TEST(Summary, keeps_its_numbers_apart_however_long_a_machine_stood) {
+  Result r = measured(1);
+  r.wake = {};
+  r.wake.longer = 2000;
+  r.wake.max_us = 1504138.7;
+  std::istringstream lines(summary(r, 100));
+  std::string line, number;
+  while (!line.starts_with("wake-up ")) {
+    ASSERT_TRUE(std::getline(lines, line));
+  }
+  std::istringstream words(line.substr(7));
+  int same = 0;
+  while (words >> number && number != "-") {
+    EXPECT_EQ(number, "1504138.7");
+    ++same;
+  }
+  EXPECT_EQ(same, 4) << "p50, p90, p99 and p99.9 of 2000";
+}
+
 TEST(Measurement, ends_at_the_first_wake_up_that_is_too_late) {
   Paused paused;
   Wanted wanted;

@@ -149,6 +149,13 @@ Finding interrupts(int cpu, const std::string& others, const std::string& root) 
   return f;
 }
 
+// nosmt leaves the first thread of each core: the loop's CPU has to be one of those. That one; -1: it is.
+int instead_of_sibling(int cpu, const rt::KernelFacts& facts, const std::string& root) {
+  const std::vector<int> core = rt::parse_cpu_list(
+      line_of(fmt::format("{}/sys/devices/system/cpu/cpu{}/topology/thread_siblings_list", root, cpu)));
+  return facts.smt_active && !core.empty() && core.front() != cpu ? core.front() : -1;
+}
+
 Finding balancer(const std::string& root) {
   Finding f{"no irqbalance", "it does not run"};
   if (runs("irqbalance", root)) {
@@ -341,6 +348,15 @@ std::vector<Finding> audit(int cpu, int priority, const tools::Scene* scene, con
   for (const rt::RightFound& right : rights.table()) {
     out.push_back(finding_of(right, cpu, others));
   }
+  if (const int first = instead_of_sibling(cpu, facts, root); first >= 0) {
+    for (Finding& f : out) {
+      f.mend.boot = f.name == "no SMT siblings" ? "" : f.mend.boot;  // it would take the loop's CPU away
+    }
+    out.push_back(
+        {.name = "first thread of a core",
+         .found = fmt::format("CPU {} is the second one of CPU {}: nosmt switches it off", cpu, first),
+         .remedy = fmt::format("audit and run with --cpu {}", first)});
+  }
   out.push_back(clock_source(root));
   out.push_back(swap_areas(root));
   out.push_back(interrupts(cpu, others, root));
@@ -431,6 +447,9 @@ std::map<std::string, std::string> plan(const std::vector<Finding>& findings) {
   if (!boot.empty()) {
     readme += "    update-grub           # without GRUB: append boot-line to the kernel's boot line\n";
   }
+  if (!udev.empty() || !limits.empty()) {
+    readme += "    groupadd -f punctum\n";
+  }
   if (!udev.empty()) {
     readme += "    udevadm control --reload && udevadm trigger\n";
   }
@@ -438,7 +457,7 @@ std::map<std::string, std::string> plan(const std::vector<Finding>& findings) {
     readme += "    systemctl enable --now punctum-machine\n";
   }
   if (!limits.empty()) {
-    readme += "    adduser USER punctum  # and log in again\n";
+    readme += "    usermod -aG punctum USER  # and log in again\n";
   }
   if (!boot.empty()) {
     readme += "    reboot\n";

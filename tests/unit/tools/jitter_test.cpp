@@ -341,6 +341,19 @@ TEST_F(FileMachine, keeps_interrupts_from_other_isolated_cpus_too) {
   EXPECT_EQ(finding("interrupts elsewhere", 3).mend.boot, "irqaffinity=0-2") << "none else is left";
 }
 
+TEST_F(FileMachine, does_not_switch_off_the_cpu_of_the_loop) {
+  file("sys/devices/system/cpu/online", "0-3\n");
+  file("sys/devices/system/cpu/smt/active", "1\n");
+  file("sys/devices/system/cpu/cpu2/topology/thread_siblings_list", "2-3\n");
+  file("sys/devices/system/cpu/cpu3/topology/thread_siblings_list", "2-3\n");
+  EXPECT_NE(finding("first thread of a core", 3).remedy.find("--cpu 2"), std::string::npos);
+  EXPECT_EQ(plan(audit(3, 80, nullptr, {.root = root_.string()}))["boot-line"].find("nosmt"),
+            std::string::npos);
+  const std::vector<Finding> of_first = audit(2, 80, nullptr, {.root = root_.string()});
+  EXPECT_TRUE(std::none_of(of_first.begin(), of_first.end(),
+                           [](const Finding& f) { return f.name == "first thread of a core"; }));
+}
+
 TEST_F(FileMachine, that_shows_no_cpus_is_not_taken_for_one_of_a_single_cpu) {
   EXPECT_NE(finding("CPUs").remedy, "");
 }

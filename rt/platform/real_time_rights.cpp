@@ -295,7 +295,7 @@ RightFound throttling(const RightsWanted& wanted, const KernelFacts& facts) {
     if (!right.got) {
       right.remedy =
           "only a loop that never sleeps meets it; to switch it off: "
-          "sysctl -w kernel.sched_rt_runtime_us=-1";
+          "echo -1 > /proc/sys/kernel/sched_rt_runtime_us";
     }
     return right;
   }

@@ -430,7 +430,12 @@ std::map<std::string, std::string> plan(const std::vector<Finding>& findings) {
     files["etc/security/limits.d/punctum.conf"] = kMade + text(limits);
   }
   if (!commands.empty()) {
-    files["etc/punctum/machine"] = std::string("#!/bin/sh\n") + kMade + text(commands);
+    // One that fails stops no other, and is not hidden by those after it.
+    std::string script = fmt::format("#!/bin/sh\n{}failed=0\n", kMade);
+    for (const std::string& command : commands) {
+      script += command + " || failed=1\n";
+    }
+    files["etc/punctum/machine"] = script + "exit $failed\n";
     // Before every run, for a CAN interface has an interrupt, and that a thread, only while it is up; buses
     // are brought up before network.target.
     files["etc/systemd/system/punctum-machine.service"] = fmt::format(

@@ -519,6 +519,17 @@ TEST_F(FilesOfDevices, are_mended_by_files_that_a_shell_can_read) {
   EXPECT_NE(limits.find("memlock unlimited"), std::string::npos);
   EXPECT_NE(files.at("etc/udev/rules.d/61-punctum-machine.rules").find("cpu_dma_latency"), std::string::npos);
   EXPECT_NE(files.at("README").find("- PREEMPT_RT kernel: install it"), std::string::npos);
+  const std::string done = (root_ / "done").string();
+  for (const bool fails : {false, true}) {
+    const std::string first = fails ? "no-such-command-here 2>/dev/null" : "true";
+    const fs::path other = root_ / (fails ? "fails" : "works");
+    Finding finding;
+    finding.remedy = "by a command";
+    finding.mend.command = first + "\necho 1 >> " + done;
+    ASSERT_TRUE(write_plan(plan({finding}), other.string()));
+    EXPECT_EQ(std::system(("sh " + (other / "etc/punctum/machine").string()).c_str()) != 0, fails);
+  }
+  EXPECT_EQ(output_of("cat " + done), "1\n1\n") << "what fails stops nothing else";
   EXPECT_TRUE(plan({}).size() == 1 && plan({}).contains("README")) << "nothing is missing";
 }
 

@@ -88,6 +88,24 @@ void limit_spinning() {
   ::setrlimit(RLIMIT_RTTIME, &limit);
 }
 
+// Whether the kernel would give it: a control group without real-time time refuses what the limits allow.
+bool priority_is_given(int level) {
+  rlimit limit = {};
+  sched_param before = {};
+  const int policy = ::sched_getscheduler(0);
+  if (policy < 0 || ::sched_getparam(0, &before) != 0 || ::getrlimit(RLIMIT_RTPRIO, &limit) != 0) {
+    return false;
+  }
+  raise_limit(RLIMIT_RTPRIO, true);
+  const sched_param parameter{.sched_priority = level};
+  const bool given = ::sched_setscheduler(0, SCHED_FIFO, &parameter) == 0;
+  if (given) {
+    ::sched_setscheduler(0, policy, &before);
+  }
+  ::setrlimit(RLIMIT_RTPRIO, &limit);
+  return given;
+}
+
 RightFound priority(const RightsWanted& wanted, bool apply) {
   RightFound right{.name = "SCHED_FIFO priority", .required = true};
   const int level = std::clamp(wanted.priority, 1, 98);  // 99 belongs to the kernel's own threads
@@ -99,14 +117,17 @@ RightFound priority(const RightsWanted& wanted, bool apply) {
     right.got = ::sched_setscheduler(0, SCHED_FIFO | SCHED_RESET_ON_FORK, &parameter) == 0;
     right.detail = right.got ? "SCHED_FIFO " + text : reason(errno);
   } else {
-    right.got = has_capability(kCapSysNice) || limit >= static_cast<rlim_t>(level);
-    right.detail = right.got ? "allowed up to SCHED_FIFO " + text : "not allowed to this user";
+    const bool allowed = has_capability(kCapSysNice) || limit >= static_cast<rlim_t>(level);
+    right.got = allowed && priority_is_given(level);
+    right.detail = right.got ? "allowed up to SCHED_FIFO " + text
+                   : allowed ? "refused by the kernel"
+                             : "not allowed to this user";
   }
   if (right.got) {
     return right;
   }
   right.remedy =
-      has_capability(kCapSysNice)
+      has_capability(kCapSysNice) || limit >= static_cast<rlim_t>(level)
           ? "the control group grants no real-time time: see cpu.rt_runtime_us of its cgroup"
           : "/etc/security/limits.d/punctum.conf: '@punctum - rtprio 95' and join group punctum; or "
             "setcap cap_sys_nice,cap_ipc_lock=ep punctum-core; or systemd LimitRTPRIO=95";
@@ -179,13 +200,13 @@ RightFound affinity(const RightsWanted& wanted, const KernelFacts& facts, bool a
   if (possible) {
     CPU_SET(wanted.cpu, &set);
   }
-  if (apply) {
-    possible = possible && ::sched_setaffinity(0, sizeof set, &set) == 0;
-  } else {
-    cpu_set_t allowed;
-    CPU_ZERO(&allowed);
-    possible =
-        possible && ::sched_getaffinity(0, sizeof allowed, &allowed) == 0 && CPU_ISSET(wanted.cpu, &allowed);
+  // No thread begins on an isolated CPU, and yet it may go there: only the kernel's answer tells.
+  cpu_set_t before;
+  CPU_ZERO(&before);
+  possible = possible && ::sched_getaffinity(0, sizeof before, &before) == 0 &&
+             ::sched_setaffinity(0, sizeof set, &set) == 0;
+  if (possible && !apply) {
+    ::sched_setaffinity(0, sizeof before, &before);
   }
   right.got = possible;
   right.detail = possible ? text : text + " is not available";
@@ -274,7 +295,7 @@ RightFound throttling(const RightsWanted& wanted, const KernelFacts& facts) {
     if (!right.got) {
       right.remedy =
           "only a loop that never sleeps meets it; to switch it off: "
-          "sysctl -w kernel.sched_rt_runtime_us=-1";
+          "echo -1 > /proc/sys/kernel/sched_rt_runtime_us";
     }
     return right;
   }

@@ -37,7 +37,8 @@ class RealTimeRights {
   // Takes what it can get; for the thread that will run the loop, after all else is set up and mapped. Not
   // for a virtual clock, which never sleeps: a real-time priority would keep everyone else from the CPU.
   [[nodiscard]] static RealTimeRights acquire(const RightsWanted& wanted);
-  // The same table without changing anything: what acquire() would get, for this user and these limits.
+  // The same table: what acquire() would get, for this user and these limits. Nothing is changed at its end;
+  // the calling thread is on the CPU for a moment.
   [[nodiscard]] static RealTimeRights examine(const RightsWanted& wanted);
 
   RealTimeRights(RealTimeRights&& other) noexcept;

@@ -13,6 +13,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <sstream>
 #include <utility>
 
@@ -50,10 +51,21 @@ Finding clock_source(const std::string& root) {
       line_of(root + "/sys/devices/system/clocksource/clocksource0/current_clocksource");
   Finding f{"clock source", source.empty() ? "cannot be read" : source, "", false};
   // Read in user space, without a system call; kvm-clock and the like are virtual machines' own of that kind.
-  if (source != "tsc" && source != "kvm-clock" && source != "arch_sys_counter" &&
-      source != "hyperv_clocksource_tsc_page") {
-    f.remedy = "boot with clocksource=tsc tsc=reliable, if the processor's counter is invariant";
-    f.mend.boot = "clocksource=tsc tsc=reliable";
+  if (source == "tsc" || source == "kvm-clock" || source == "arch_sys_counter" ||
+      source == "hyperv_clocksource_tsc_page") {
+    return f;
+  }
+  std::istringstream offered(
+      line_of(root + "/sys/devices/system/clocksource/clocksource0/available_clocksource"));
+  const std::vector<std::string> sources{std::istream_iterator<std::string>(offered), {}};
+  if (std::find(sources.begin(), sources.end(), "tsc") != sources.end()) {
+    f.remedy = "boot with clocksource=tsc";
+    f.mend.boot = "clocksource=tsc";
+  } else {  // to trust what the kernel has found to go wrong is no file's decision
+    f.remedy =
+        "the kernel offers no tsc: dmesg says why (grep -i tsc); tsc=reliable only where its maker says that "
+        "the "
+        "processor's counter is invariant";
   }
   return f;
 }
@@ -135,6 +147,13 @@ Finding interrupts(int cpu, const std::string& others, const std::string& root) 
         others, cpu);
   }
   return f;
+}
+
+// nosmt leaves the first thread of each core: the loop's CPU has to be one of those. That one; -1: it is.
+int instead_of_sibling(int cpu, const rt::KernelFacts& facts, const std::string& root) {
+  const std::vector<int> core = rt::parse_cpu_list(
+      line_of(fmt::format("{}/sys/devices/system/cpu/cpu{}/topology/thread_siblings_list", root, cpu)));
+  return facts.smt_active && !core.empty() && core.front() != cpu ? core.front() : -1;
 }
 
 Finding balancer(const std::string& root) {
@@ -304,16 +323,39 @@ Finding finding_of(const rt::RightFound& right, int cpu, const std::string& othe
 
 std::vector<Finding> audit(int cpu, int priority, const tools::Scene* scene, const Machine& machine) {
   const std::string& root = machine.root;
-  std::vector<int> other_cpus = rt::read_kernel_facts(root).online_cpus;
+  const rt::KernelFacts facts = rt::read_kernel_facts(root);
+  std::vector<int> other_cpus = facts.online_cpus;
   std::erase(other_cpus, cpu);
+  // Another isolated CPU is kept free for something, too, unless no other one is left.
+  if (std::vector<int> shared = other_cpus;
+      std::erase_if(shared, [&](int one) {
+        return std::count(facts.isolated_cpus.begin(), facts.isolated_cpus.end(), one) > 0;
+      }) < other_cpus.size()) {
+    other_cpus = std::move(shared);
+  }
   const std::string others = cpu >= 0 ? cpu_list(other_cpus) : "";
   rt::RightsWanted wanted;
   wanted.cpu = cpu;
   wanted.priority = priority;
   const auto rights = rt::RealTimeRights::examine(wanted);
   std::vector<Finding> out;
+  if (facts.online_cpus.empty()) {
+    out.push_back(
+        {.name = "CPUs",
+         .found = "/sys/devices/system/cpu/online cannot be read: what is said of CPUs below is a guess",
+         .remedy = "audit outside of this container, where /sys is mounted"});
+  }
   for (const rt::RightFound& right : rights.table()) {
     out.push_back(finding_of(right, cpu, others));
+  }
+  if (const int first = instead_of_sibling(cpu, facts, root); first >= 0) {
+    for (Finding& f : out) {
+      f.mend.boot = f.name == "no SMT siblings" ? "" : f.mend.boot;  // it would take the loop's CPU away
+    }
+    out.push_back(
+        {.name = "first thread of a core",
+         .found = fmt::format("CPU {} is the second one of CPU {}: nosmt switches it off", cpu, first),
+         .remedy = fmt::format("audit and run with --cpu {}", first)});
   }
   out.push_back(clock_source(root));
   out.push_back(swap_areas(root));
@@ -388,11 +430,18 @@ std::map<std::string, std::string> plan(const std::vector<Finding>& findings) {
     files["etc/security/limits.d/punctum.conf"] = kMade + text(limits);
   }
   if (!commands.empty()) {
-    files["etc/punctum/machine"] = std::string("#!/bin/sh\n") + kMade + text(commands);
+    // One that fails stops no other, and is not hidden by those after it.
+    std::string script = fmt::format("#!/bin/sh\n{}failed=0\n", kMade);
+    for (const std::string& command : commands) {
+      script += command + " || failed=1\n";
+    }
+    files["etc/punctum/machine"] = script + "exit $failed\n";
+    // Before every run, for a CAN interface has an interrupt, and that a thread, only while it is up; buses
+    // are brought up before network.target.
     files["etc/systemd/system/punctum-machine.service"] = fmt::format(
-        "{}[Unit]\nDescription=This machine made ready for punctum\n\n[Service]\nType=oneshot\n"
-        "RemainAfterExit=yes\nExecStart=/bin/sh "
-        "/etc/punctum/machine\n\n[Install]\nWantedBy=multi-user.target\n",
+        "{}[Unit]\nDescription=This machine made ready for punctum\nAfter=network.target "
+        "punctum-bus@can0.service punctum-bus@can1.service\n\n[Service]\nType=oneshot\n"
+        "ExecStart=/bin/sh /etc/punctum/machine\n\n[Install]\nWantedBy=multi-user.target\n",
         kMade);
     for (const char* unit : {"punctum@", "punctum-can@"}) {
       files[fmt::format("etc/systemd/system/{}.service.d/machine.conf", unit)] =
@@ -403,6 +452,9 @@ std::map<std::string, std::string> plan(const std::vector<Finding>& findings) {
   if (!boot.empty()) {
     readme += "    update-grub           # without GRUB: append boot-line to the kernel's boot line\n";
   }
+  if (!udev.empty() || !limits.empty()) {
+    readme += "    groupadd -f punctum\n";
+  }
   if (!udev.empty()) {
     readme += "    udevadm control --reload && udevadm trigger\n";
   }
@@ -410,7 +462,7 @@ std::map<std::string, std::string> plan(const std::vector<Finding>& findings) {
     readme += "    systemctl enable --now punctum-machine\n";
   }
   if (!limits.empty()) {
-    readme += "    adduser USER punctum  # and log in again\n";
+    readme += "    usermod -aG punctum USER  # and log in again\n";
   }
   if (!boot.empty()) {
     readme += "    reboot\n";

@@ -275,8 +275,8 @@ std::string difference_text(const std::vector<QuantileDifference>& found, const 
   }
   out += "wake-up, us      A        B    B - A (95 % of all together)\n";
   for (const QuantileDifference& q : found) {
-    out += fmt::format("p{:<8}{:>9.1f}{:>9.1f}{:>9.1f}  {:.1f} .. {:.1f}{}\n", 100 * q.part, q.a_us, q.b_us,
-                       q.b_us - q.a_us, q.low_us, q.high_us, q.differs ? "  differs" : "");
+    out += fmt::format("p{:<8} {:>8.1f} {:>8.1f} {:>8.1f}  {:.1f} .. {:.1f}{}\n", 100 * q.part, q.a_us,
+                       q.b_us, q.b_us - q.a_us, q.low_us, q.high_us, q.differs ? "  differs" : "");
   }
   const bool any = std::any_of(found.begin(), found.end(), [](const auto& q) { return q.differs; });
   return out + (any ? "they differ\n" : "no difference is shown\n");

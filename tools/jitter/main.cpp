@@ -1,6 +1,7 @@
 // punctum-jitter: how punctually this machine wakes the loop of the core.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <sched.h>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -15,10 +16,10 @@
 #include <optional>
 #include <string>
 #include <system_error>
-#include <thread>
 #include <utility>
 #include <vector>
 
+#include "rt/platform/kernel_facts.hpp"
 #include "tools/jitter/answer.hpp"
 #include "tools/jitter/audit.hpp"
 #include "tools/jitter/comparison.hpp"
@@ -105,7 +106,7 @@ int compare(const jitter::Wanted& wanted, const std::vector<std::string>& tick) 
   }
   say("A: cyclictest, B: the loop of the core, in turns\n" +
       jitter::difference_text(*found, both->cyclictest, both->loop));
-  say(fmt::format("max{:>14.1f}{:>9.1f}\n", both->cyclictest.wake.max_us, both->loop.wake.max_us));
+  say(fmt::format("max{:>14.1f} {:>8.1f}\n", both->cyclictest.wake.max_us, both->loop.wake.max_us));
   return kDone;
 }
 
@@ -211,7 +212,9 @@ int main_or_throw(int argc, char** argv) {
   std::string station, gpio, audited, plan_folder;
   std::vector<std::string> tick;
   bool loaded = false, beside = false;
-  const int last_cpu = static_cast<int>(std::max(1U, std::thread::hardware_concurrency())) - 1;
+  // Where siblings are switched off, numbers are left out.
+  const std::vector<int> online = rt::read_kernel_facts().online_cpus;
+  const int last_cpu = online.empty() ? CPU_SETSIZE - 1 : online.back();
   const CLI::Option* rate =
       app.add_option("--rate", wanted.rate_Hz, "ticks per second (default: 1000, or the scene's)")
           ->type_name("HZ")

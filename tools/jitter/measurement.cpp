@@ -270,7 +270,6 @@ std::string machine(int cpu) {
 tl::expected<Result, std::string> measure(const Wanted& wanted, const Work& work) {
   Result result;
   result.rate_Hz = wanted.rate_Hz;
-  result.cpu = wanted.cpu;
   result.machine = machine(wanted.cpu);
   const auto period_ns = static_cast<std::int64_t>(std::llround(1e9 / wanted.rate_Hz));
   rt::MonotonicClock monotonic;
@@ -286,6 +285,11 @@ tl::expected<Result, std::string> measure(const Wanted& wanted, const Work& work
   const auto rights = rt::RealTimeRights::acquire(rights_wanted);
   result.degraded = rights.degraded();
   tell_place(0, result);
+  if (wanted.cpu >= 0 && result.cpu != wanted.cpu) {  // another one's punctuality is not what was asked for
+    rt::leave_real_time();
+    return tl::unexpected(
+        fmt::format("--cpu: {}: the kernel does not let this process run there", wanted.cpu));
+  }
   for (const rt::RightFound& right : rights.table()) {
     if (right.required && !right.got) {
       result.missing.push_back(fmt::format("{}: {}", right.name, right.remedy));

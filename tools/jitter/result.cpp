@@ -249,9 +249,9 @@ std::string quantile_line(const char* name, const Distribution& d) {
   for (const auto& [label, part] : kQuantiles) {
     // Fewer entries than it takes for one beyond the quantile tell only the largest.
     const bool told = static_cast<double>(d.entries()) * (1 - part) >= 1;
-    out += told ? fmt::format("{:>9.1f}", d.quantile_us(part)) : fmt::format("{:>9}", "-");
+    out += told ? fmt::format(" {:>8.1f}", d.quantile_us(part)) : fmt::format("{:>9}", "-");
   }
-  return out + (d.entries() > 0 ? fmt::format("{:>9.1f}\n", d.max_us) : fmt::format("{:>9}\n", "-"));
+  return out + (d.entries() > 0 ? fmt::format(" {:>8.1f}\n", d.max_us) : fmt::format("{:>9}\n", "-"));
 }
 
 // One line per class of latency, classes a quarter of an octave wide; the bars are as long as the logarithm
@@ -324,7 +324,7 @@ std::string late_text(const Result& r) {
                      r.unexplained > 0 ? fmt::format(", {} more not", r.unexplained) : "");
   for (const auto& [cause, kind] : list) {
     const Explained& e = *kind.latest;
-    out += fmt::format("{:>6} x {:<15}{:>9.1f} us late at {:.4f} s: {}{}{}\n", kind.count, name_of(cause),
+    out += fmt::format("{:>6} x {:<15} {:>8.1f} us late at {:.4f} s: {}{}{}\n", kind.count, name_of(cause),
                        1e-3 * static_cast<double>(lateness(e)),
                        1e-9 * static_cast<double>(e.tick.release_ns - r.first_release_ns), e.verdict.what,
                        e.verdict.proof == Proof::none

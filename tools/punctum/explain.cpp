@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <thread>
 
 #include "rt/control/device_limits.hpp"
 #include "rt/forces/list.hpp"
@@ -414,9 +413,10 @@ int check(const Scene& s, std::string& text) {
         good;
   }
   if (s.vision_cpu >= 0) {  // that of the core is one of its rights
-    const int cpus = static_cast<int>(std::thread::hardware_concurrency());
-    text += fmt::format("  {} {:<18} CPU {} of {}{}\n", s.vision_cpu < cpus ? "ok  " : "note", "vision.cpu",
-                        s.vision_cpu, cpus, s.vision_cpu < cpus ? "" : ": vision runs wherever it may");
+    const std::vector<int> online = rt::read_kernel_facts().online_cpus;
+    const bool there = std::count(online.begin(), online.end(), s.vision_cpu) > 0;
+    text += fmt::format("  {} {:<18} CPU {} of {}{}\n", there ? "ok  " : "note", "vision.cpu", s.vision_cpu,
+                        online.size(), there ? "" : ": vision runs wherever it may");
   }
 
   // Without the required rights the core runs degraded, and says so.

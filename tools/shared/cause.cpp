@@ -225,6 +225,10 @@ class Processor {
                             ? ", in a section that is not preempted"
                             : "")};
   }
+  // Whose thread it would run if it were not silent; empty: nobody's.
+  [[nodiscard]] std::string whose() const {
+    return task_.pid > 0 && task_.pid != tid_ ? fmt::format("{}-{}", task_.comm, task_.pid) : "";
+  }
   [[nodiscard]] int faults() const { return faults_; }
   [[nodiscard]] bool known() const { return task_.pid >= 0; }
 
@@ -261,6 +265,7 @@ std::int64_t nmi_ns(const TraceEvent& e) {
 
 struct Account {
   std::map<Key, std::int64_t> ns;
+  std::map<std::string, std::int64_t> silent_ns;  // with whose thread on the processor
   int faults = 0;
   bool whole = true;  // the trace reaches back to the beginning
   int cpu = -1;       // where the loop ran at the end of the tick
@@ -277,6 +282,12 @@ void add_piece(const std::vector<TraceEvent>& events, int cpu, std::int64_t from
   const auto key = [&](const TraceEvent* next, std::int64_t gap_ns) {
     const Key doing = processor.known() ? processor.doing(timer_due, next, gap_ns) : kSilent;
     return doing == kOwn && !awake ? kSilent : doing;
+  };
+  const auto add = [&](const Key& doing, std::int64_t ns) {
+    account.ns[doing] += ns;
+    if (doing == kSilent) {
+      account.silent_ns[processor.whose()] += ns;
+    }
   };
   for (const TraceEvent& e : events) {
     if (e.cpu != cpu) {
@@ -295,7 +306,7 @@ void add_piece(const std::vector<TraceEvent>& events, int cpu, std::int64_t from
       if (in_nmi > 0) {
         account.ns[{Cause::interrupt, fmt::format("NMI {}", e.args.substr(0, e.args.find('(')))}] += in_nmi;
       }
-      account.ns[key(&e, e.t_ns - at)] += e.t_ns - at - in_nmi;
+      add(key(&e, e.t_ns - at), e.t_ns - at - in_nmi);
       at = e.t_ns;
     }
     processor.see(e);
@@ -304,7 +315,7 @@ void add_piece(const std::vector<TraceEvent>& events, int cpu, std::int64_t from
     account.whole = account.whole && processor.known();
     faults_before = processor.faults();
   }
-  account.ns[key(nullptr, to - at)] += std::max<std::int64_t>(0, to - at);
+  add(key(nullptr, to - at), std::max<std::int64_t>(0, to - at));
   account.faults += processor.faults() - faults_before;
 }
 
@@ -419,9 +430,10 @@ std::string told_as_stolen(std::int64_t ns, const Counters& after) {
   return fmt::format("{} us counted as steal{}", ns / kNs, after.stolen_ns ? "" : ", in steps of 10 ms");
 }
 
-// Time in which the processor did nothing that its kernel knows of.
+// Time in which the processor did nothing that its kernel knows of. whose: the thread that was on it most of
+// that time, which may have switched interrupts off; empty: none.
 Verdict explain_silence(std::int64_t silent_ns, const Counters& before, const Counters& after,
-                        const Surroundings& surroundings) {
+                        const Surroundings& surroundings, const std::string& whose = "") {
   Verdict v;
   v.us = 1e-3 * static_cast<double>(silent_ns);
   // In a long interval they may have been another tick's.
@@ -439,9 +451,11 @@ Verdict explain_silence(std::int64_t silent_ns, const Counters& before, const Co
     v.proof = Proof::counted;
     return v;
   }
-  v.what = fmt::format("{:.0f} us in which the processor took no interrupt: ", v.us);
+  v.what = fmt::format("{:.0f} us in which the processor took no interrupt{}: ", v.us,
+                       whose.empty() ? "" : ", with " + whose + " on it");
   if (!surroundings.virtual_machine) {
-    v.what += "interrupts switched off, the firmware or the way out of a sleep";
+    v.what += whose.empty() ? "interrupts switched off, the firmware or the way out of a sleep"
+                            : "interrupts switched off, or the firmware";
   } else if (after.stolen_ns) {
     v.what += fmt::format("work of the hypervisor, or interrupts switched off; {} within {} ms around it",
                           told_as_stolen(stolen, after), (after.t_ns - before.t_ns) / kMs_ns);
@@ -539,7 +553,10 @@ Verdict explain(const Episode& tick, const std::vector<TraceEvent>& events, cons
     return v;
   }
   if (most->first == Cause::unknown) {
-    return explain_silence(most->second, before, after, surroundings);
+    const auto on_it = std::max_element(account.silent_ns.begin(), account.silent_ns.end(),
+                                        [](const auto& a, const auto& b) { return a.second < b.second; });
+    const bool mostly = on_it != account.silent_ns.end() && 2 * on_it->second >= most->second;
+    return explain_silence(most->second, before, after, surroundings, mostly ? on_it->first : "");
   }
   const Key* largest = nullptr;
   std::int64_t largest_ns = -1;

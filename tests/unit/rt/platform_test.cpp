@@ -1,14 +1,22 @@
 // What the machine is asked for, and what is said when it does not give it.
 #include <gtest/gtest.h>
+#include <linux/filter.h>
+#include <linux/seccomp.h>
 #include <sched.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cerrno>
+#include <cstddef>
 #include <filesystem>
 #include <fstream>
 #include <functional>
 #include <memory>
+#include <string>
 
 #include "rt/platform/kernel_facts.hpp"
 #include "rt/platform/real_time_rights.hpp"
@@ -154,6 +162,72 @@ TEST(RealTimeRights, examining_changes_nothing) {
               const int policy = ::sched_getscheduler(0);
               const RealTimeRights rights = RealTimeRights::examine({.priority = 10, .cpu = 0});
               return ::sched_getscheduler(0) == policy && !rights.table().empty() ? 0 : 1;
+            }),
+            0);
+}
+
+const RightFound& right_named(const RealTimeRights& rights, const std::string& name) {
+  return *std::find_if(rights.table().begin(), rights.table().end(),
+                       [&](const RightFound& right) { return right.name == name; });
+}
+
+// As of a process on a machine with isolcpus=: it begins on the others. The kernel's own answer is the truth.
+TEST(RealTimeRights, examining_tells_of_a_cpu_what_the_kernel_says_when_it_is_asked_for) {
+  const auto goes_to = [](int cpu) {
+    return in_child([cpu] {
+             cpu_set_t set;
+             CPU_ZERO(&set);
+             CPU_SET(cpu, &set);
+             return ::sched_setaffinity(0, sizeof set, &set) == 0 ? 1 : 0;
+           }) == 1;
+  };
+  int first = 0;
+  while (!goes_to(first)) {
+    ++first;
+  }
+  for (int cpu = 0; cpu <= static_cast<int>(::sysconf(_SC_NPROCESSORS_CONF)); ++cpu) {
+    EXPECT_EQ(in_child([&] {
+                cpu_set_t narrow, after;
+                CPU_ZERO(&narrow);
+                CPU_SET(first, &narrow);
+                if (::sched_setaffinity(0, sizeof narrow, &narrow) != 0) {
+                  return 2;
+                }
+                const bool got =
+                    right_named(RealTimeRights::examine({.priority = 10, .cpu = cpu}), "CPU affinity").got;
+                if (::sched_getaffinity(0, sizeof after, &after) != 0 || !CPU_EQUAL(&narrow, &after)) {
+                  return 3;
+                }
+                return got ? 1 : 0;
+              }),
+              goes_to(cpu) ? 1 : 0)
+        << cpu;
+  }
+}
+
+// As in a control group without real-time time, or in a container: limits allow it, and the kernel refuses.
+TEST(RealTimeRights, examining_tells_of_a_priority_that_the_kernel_refuses) {
+  EXPECT_EQ(in_child([] {
+              sock_filter program[] = {
+                  BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr)),
+                  BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, SYS_sched_setscheduler, 0, 1),
+                  BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | EPERM),
+                  BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW),
+              };
+              const sock_fprog filter{.len = 4, .filter = program};
+              rlimit before = {}, after = {};
+              if (::prctl(PR_SET_NO_NEW_PRIVS, 1UL, 0UL, 0UL, 0UL) != 0 ||
+                  ::prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &filter) != 0 ||
+                  ::getrlimit(RLIMIT_RTPRIO, &before) != 0) {
+                return 1;
+              }
+              const RealTimeRights examined = RealTimeRights::examine({.priority = 10});
+              if (::getrlimit(RLIMIT_RTPRIO, &after) != 0 || after.rlim_cur != before.rlim_cur) {
+                return 2;
+              }
+              const RightFound& told = right_named(examined, "SCHED_FIFO priority");
+              const RealTimeRights acquired = RealTimeRights::acquire({.priority = 10});
+              return told.got || right_named(acquired, told.name).got || told.remedy.empty() ? 3 : 0;
             }),
             0);
 }

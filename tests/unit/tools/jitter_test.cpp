@@ -1,6 +1,7 @@
 // Results of punctum-jitter: distributions by hand, differences between random measurements whose truth is
 // known, machines made of files, and the loop itself for a moment.
 #include <gtest/gtest.h>
+#include <sched.h>
 #include <signal.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
@@ -310,6 +311,10 @@ TEST_F(FileMachine, is_told_what_is_not_ready_and_what_mends_it) {
   file("sys/devices/system/cpu/online", "0-63\n");
   EXPECT_NE(finding("no swap").remedy.find("swapoff"), std::string::npos);
   EXPECT_NE(finding("clock source").remedy.find("tsc"), std::string::npos);
+  EXPECT_EQ(finding("clock source").mend.boot, "")
+      << "the kernel has given it up, and no file may overrule that";
+  file("sys/devices/system/clocksource/clocksource0/available_clocksource", "tsc hpet acpi_pm \n");
+  EXPECT_EQ(finding("clock source").mend.boot, "clocksource=tsc");
   EXPECT_NE(finding("interrupts elsewhere", 3).remedy.find("irqaffinity=0-2,4-63"), std::string::npos);
   EXPECT_NE(finding("interrupts elsewhere", 32).remedy, "");
   EXPECT_EQ(finding("interrupts elsewhere", 4).remedy, "");
@@ -325,6 +330,32 @@ TEST_F(FileMachine, is_told_what_is_not_ready_and_what_mends_it) {
   EXPECT_NE(served.remedy.find("echo 0-3,5-63 > /proc/irq/NUMBER/smp_affinity_list"), std::string::npos)
       << served.remedy;
   EXPECT_NE(finding("interrupts elsewhere", -1).remedy, "");
+}
+
+TEST_F(FileMachine, keeps_interrupts_from_other_isolated_cpus_too) {
+  file("proc/irq/default_smp_affinity", "f\n");
+  file("sys/devices/system/cpu/online", "0-3\n");
+  file("sys/devices/system/cpu/isolated", "2-3\n");
+  EXPECT_EQ(finding("interrupts elsewhere", 3).mend.boot, "irqaffinity=0-1");
+  file("sys/devices/system/cpu/isolated", "0-2\n");
+  EXPECT_EQ(finding("interrupts elsewhere", 3).mend.boot, "irqaffinity=0-2") << "none else is left";
+}
+
+TEST_F(FileMachine, does_not_switch_off_the_cpu_of_the_loop) {
+  file("sys/devices/system/cpu/online", "0-3\n");
+  file("sys/devices/system/cpu/smt/active", "1\n");
+  file("sys/devices/system/cpu/cpu2/topology/thread_siblings_list", "2-3\n");
+  file("sys/devices/system/cpu/cpu3/topology/thread_siblings_list", "2-3\n");
+  EXPECT_NE(finding("first thread of a core", 3).remedy.find("--cpu 2"), std::string::npos);
+  EXPECT_EQ(plan(audit(3, 80, nullptr, {.root = root_.string()}))["boot-line"].find("nosmt"),
+            std::string::npos);
+  const std::vector<Finding> of_first = audit(2, 80, nullptr, {.root = root_.string()});
+  EXPECT_TRUE(std::none_of(of_first.begin(), of_first.end(),
+                           [](const Finding& f) { return f.name == "first thread of a core"; }));
+}
+
+TEST_F(FileMachine, that_shows_no_cpus_is_not_taken_for_one_of_a_single_cpu) {
+  EXPECT_NE(finding("CPUs").remedy, "");
 }
 
 TEST_F(FileMachine, that_is_ready_needs_nothing) {
@@ -479,11 +510,26 @@ TEST_F(FilesOfDevices, are_mended_by_files_that_a_shell_can_read) {
        {"swapoff -a", "ethtool -C eth0", "chrt -f -p 85", "xhci_hcd", "kernel.sched_rt_runtime_us=-1"}) {
     EXPECT_NE(machine.find(word), std::string::npos) << word;
   }
+  const std::string& unit = files.at("etc/systemd/system/punctum-machine.service");
+  EXPECT_NE(unit.find("After=network.target punctum-bus@can0.service"), std::string::npos)
+      << "an interface that is down has no interrupt";
+  EXPECT_EQ(unit.find("RemainAfterExit"), std::string::npos) << "again with each run";
   const std::string& limits = files.at("etc/security/limits.d/punctum.conf");
   EXPECT_NE(limits.find("rtprio 95"), std::string::npos);
   EXPECT_NE(limits.find("memlock unlimited"), std::string::npos);
   EXPECT_NE(files.at("etc/udev/rules.d/61-punctum-machine.rules").find("cpu_dma_latency"), std::string::npos);
   EXPECT_NE(files.at("README").find("- PREEMPT_RT kernel: install it"), std::string::npos);
+  const std::string done = (root_ / "done").string();
+  for (const bool fails : {false, true}) {
+    const std::string first = fails ? "no-such-command-here 2>/dev/null" : "true";
+    const fs::path other = root_ / (fails ? "fails" : "works");
+    Finding finding;
+    finding.remedy = "by a command";
+    finding.mend.command = first + "\necho 1 >> " + done;
+    ASSERT_TRUE(write_plan(plan({finding}), other.string()));
+    EXPECT_EQ(std::system(("sh " + (other / "etc/punctum/machine").string()).c_str()) != 0, fails);
+  }
+  EXPECT_EQ(output_of("cat " + done), "1\n1\n") << "what fails stops nothing else";
   EXPECT_TRUE(plan({}).size() == 1 && plan({}).contains("README")) << "nothing is missing";
 }
 
@@ -718,6 +764,13 @@ class Paused {
   int ask_ = -1;
 };
 
+TEST(Measurement, on_another_cpu_than_the_one_asked_for_is_refused) {
+  const auto result = measure({.seconds = 0.1, .cpu = CPU_SETSIZE - 1});
+  ASSERT_FALSE(result);
+  EXPECT_NE(result.error().find("--cpu"), std::string::npos);
+  EXPECT_EQ(sched_getscheduler(0) & ~SCHED_RESET_ON_FORK, SCHED_OTHER);
+}
+
 TEST(Measurement, tells_a_wake_up_later_than_many_periods_from_the_release_it_slept_for) {
   Paused paused;
   Wanted wanted;
@@ -912,6 +965,45 @@ TEST(CauseOfALateTick, is_silence_that_only_a_counter_names) {
       << "another tick's, perhaps";
 }
 
+// As Linux 7.3 with PREEMPT_RT traced it, while its own tracer hwlat kept interrupts off for 1 ms; timerlat's
+// stack of the same showed hwlatd's kthread_fn.
+TEST(CauseOfALateTick, is_silence_with_a_thread_that_is_named) {
+  Episode tick;
+  tick.release_ns = 4'576'568'858;
+  tick.wake_ns = tick.release_ns + 470'305;
+  tick.end_ns = tick.release_ns + 471'168;
+  tick.tid = 289;
+  const std::string before =
+      "  punctum-jitter-289     [000] d..2.     4.575680: sched_switch: prev_comm=punctum-jitter "
+      "prev_pid=289 "
+      "prev_prio=19 prev_state=S ==> next_comm=swapper/0 next_pid=0 next_prio=120\n"
+      "          <idle>-0       [000] d.h1.     4.576001: local_timer_entry: vector=236\n"
+      "          <idle>-0       [000] dNh1.     4.576007: local_timer_exit: vector=236\n";
+  const std::string to_hwlatd =
+      "       ktimers/0-15      [000] d..2.     4.576024: sched_switch: prev_comm=ktimers/0 prev_pid=15 "
+      "prev_prio=98 prev_state=S ==> next_comm=hwlatd next_pid=288 next_prio=120\n";
+  const auto woken = [](const std::string& who) {
+    return who + "     [000] d.h..     4.577027: local_timer_entry: vector=236\n" + who +
+           "     [000] d.h..     4.577028: hrtimer_expire_entry: hrtimer=000000000306ec40 "
+           "function=hrtimer_wakeup now=4577027819\n" +
+           who +
+           "     [000] d.h2.     4.577029: sched_waking: comm=punctum-jitter pid=289 prio=19 "
+           "target_cpu=000\n" +
+           who + "     [000] dNh..     4.577032: hrtimer_expire_exit: hrtimer=000000000306ec40\n" + who +
+           "     [000] dNh..     4.577033: local_timer_exit: vector=236\n" + who +
+           "     [000] d..2.     4.577036: sched_switch: prev_comm=x prev_pid=" +
+           who.substr(who.rfind('-') + 1) +
+           " prev_prio=120 prev_state=R+ ==> next_comm=punctum-jitter next_pid=289 next_prio=19\n";
+  };
+  const Verdict thread =
+      cause_of(tick, before + to_hwlatd + woken("          hwlatd-288"), at(4.57), at(4.58));
+  EXPECT_EQ(thread.cause, Cause::unknown) << "the firmware may have been there as well";
+  EXPECT_NE(thread.what.find("with hwlatd-288 on it"), std::string::npos) << thread.what;
+  const Verdict idle = cause_of(tick, before + woken("          <idle>-0"), at(4.57), at(4.58));
+  EXPECT_EQ(idle.cause, Cause::unknown);
+  EXPECT_EQ(idle.what.find("on it"), std::string::npos) << idle.what;
+}
+
 TEST(CauseOfALateTick, is_the_hypervisor_that_took_the_processor_during_an_interrupt) {
   const std::string trace =
       kAsleep +
@@ -1076,6 +1168,25 @@ TEST(Summary, names_the_slot_of_a_late_tick) {
   e.tick.longest_slot_ns = 30'000'000;
   r.explained.push_back(e);
   EXPECT_NE(summary(r, 100).find("slot slow took 30000.0 us"), std::string::npos) << summary(r, 100);
+}
+
+TEST(Summary, keeps_its_numbers_apart_however_long_a_machine_stood) {
+  Result r = measured(1);
+  r.wake = {};
+  r.wake.longer = 2000;
+  r.wake.max_us = 1504138.7;
+  std::istringstream lines(summary(r, 100));
+  std::string line, number;
+  while (!line.starts_with("wake-up ")) {
+    ASSERT_TRUE(std::getline(lines, line));
+  }
+  std::istringstream words(line.substr(7));
+  int same = 0;
+  while (words >> number && number != "-") {
+    EXPECT_EQ(number, "1504138.7");
+    ++same;
+  }
+  EXPECT_EQ(same, 4) << "p50, p90, p99 and p99.9 of 2000";
 }
 
 TEST(Measurement, ends_at_the_first_wake_up_that_is_too_late) {

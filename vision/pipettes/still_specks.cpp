@@ -103,7 +103,8 @@ void StillSpecks::learn(const GradientField& field, double noise, const NeedlePo
 // False where it is there no more.
 bool StillSpecks::look_at(Speck& s, double noise) const {
   constexpr int kMemory = 16;
-  constexpr double kEven = 0.5, kDiffers = 0.15, kSds = 2, kShows = 3;
+  constexpr double kEven = 0.5, kSds = 3;
+  constexpr double kNoisier = 1.2;  // pixels differ in their noise
   const Beside around = beside(frame_, s.box, noise);
   if (around.even < kEven || around.grey < 1) {  // something else lies beside it
     return s.frames > 0;
@@ -112,31 +113,27 @@ bool StillSpecks::look_at(Speck& s, double noise) const {
     const int w = s.box.width, k = static_cast<int>(i);
     return static_cast<float>(frame_.ptr(s.box.y + k / w)[s.box.x + k % w] / around.grey);
   };
-  const double of_noise = std::pow(noise / around.grey, 2);  // in a pixel of one frame
-  double alike = 0, all = 0;
-  for (std::size_t i = 0; i < s.light.size(); ++i) {
-    if (s.part[i] != 0) {
-      const double takes = static_cast<double>(s.light[i]) - 1;
-      all -= of_noise / std::max(s.frames, 1);
-      alike += takes * (static_cast<double>(light_at(i)) - 1);
-      all += takes * takes;
-    }
-  }
-  const bool stays =
-      s.frames > 0 && all > 0 && std::abs(alike / all - 1) < kDiffers + kSds * std::sqrt(of_noise / all);
-  s.grey = static_cast<float>(around.grey);
-  s.frames = stays ? std::min(s.frames + 1, kMemory) : 1;
-  double shows = 0;
+  const double of_noise = std::pow(kNoisier * noise / around.grey, 2);  // in a pixel of one frame
+  double off = 0;
   int pixels = 0;
   for (std::size_t i = 0; i < s.light.size(); ++i) {
     if (s.part[i] != 0) {
-      s.light[i] += (light_at(i) - s.light[i]) / static_cast<float>(s.frames);
-      shows += (static_cast<double>(s.light[i]) - 1) * (static_cast<double>(s.light[i]) - 1);
+      off += std::pow(static_cast<double>(light_at(i) - s.light[i]), 2);
       ++pixels;
     }
   }
-  const double by_noise = of_noise / s.frames;
-  return shows > by_noise * (pixels + kShows * std::sqrt(2.0 * pixels));
+  const double by_chance = pixels + kSds * std::sqrt(2.0 * pixels);  // of as many squares
+  const bool stays = s.frames > 0 && off < of_noise * (1 + 1.0 / s.frames) * by_chance;
+  s.grey = static_cast<float>(around.grey);
+  s.frames = stays ? std::min(s.frames + 1, kMemory) : 1;
+  double shows = 0;
+  for (std::size_t i = 0; i < s.light.size(); ++i) {
+    if (s.part[i] != 0) {
+      s.light[i] += (light_at(i) - s.light[i]) / static_cast<float>(s.frames);
+      shows += std::pow(static_cast<double>(s.light[i]) - 1, 2);
+    }
+  }
+  return shows > of_noise / s.frames * by_chance;
 }
 
 void StillSpecks::find_new(const GradientField& field, double noise, const NeedlePose& needle,

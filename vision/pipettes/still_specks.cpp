@@ -24,6 +24,46 @@ constexpr int kLeast_px = 6, kMost_px = 24;  // pixels of one that is no noise; 
 constexpr std::size_t kMostSpecks = 12;
 constexpr float kLeastLight = 0.25F, kMostLight = 4;  // of less too little is left to be put right
 
+// What of the medium lies before the needle.
+struct Way {
+  const NeedlePose& needle;
+  double to, wide;  // px: ahead of the tip; to either side of the axis
+
+  // within: of the sides where what is seen may be a part of something that is cut off. beyond: towards the
+  // cell.
+  [[nodiscard]] bool holds(const cv::Point& p, double within, double beyond) const {
+    const Point from_tip = Point(p) - needle.tip;
+    const double ahead = from_tip.dot(needle.axis);
+    return ahead > kClearAhead_px + within && ahead < to + beyond &&
+           std::abs(from_tip.cross(needle.axis)) < wide - within;
+  }
+  [[nodiscard]] cv::Rect in(const cv::Rect& area) const {
+    const Point a = needle.at(-kClearAhead_px, 0), b = needle.at(-to, 0);
+    const cv::Rect2d box(std::min(a.x, b.x) - wide, std::min(a.y, b.y) - wide, std::abs(a.x - b.x) + 2 * wide,
+                         std::abs(a.y - b.y) + 2 * wide);
+    return {box & cv::Rect2d(area)};
+  }
+};
+
+const float* smooth_row(const GradientField& field, const cv::Point& from) {
+  return field.smooth.ptr<float>(from.y - field.area.y) + from.x - field.area.x;
+}
+
+// Grey level of the medium.
+float usual_grey(const GradientField& field, const cv::Rect& area, const Way& way) {
+  Vector<float> levels;
+  levels.reserve(static_cast<std::size_t>(area.area()));
+  for (int y = 0; y < area.height; ++y) {
+    const float* row = smooth_row(field, area.tl() + cv::Point(0, y));
+    for (int x = 0; x < area.width; x += 2) {
+      if (way.holds(area.tl() + cv::Point(x, y), 0, 0)) {
+        levels.push_back(row[x]);
+      }
+    }
+  }
+  return static_cast<float>(median_in_place(levels));
+}
+
 struct Beside {
   double grey = 0, even = 0;  // the middle one; share of those that are like it
 };
@@ -140,85 +180,55 @@ void StillSpecks::find_new(const GradientField& field, double noise, const Needl
                            double free_px) {
   constexpr double kStandsOut = 5, kLeast_grey = 6;
   constexpr float kClear_grey = 15;
-  const double to = std::min(free_px - kOfMembrane_px, kFarthest_px), wide = needle.half_width + kBeside_px;
-  if (to <= kClearAhead_px + kLeast_px) {
+  const Way way{needle, std::min(free_px - kOfMembrane_px, kFarthest_px), needle.half_width + kBeside_px};
+  const cv::Rect area = way.in(field.area);
+  if (way.to <= kClearAhead_px || area.empty()) {
     return;
   }
-  double left = 1e9, right = -1e9, top = 1e9, bottom = -1e9;
-  for (const double s : {-kClearAhead_px, -to}) {
-    for (const double u : {-wide, wide}) {
-      const Point p = needle.at(s, u);
-      left = std::min(left, p.x);
-      right = std::max(right, p.x);
-      top = std::min(top, p.y);
-      bottom = std::max(bottom, p.y);
-    }
-  }
-  const cv::Rect area = cv::Rect(static_cast<int>(left), static_cast<int>(top),
-                                 static_cast<int>(right - left) + 2, static_cast<int>(bottom - top) + 2) &
-                        field.area;
-  if (area.width < kMost_px || area.height < kMost_px) {
-    return;
-  }
-  // within: of the sides where what is seen may be a part of something that is cut off.
-  const auto is_ahead = [&](int x, int y, double within, double beyond = 0) {
-    const Point from_tip = Point(x, y) - needle.tip;
-    const double ahead = from_tip.dot(needle.axis);
-    return ahead > kClearAhead_px + within && ahead < to + beyond &&
-           std::abs(from_tip.cross(needle.axis)) < wide - within;
-  };
-  Vector<float> levels;
-  levels.reserve(static_cast<std::size_t>(area.area()));
-  for (int y = area.y; y < area.y + area.height; ++y) {
-    const float* row = field.smooth.ptr<float>(y - field.area.y) - field.area.x;
-    for (int x = area.x; x < area.x + area.width; x += 2) {
-      if (is_ahead(x, y, 0)) {
-        levels.push_back(row[x]);
-      }
-    }
-  }
-  if (levels.empty()) {
-    return;
-  }
-  const auto level = static_cast<float>(median_in_place(levels));
+  const float level = usual_grey(field, area, way);
   // What is left of the noise of a pixel in the smoothed picture.
   const double left_of_noise = noise / (2 * std::sqrt(std::numbers::pi) * std::max(field.sigma, 0.5));
   const auto least = static_cast<float>(std::max(kStandsOut * left_of_noise, kLeast_grey));
   cv::Mat stands_out = kept_picture(area.size(), CV_8U);
   for (int y = 0; y < area.height; ++y) {
-    const float* row = field.smooth.ptr<float>(area.y + y - field.area.y) + area.x - field.area.x;
+    const cv::Point from = area.tl() + cv::Point(0, y);
+    const float* row = smooth_row(field, from);
     std::uint8_t* out = stands_out.ptr(y);
     for (int x = 0; x < area.width; ++x) {
-      out[x] = std::abs(row[x] - level) > least && is_ahead(area.x + x, area.y + y, 0) ? 255 : 0;
+      out[x] = std::abs(row[x] - level) > least && way.holds(from + cv::Point(x, 0), 0, 0) ? 255 : 0;
     }
   }
   const Components found = components_of(stands_out);
   Vector<std::uint8_t> cut(found.box.size(), 0);  // by the border of what is looked at
   Vector<float> peak(found.box.size(), 0.0F);
   for (const PixelRun& run : found.runs) {
-    const int y = area.y + run.y;
-    const float* row = field.smooth.ptr<float>(y - field.area.y) + area.x - field.area.x;
+    const cv::Point from = area.tl() + cv::Point(0, run.y);
+    const float* row = smooth_row(field, from);
     for (int x = run.from; x < run.to; ++x) {
       peak[run.component] = std::max(peak[run.component], std::abs(row[x] - level));
     }
-    if (!is_ahead(area.x + run.from, y, 1) || !is_ahead(area.x + run.to - 1, y, 1)) {
+    if (!way.holds(from + cv::Point(run.from, 0), 1, 0) ||
+        !way.holds(from + cv::Point(run.to - 1, 0), 1, 0)) {
       cut[run.component] = 1;
     }
   }
   for (std::size_t c = 0; c < found.box.size() && specks_.size() < kMostSpecks; ++c) {
-    const cv::Rect core = found.box[c] + area.tl();
+    const cv::Size size = found.box[c].size();
     if (cut[c] == 0 && peak[c] > kClear_grey && found.pixels[c] >= kLeast_px &&
-        std::max(core.width, core.height) <= kMost_px) {
-      add(found, c, core, [&](const cv::Point& p) { return is_ahead(p.x, p.y, 0, 2); }, noise);
+        std::max(size.width, size.height) <= kMost_px) {
+      // Towards the cell, too, where it may go on.
+      constexpr double kBeyond_px = 2;
+      add(found, c, area.tl(), [&](const cv::Point& p) { return way.holds(p, 0, kBeyond_px); }, noise);
     }
   }
 }
 
 // Where it is all in the picture, and not known yet.
 template <class Ahead>
-void StillSpecks::add(const Components& found, std::size_t component, const cv::Rect& core,
+void StillSpecks::add(const Components& found, std::size_t component, const cv::Point& origin,
                       const Ahead& is_ahead, double noise) {
   const cv::Point margin(kMargin_px, kMargin_px);
+  const cv::Rect core = found.box[component] + origin;
   const cv::Rect box(core.tl() - margin, core.br() + margin);
   const auto core_of = [&](const Speck& s) { return cv::Rect(s.box.tl() + margin, s.box.br() - margin); };
   if ((box & cv::Rect({}, frame_.size())) != box ||
@@ -236,7 +246,7 @@ void StillSpecks::add(const Components& found, std::size_t component, const cv::
   s.box = box;
   s.light.assign(static_cast<std::size_t>(box.area()), 1.0F);
   s.part.assign(s.light.size(), 0);
-  const cv::Point in_box = core.tl() - found.box[component].tl() - box.tl();
+  const cv::Point in_box = origin - box.tl();
   for (const PixelRun& run : found.runs) {
     for (int y = run.y - kBlur_px; run.component == component && y <= run.y + kBlur_px; ++y) {
       for (int x = run.from - kBlur_px; x < run.to + kBlur_px; ++x) {

@@ -33,8 +33,9 @@ class StillSpecks {
 
   [[nodiscard]] bool look_at(Speck& speck, double noise) const;
   void find_new(const GradientField& field, double noise, const NeedlePose& needle, double free_px);
+  // One component, of a part of the picture that begins at `origin`.
   template <class Ahead>
-  void add(const Components& found, std::size_t component, const cv::Rect& core, const Ahead& is_ahead,
+  void add(const Components& found, std::size_t component, const cv::Point& origin, const Ahead& is_ahead,
            double noise);
 
   Vector<Speck> specks_;

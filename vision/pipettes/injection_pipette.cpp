@@ -21,10 +21,7 @@ namespace {
 
 constexpr double kLeastScore = 0.3;                  // of the centred correlation
 constexpr int kNearAlong_px = 4, kNearAside_px = 2;  // from where it is expected
-constexpr double kJump_px = 4;  // along the axis, from what motion and correlation predict
-// Standard deviation of an end that is learnt anew beside a speck, and what a frame leaves of it that shows
-// the end alone.
-constexpr double kBegunBeyond_px = 3, kDoubtLeft = 0.7;
+constexpr double kJump_px = 4;      // along the axis, from what motion and correlation predict
 constexpr int kGoesOnMax = 2;       // frames in a row in which its walls go on beyond what is seen as its end
 constexpr int kJumpsMax = 3;        // frames in a row; then it is where it is seen
 constexpr double kAside_px = 2;     // across the axis; further aside the shaft must lie there, too
@@ -256,7 +253,6 @@ NeedlePose InjectionPipette::find(const GradientField& field, double noise,
   if (needle.ok && in_noise_ && noise >= kNoisy_grey) {
     end_.weigh(field, noise, needle);
   }
-  needle.sd = math::hypot(needle.sd, doubt_px_);
   return needle;
 }
 
@@ -365,7 +361,7 @@ NeedlePose InjectionPipette::follow(const GradientField& field, double noise) {
   }
   const bool further = end != LearntEnd::Seen::no && go_beyond_speck(field, noise, needle);
   if (end == LearntEnd::Seen::no || goes_on_ > kGoesOnMax) {
-    return goes_on_ > kGoesOnMax && begin_beyond_speck(field, noise, needle) ? last_ : not_seen(kEndNotSeen);
+    return not_seen(kEndNotSeen);
   }
   lost_ += further ? 1 : 0;
   if (lost_ <= kLostMax && ends_before(field, noise, needle, last_.tip + velocity_)) {
@@ -412,26 +408,6 @@ bool InjectionPipette::go_beyond_speck(const GradientField& field, double noise,
   goes_on_ = 0;
   needle = there;
   return specks > 0;
-}
-
-// What was learnt of its end is that speck's: it is learnt anew where the walls end.
-bool InjectionPipette::begin_beyond_speck(const GradientField& field, double noise, NeedlePose needle) {
-  constexpr double kSpeck_px = 6, kBeyond_px = 16, kStep_px = 10, kAhead_px = 24;
-  constexpr int kSteps = 10;
-  for (int step = 0; step < kSteps && walls_go_on(field, noise, needle, kSpeck_px, kBeyond_px, kShortest_px);
-       ++step) {
-    needle.tip = needle.at(-kStep_px, 0);
-  }
-  put_at_end_of_walls(field, noise, kStep_px, kAhead_px, needle);
-  const NeedlePose before = std::exchange(last_, needle);
-  LearntEnd end = end_;
-  if (begin_in(field, noise, [](const Point&) { return false; }, nullptr)) {
-    doubt_px_ = kBegunBeyond_px;
-    return true;
-  }
-  last_ = before;
-  end_ = std::move(end);
-  return false;
 }
 
 // How far across the predicted needle it is, px, when its tip is recognised `correlated` px across. Granules
@@ -491,7 +467,6 @@ bool InjectionPipette::go_to_end_line(const GradientField& field, double noise, 
 void InjectionPipette::learn(const GradientField& field, const NeedlePose& needle, double noise,
                              double free_px) {
   const bool alone = free_px > kAlone_px;
-  doubt_px_ *= alone ? kDoubtLeft : 1;
   if (!needle.ok || template_.empty() || !end_.is_sharp()) {
     return;
   }

@@ -91,7 +91,6 @@ class InjectionPipette {
   [[nodiscard]] bool begin_steep(const GradientField& field, double noise, const Clear& clear_at);
   void begin();
   bool cut_template(const GradientField& field);
-  [[nodiscard]] bool begin_beyond_speck(const GradientField& field, double noise, NeedlePose needle);
   [[nodiscard]] bool go_beyond_speck(const GradientField& field, double noise, NeedlePose& needle);
   [[nodiscard]] double aside(const GradientField& field, double noise, const NeedlePose& predicted,
                              double correlated) const;
@@ -114,7 +113,6 @@ class InjectionPipette {
   NeedlePose last_;           // at the end that is followed
   Point velocity_;            // px per frame: what it is expected to move by
   int lost_ = 0;              // frames in a row without the tip
-  double doubt_px_ = 0;       // standard deviation, of an end that was learnt anew beside a speck
   int goes_on_ = 0;           // frames in a row in which its walls went on beyond what is seen as its end
   int jumps_ = 0;             // frames in a row in which the end lay somewhere else
   bool search_next_ = false;  // from the border, in the next frame

@@ -17,6 +17,7 @@
 #include "tests/support/pictures.hpp"
 #include "tools/vision/live_tracker.hpp"
 #include "vision/overlay.hpp"
+#include "vision/pipettes/end_line.hpp"
 #include "vision/pipettes/still_specks.hpp"
 #include "vision/tracker.hpp"
 
@@ -675,6 +676,29 @@ TEST(Tracker, does_not_stay_at_a_speck_that_the_needle_has_passed) {
       } else {
         EXPECT_GT(tip, kSpeck - kPast_px) << needle.reason;
       }
+    }
+  }
+}
+
+// Ahead of a needle that ends at 430, on its axis.
+TEST(EndLine, is_not_told_of_a_round_speck) {
+  NeedlePose needle;
+  needle.ok = true;
+  needle.tip = Point(430, kCentre.y);
+  needle.half_width = kNeedle + 1;
+  needle.taper = 0.03;
+  for (const double ahead : {9.0, 10.0, 12.0}) {
+    for (const double grey : {-60.0, 60.0}) {
+      // Walls of a third of their contrast.
+      cv::Mat m = draw({.tip = 430, .noise = 9, .seed = 5});
+      m.convertTo(m, CV_8U, 1 / 3.0, 100);
+      cv::Mat speck = cv::Mat::zeros(m.size(), CV_32F);
+      cv::circle(speck, Point(430 - ahead, std::round(kCentre.y)), 3, cv::Scalar(grey), cv::FILLED);
+      cv::GaussianBlur(speck, speck, cv::Size(0, 0), 1.2);
+      cv::add(m, speck, m, cv::noArray(), CV_8U);
+      GradientField field;
+      field.compute(m, {0, 0, kW, kH}, 1.2);
+      EXPECT_FALSE(end_line(field, 3, needle, -7, 20, false)) << ahead << ' ' << grey;
     }
   }
 }

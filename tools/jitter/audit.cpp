@@ -63,9 +63,8 @@ Finding clock_source(const std::string& root) {
     f.mend.boot = "clocksource=tsc";
   } else {  // to trust what the kernel has found to go wrong is no file's decision
     f.remedy =
-        "the kernel offers no tsc: dmesg says why (grep -i tsc); tsc=reliable only where its maker says that "
-        "the "
-        "processor's counter is invariant";
+        "the kernel offers no tsc: dmesg says why (grep -i tsc); tsc=reliable only where its "
+        "maker says that the processor's counter is invariant";
   }
   return f;
 }

@@ -21,11 +21,10 @@ namespace {
 
 constexpr double kLeastScore = 0.3;                  // of the centred correlation
 constexpr int kNearAlong_px = 4, kNearAside_px = 2;  // from where it is expected
-constexpr double kJump_px = 4;      // along the axis, from what motion and correlation predict
-constexpr int kGoesOnMax = 2;       // frames in a row in which its walls go on beyond what is seen as its end
-constexpr int kJumpsMax = 3;        // frames in a row; then it is where it is seen
-constexpr double kAside_px = 2;     // across the axis; further aside the shaft must lie there, too
-constexpr double kShortest_px = 4;  // of a wall that an edge is averaged over
+constexpr double kJump_px = 4;   // along the axis, from what motion and correlation predict
+constexpr int kGoesOnMax = 2;    // frames in a row in which its walls go on beyond what is seen as its end
+constexpr int kJumpsMax = 3;     // frames in a row; then it is where it is seen
+constexpr double kAside_px = 2;  // across the axis; further aside the shaft must lie there, too
 constexpr double kElsewhere_px = 8;   // along the axis: what is seen as its end is something else
 constexpr double kFollowed_px = 24;   // of a faint one while it is followed: it may bend
 constexpr std::size_t kGathered = 4;  // frames that tell an end which one of them does not
@@ -178,7 +177,7 @@ bool InjectionPipette::begin_in(const GradientField& field, double noise, const 
                                 const MovingEnd* moving) {
   const bool end_known = end_.learn_anew(field, noise, last_, moving != nullptr ? moving->motion_sd : 0);
   NeedlePose plain = last_;
-  const bool faint = fit_walls(field, noise, radius_px_, plain, kShortest_px) < kStraightWalls;
+  const bool faint = fit_walls(field, noise, radius_px_, plain, kShortestWall_px) < kStraightWalls;
   if ((moving != nullptr && !end_known) || (faint && !(end_known && clear_at(last_.tip)))) {
     reason_ = kEndNotClear;
     return false;
@@ -186,7 +185,7 @@ bool InjectionPipette::begin_in(const GradientField& field, double noise, const 
   in_noise_ =
       end_.shows_lumen() && end_.glass_is_known() && (moving != nullptr || (faint && noise >= kNoisy_grey));
   looked_at_ = 1;
-  longest_ = faint || in_noise_ ? kFollowed_px : kShortest_px;
+  longest_ = faint || in_noise_ ? kFollowed_px : kShortestWall_px;
   if (!cut_template(field)) {
     reason_ = "tip too close to the border";
     return false;
@@ -220,7 +219,7 @@ bool InjectionPipette::begin_steep(const GradientField& field, double noise, con
   }
   end_.learn_steep(field, last_);
   looked_at_ = 1;
-  longest_ = kShortest_px;
+  longest_ = kShortestWall_px;
   in_noise_ = false;
   begin();
   // The shape does not fit best just where it was learnt.
@@ -278,7 +277,7 @@ bool InjectionPipette::goes_on_to(const GradientField& field, double noise, cons
   constexpr double kSpeck_px = 5;
   const double ahead = (tip - seen.tip).dot(seen.axis);
   return ahead > kElsewhere_px && std::abs((tip - seen.tip).cross(seen.axis)) < seen.half_width &&
-         walls_go_on(field, noise, seen, kSpeck_px, ahead - kShortest_px / 2, kShortest_px);
+         walls_go_on(field, noise, seen, kSpeck_px, ahead - kShortestWall_px / 2, kShortestWall_px);
 }
 
 bool InjectionPipette::ends_before(const GradientField& field, double noise, const NeedlePose& seen,
@@ -287,8 +286,8 @@ bool InjectionPipette::ends_before(const GradientField& field, double noise, con
   NeedlePose there = seen;
   there.tip = seen.at(ahead, 0);
   there.half_width = seen.half_width_at(ahead);
-  return ahead > kElsewhere_px &&
-         !walls_go_on(field, noise, there, kShortest_px / 2, ahead - kShortest_px / 2, kShortest_px);
+  return ahead > kElsewhere_px && !walls_go_on(field, noise, there, kShortestWall_px / 2,
+                                               ahead - kShortestWall_px / 2, kShortestWall_px);
 }
 
 std::optional<NeedlePose> InjectionPipette::by_shaft(const GradientField& field, double noise,
@@ -396,7 +395,7 @@ bool InjectionPipette::go_beyond_speck(const GradientField& field, double noise,
   constexpr int kSpecks = 2;
   NeedlePose there = needle;
   int specks = 0;
-  while (walls_go_on(field, noise, there, kSpeck_px, kBeyond_px, kShortest_px)) {
+  while (walls_go_on(field, noise, there, kSpeck_px, kBeyond_px, kShortestWall_px)) {
     there.tip = there.at(-kBeyond_px, 0);
     LearntEnd end = end_;
     if (specks++ == kSpecks || end.find(field, noise, longest_, there) == LearntEnd::Seen::no) {

@@ -182,7 +182,6 @@ bool LearntEnd::learn_by_glass(const GradientField& field, double noise, NeedleP
 // How the needle is cut, and how far ahead the glass ends. It is put where they are when that is far from the
 // end of the walls.
 std::optional<CutGlass> LearntEnd::go_to_cut(const GradientField& field, double noise, NeedlePose& last) {
-  constexpr double kAveraged_px = 4;  // of a wall
   NeedlePose needle = last;
   auto cut = cut_seen(field, noise, needle);
   const auto middle_ahead = [&] {
@@ -194,7 +193,7 @@ std::optional<CutGlass> LearntEnd::go_to_cut(const GradientField& field, double 
        ++round) {
     const double ahead = middle_ahead();
     if (ahead > kFar_px && !in_relief_ && !lit_from_aside(field, needle) &&
-        !walls_go_on(field, noise, needle, kNear_px, ahead - kNear_px, kAveraged_px)) {
+        !walls_go_on(field, noise, needle, kNear_px, ahead - kNear_px, kShortestWall_px)) {
       return std::nullopt;  // a speck ahead of it
     }
     needle.tip += ahead * needle.axis;

@@ -15,6 +15,7 @@ namespace punctum::vision {
 inline constexpr double kWallReach_px = 3, kWallReachAtStart_px = 7;
 inline constexpr double kStraightWalls = 0.65;  // what a straight needle has of those stations, at least
 inline constexpr double kLongestWall_px = 40;   // to average an edge over, at the start
+inline constexpr double kShortestWall_px = 4;   // likewise, where it is clear
 // In a needle with a smaller half-width no lumen is left between the walls, and a line across it looks like
 // them.
 inline constexpr double kLeastLumen_px = 4.5;

@@ -123,18 +123,16 @@ bool is_gone(std::uint64_t pid) {
 }
 
 // Whether to go on: a core whose parent has died, as this program's has, stops by itself, and how it does so
-// is a part of the run. Its parent's death is told as a signal to stop.
+// is a part of the run.
 class GoOn {
  public:
-  explicit GoOn(bool has_parent) : parent_(has_parent ? ::getppid() : 0) {}
-
   [[nodiscard]] bool operator()() {
     constexpr std::chrono::seconds kStops{5};
     const int asked = stop_signal::count();
     if (asked == 0) {
       return true;
     }
-    if (parent_ == 0 || ::getppid() == parent_ || asked > 1) {
+    if (!stop_signal::parent_has_died() || asked > 1) {
       return false;
     }
     const auto now = std::chrono::steady_clock::now();
@@ -143,7 +141,6 @@ class GoOn {
   }
 
  private:
-  pid_t parent_;
   std::chrono::steady_clock::time_point until_ = std::chrono::steady_clock::time_point::max();
 };
 
@@ -152,7 +149,7 @@ void record(StationRecorder& recorder, const rt::CoreStatus& core, ClockKind clo
             RecordProgress* progress) {
   constexpr std::chrono::milliseconds kBetweenRounds{2}, kBetweenLooks{200};
   constexpr std::uint64_t kBusyRound = 64;
-  GoOn go_on(progress != nullptr);
+  GoOn go_on;
   for (auto next_look = std::chrono::steady_clock::now(); go_on() && !recorder.core_has_ended();) {
     const std::uint64_t from = recorder.position();
     const std::uint64_t taken = recorder.drain();

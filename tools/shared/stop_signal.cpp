@@ -12,10 +12,12 @@ namespace punctum::tools::stop_signal {
 namespace {
 
 std::atomic<int> signals{0};
+std::atomic<bool> parent_died{false};
 std::atomic<Wake> wake_up{nullptr};
 static_assert(std::atomic<int>::is_always_lock_free && std::atomic<Wake>::is_always_lock_free);
 
 constexpr int kMostAncestors = 8;
+constexpr int kParentDied = SIGUSR1;  // not SIGTERM, with which somebody else may ask
 
 // 0: there is no such process.
 std::uint64_t parent_of(std::uint64_t pid) {
@@ -35,6 +37,14 @@ extern "C" void on_stop_signal(int) {
   }
 }
 
+extern "C" void on_parent_died(int) {
+  parent_died.store(true);
+  request();
+  if (const Wake wake = wake_up.load()) {
+    wake(signals.load());
+  }
+}
+
 }  // namespace
 
 void watch(std::initializer_list<int> which, Wake wake) {
@@ -47,13 +57,18 @@ void watch(std::initializer_list<int> which, Wake wake) {
 }
 
 bool watch_parent(std::uint64_t maker) {
-  prctl(PR_SET_PDEATHSIG, SIGTERM);
+  struct sigaction action{};
+  action.sa_handler = on_parent_died;
+  sigaction(kParentDied, &action, nullptr);
+  prctl(PR_SET_PDEATHSIG, kParentDied);
   auto ancestor = static_cast<std::uint64_t>(getppid());
   for (int i = 0; i < kMostAncestors && ancestor > 1 && ancestor != maker; ++i) {
     ancestor = parent_of(ancestor);
   }
   return ancestor == maker;
 }
+
+bool parent_has_died() noexcept { return parent_died.load(); }
 
 int count() NONBLOCKING { return signals.load(std::memory_order_relaxed); }
 

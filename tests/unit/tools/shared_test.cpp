@@ -314,6 +314,58 @@ TEST_F(ChildTest, inherits_the_descriptors_it_is_given_and_no_others) {
   ::close(kept);
 }
 
+// The thread that starts the child ends before its process does: the kernel tells of both deaths.
+TEST(StopSignalTest, the_death_of_the_parent_is_one_request_whichever_of_its_threads_die) {
+  ASSERT_EQ(stop_signal::count(), 0);
+  int ready[2];
+  int told[2];
+  ASSERT_EQ(::pipe(ready) + ::pipe(told), 0);
+  const auto child = [&] {
+    static int report = -1;
+    report = told[1];
+    stop_signal::watch({SIGTERM}, [](int count) noexcept {
+      const char digit = static_cast<char>('0' + count);
+      (void)!::write(report, stop_signal::parent_has_died() ? &digit : "-", 1);
+    });
+    const auto maker = static_cast<std::uint64_t>(::getppid());
+    const bool alive_maker = stop_signal::watch_parent(maker);
+    const bool dead_maker = stop_signal::watch_parent(1U << 30);  // no process has this number
+    const char alive = alive_maker && !dead_maker ? 'y' : 'n';
+    (void)!::write(ready[1], &alive, 1);
+    ::alarm(10);
+    for (;;) {
+      ::pause();
+    }
+  };
+  const pid_t parent = ::fork();
+  if (parent == 0) {
+    std::thread([&] {
+      if (::fork() == 0) {
+        child();
+      }
+      char c = 'n';
+      (void)!::read(ready[0], &c, 1);
+      (void)!::write(told[1], &c, 1);
+    }).join();
+    for (;;) {
+      ::pause();
+    }
+  }
+  ::close(told[1]);
+  char c = 'n';
+  ASSERT_EQ(::read(told[0], &c, 1), 1);
+  EXPECT_EQ(c, 'y');
+  ASSERT_EQ(::read(told[0], &c, 1), 1) << "the death of a thread was not told";
+  EXPECT_EQ(c, '1');
+  ::kill(parent, SIGKILL);
+  ::waitpid(parent, nullptr, 0);
+  ASSERT_EQ(::read(told[0], &c, 1), 1) << "the death of the process was not told";
+  EXPECT_EQ(c, '1') << "a second death is no second request";
+  for (const int fd : {ready[0], ready[1], told[0]}) {
+    ::close(fd);
+  }
+}
+
 std::atomic<int> woken{0};
 
 TEST(StopSignalTest, signals_are_counted_and_wake_whoever_waits) {
@@ -329,42 +381,6 @@ TEST(StopSignalTest, signals_are_counted_and_wake_whoever_waits) {
   EXPECT_EQ(woken.load(), 2);
   ASSERT_EQ(::raise(SIGUSR2), 0);
   EXPECT_EQ(woken.load(), 3);
-}
-
-TEST(StopSignalTest, the_death_of_the_parent_arrives_as_a_signal) {
-  int ready[2];
-  int told[2];
-  ASSERT_EQ(::pipe(ready) + ::pipe(told), 0);
-  const pid_t parent = ::fork();
-  if (parent == 0) {
-    if (::fork() == 0) {
-      static int report = -1;
-      report = told[1];
-      stop_signal::watch({SIGTERM}, [](int) noexcept { (void)!::write(report, "s", 1); });
-      const auto maker = static_cast<std::uint64_t>(::getppid());
-      const bool alive_maker = stop_signal::watch_parent(maker);
-      const bool dead_maker = stop_signal::watch_parent(1U << 30);  // no process has this number
-      const char alive = alive_maker && !dead_maker ? 'y' : 'n';
-      (void)!::write(ready[1], &alive, 1);
-      ::alarm(10);
-      ::pause();
-      ::_exit(0);
-    }
-    for (;;) {
-      ::pause();
-    }
-  }
-  char c = 'n';
-  ASSERT_EQ(::read(ready[0], &c, 1), 1);
-  EXPECT_EQ(c, 'y');
-  ::kill(parent, SIGKILL);
-  ::waitpid(parent, nullptr, 0);
-  ::close(told[1]);
-  ASSERT_EQ(::read(told[0], &c, 1), 1) << "no signal came";
-  EXPECT_EQ(c, 's');
-  for (const int fd : {ready[0], ready[1], told[0]}) {
-    ::close(fd);
-  }
 }
 
 TEST(HandedSegments, are_the_same_after_their_way_through_an_argument) {

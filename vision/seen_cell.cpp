@@ -86,8 +86,26 @@ void SeenCell::doubt_outer(const ClearedPicture& picture, const Touch& touch, co
   }
 }
 
-void SeenCell::follow(const ClearedPicture& picture, const SeenNeedle& needle, const Touch& touch,
-                      Result& result, Stopwatch& watch) {
+// With what holds it, or with the picture: where its edge is seen there rather than here.
+bool SeenCell::jumps_by(const ClearedPicture& picture, const Point& by) {
+  const Contour contour = outermost().contour();
+  double here = 0, there = 0;
+  for (const Point& p : contour) {
+    const Point slope_here = picture.field.gradient(p), slope_there = picture.field.gradient(p + by);
+    here += std::abs(slope_here.dot(p - outermost().centre));
+    there += std::abs(slope_there.dot(p - outermost().centre));
+  }
+  if (!(there > here)) {
+    return false;
+  }
+  outer_.jump_with_picture(by);
+  inner_.jump_with_picture(by);
+  undeformed_.jump_with_picture(by);
+  return true;
+}
+
+void SeenCell::follow(const ClearedPicture& picture, const SeenHolder& holder, const SeenNeedle& needle,
+                      const Touch& touch, Result& result, Stopwatch& watch) {
   if (config_.method == Method::paper) {
     follow_snakes(picture, result, watch);
     return;
@@ -95,16 +113,22 @@ void SeenCell::follow(const ClearedPicture& picture, const SeenNeedle& needle, c
   doubt_outer(picture, touch, result);
   NeedlePose on_membrane = result.needle;  // its tip where the membrane on it is seen
   on_membrane.tip = needle.on_membrane(result.needle);
-  const std::optional<Point> held_at =
-      result.holder.ok && result.holder.sd > 0 ? std::optional(result.holder.mouth) : std::nullopt;
-  const std::optional<Point> carried =
-      held_at && held_at_ ? std::optional(*held_at - *held_at_) : std::nullopt;
-  held_at_ = held_at;
+  // Everything is told as if neither it nor the needle had jumped.
+  std::optional<Point> carried = holder.moved();
+  Point jump;
+  if (holder.jump() && jumps_by(picture, *holder.jump())) {
+    jump = *std::exchange(carried, Point());
+  }
+  const Point needle_alone = needle.jump() - jump;
+  std::optional<Point> last_tip = needle.last_on_membrane();
+  if (last_tip) {
+    *last_tip -= needle_alone;
+  }
   const auto surroundings = [&] {
     return Surroundings{
         .needle = on_membrane,
-        .last_tip = needle.last_on_membrane(),
-        .expected_px = needle.expected_px(result.needle),
+        .last_tip = last_tip,
+        .expected_px = needle.expected_px(result.needle) + needle_alone.dot(result.needle.axis),
         .carried = carried,
         .gone_odds = needle.membrane_gone_odds(),
         .punctured = touch.punctured,

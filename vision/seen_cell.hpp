@@ -8,6 +8,7 @@
 
 #include "vision/membrane/membrane_start.hpp"
 #include "vision/result.hpp"
+#include "vision/seen_holder.hpp"
 #include "vision/seen_needle.hpp"
 #include "vision/stopwatch.hpp"
 
@@ -38,8 +39,8 @@ class SeenCell {
   // at_once: all of the search is done in this frame. False while no membrane is known.
   [[nodiscard]] bool start(const ClearedPicture& picture, const Touch& touch, bool at_once, Result& result);
   // Sets the membranes of the result.
-  void follow(const ClearedPicture& picture, const SeenNeedle& needle, const Touch& touch, Result& result,
-              Stopwatch& watch);
+  void follow(const ClearedPicture& picture, const SeenHolder& holder, const SeenNeedle& needle,
+              const Touch& touch, Result& result, Stopwatch& watch);
   // Sets its undeformed membrane, its entry and its gap. needle_hidden: it may touch the cell. False where it
   // is larger or smaller than cells of the scene: then it is none, and given up.
   [[nodiscard]] bool measure(const ClearedPicture& picture, const Touch& touch, bool needle_hidden,
@@ -48,6 +49,7 @@ class SeenCell {
  private:
   [[nodiscard]] std::optional<StartedMembranes> search(const ClearedPicture& picture, bool at_once);
   void take(StartedMembranes&& begun, const Touch& touch, const Result& result);
+  [[nodiscard]] bool jumps_by(const ClearedPicture& picture, const Point& by);
   void doubt_outer(const ClearedPicture& picture, const Touch& touch, const Result& result);
   void follow_snakes(const ClearedPicture& picture, Result& result, Stopwatch& watch);
   [[nodiscard]] bool round_as_if_untouched(const ClearedPicture& picture, const Touch& touch,
@@ -68,7 +70,6 @@ class SeenCell {
   LearntUndeformed undeformed_;                       // of the outer one
   double entry_sd_px_ = 0;
   bool another_ = false;
-  std::optional<Point> held_at_;  // the mouth of the holding pipette, when the cell was followed last
 };
 
 }  // namespace punctum::vision

@@ -41,12 +41,31 @@ HolderPose SeenHolder::locate(ClearedPicture& picture, std::span<const Side> sid
       follow_mouth(holder);
     }
   }
+  compare(holder);
   if (tube_) {
     // The middle of a given template need not be the mouth.
     const Point mouth = holder.ok && !template_given_ ? holder.mouth : tube_->end();
     picture.holder_face = {mouth, tube_->axis, tube_->end_half_width};
   }
   return holder;
+}
+
+void SeenHolder::compare(const HolderPose& holder) {
+  way_.reset();
+  ++ago_;
+  if (holder.ok && holder.sd > 0) {
+    if (seen_at_) {
+      way_ = holder.mouth - *seen_at_;
+      apart_ = ago_;
+    }
+    seen_at_ = holder.mouth;
+    ago_ = 0;
+  }
+}
+
+std::optional<Point> SeenHolder::jump() const {
+  constexpr double kDrift_px = 2;  // per frame: more is no drift
+  return way_ && cv::norm(*way_) > kDrift_px * apart_ ? way_ : std::nullopt;
 }
 
 // One picture tells it less surely than all of them.

@@ -27,6 +27,11 @@ class SeenHolder {
   void begin();
   [[nodiscard]] bool due() const noexcept { return due_; }
   [[nodiscard]] bool found() const noexcept { return tube_.has_value(); }
+  // Its mouth, since the last frame, px; empty where one of the two does not show it exactly.
+  [[nodiscard]] std::optional<Point> moved() const { return apart_ == 1 ? way_ : std::nullopt; }
+  // Since the last frame that shows it, where that is further than it drifts: alone or with the whole
+  // picture.
+  [[nodiscard]] std::optional<Point> jump() const;
   // Tells the picture its face as well. sides: the borders that it may enter through.
   [[nodiscard]] HolderPose locate(ClearedPicture& picture, std::span<const Side> sides);
   // What is erased of it, where it is found. The paper's snake needs the membrane that the pipette touches:
@@ -35,10 +40,14 @@ class SeenHolder {
 
  private:
   void follow_mouth(HolderPose& holder);
+  void compare(const HolderPose& holder);
 
   const VisionConfig& config_;
   HoldingPipette pipette_;
   DriftingPlace mouth_;
+  std::optional<Point> seen_at_;  // its mouth, in the last frame that showed it
+  std::optional<Point> way_;      // there from the one before, if that is this frame
+  int apart_ = 0, ago_ = 0;       // those two frames; the last of them and this one
   std::optional<TubeTrace> tube_;
   bool template_given_ = false;
   bool due_ = false;

@@ -14,8 +14,9 @@ namespace punctum::vision {
 namespace {
 
 constexpr int kNeedleAtOnce = 6, kNeedleEvery = 8;  // frames between two tries, after so many of them
-constexpr double kUntouched_px = 12;                // further outside, nothing touches the tip
-constexpr double kEndShows_px = 2;  // further outside, the end of the needle shows beside the membrane
+constexpr const char* kJumped = "the picture has jumped";
+constexpr double kUntouched_px = 12;  // further outside, nothing touches the tip
+constexpr double kEndShows_px = 2;    // further outside, the end of the needle shows beside the membrane
 constexpr double kWall_px =
     0.4;  // from the membrane, which is what is seen on the tip, to the outermost glass
 constexpr double kAtMembrane_px = 0.3, kInside_px = 1.5;  // to which the picture alone shows the tip there
@@ -134,13 +135,17 @@ bool SeenNeedle::search(const ClearedPicture& picture, const FollowedMembrane& o
 }
 
 NeedlePose SeenNeedle::locate(const ClearedPicture& picture, const FollowedMembrane& outer,
-                              const Touch& touch, bool at_once) {
+                              const Touch& touch, const std::optional<Point>& mouth, bool at_once) {
   pipette_.in_relief(outer.known && outer.polarity == Polarity::relief);
   wall_px_ = gone_odds_ = 0;
-  NeedlePose n = search(picture, outer, touch, at_once)
-                     ? pipette_.as_found(picture.noise)
-                     : pipette_.find(picture.field, picture.noise, by_stage_.moved());
+  NeedlePose n =
+      search(picture, outer, touch, at_once) ? pipette_.as_found(picture.noise) : find(picture, mouth);
   on_tip_sd_px_ = n.sd;
+  if (!stays_or_jumps(n, mouth)) {
+    n.ok = seen_.ok = false;
+    n.reason = kJumped;
+    return n;
+  }
   if (config_.method == Method::tracker && n.ok && touch.at_membrane() && outer.known) {
     put_right_by_membrane(picture, outer, n);
   }
@@ -151,6 +156,67 @@ NeedlePose SeenNeedle::locate(const ClearedPicture& picture, const FollowedMembr
   seen_ = n;
   put_right_by_stage(picture, touch, n);
   return n;
+}
+
+// Since the needle was last where it was expected; none where that is no more than it may drift.
+Point SeenNeedle::jump_of_mouth(const std::optional<Point>& mouth) const {
+  constexpr double kDrift_px = 2;
+  const Point way = mouth && mouth_ ? *mouth - *mouth_ : Point();
+  return cv::norm(way) > kDrift_px ? way : Point();
+}
+
+// First where it would be if the whole picture had jumped.
+NeedlePose SeenNeedle::find(const ClearedPicture& picture, const std::optional<Point>& mouth) {
+  const std::optional<Point> moved = by_stage_.moved();
+  const Point jump = jump_of_mouth(mouth);
+  before_.reset();
+  if (mouth_ && (!mouth || jump != Point())) {
+    before_ = pipette_;
+  }
+  if (jump != Point()) {
+    const NeedlePose n =
+        pipette_.find(picture.field, picture.noise, moved.value_or(pipette_.velocity()) + jump);
+    if (n.ok) {
+      return n;
+    }
+    pipette_ = *before_;
+  }
+  return pipette_.find(picture.field, picture.noise, moved);
+}
+
+// A picture that jumps moves the holding pipette and the needle by the same; neither hand nor manipulator has
+// moved the needle then. False while it is neither where it was, nor as far from there as a holding pipette
+// that has jumped; or not where it was, and that is out of sight.
+bool SeenNeedle::stays_or_jumps(const NeedlePose& n, const std::optional<Point>& mouth) {
+  constexpr double kSame_px = 1.5, kSameAlone_px = 4, kShare = 0.4;
+  constexpr int kMostFrames = 12;
+  jump_ = {};
+  const auto told = by_stage_.tip(), expected = told ? told : tip_;
+  if (before_ && expected && ++undecided_ < kMostFrames) {
+    const Point jump = jump_of_mouth(mouth), off = n.tip - *expected;
+    const double of_picture = std::max(told ? kSame_px : kSameAlone_px, 2 * n.sd),
+                 near = mouth ? std::min(of_picture, kShare * cv::norm(jump)) : of_picture;
+    if (!n.ok ? mouth.has_value() : std::min(cv::norm(off), cv::norm(off - jump)) > near) {
+      pipette_ = *before_;
+      return false;
+    }
+    if (n.ok && cv::norm(off - jump) < cv::norm(off)) {
+      jump_ = jump;
+      by_stage_.jump_with_picture(jump);
+      motion_.jump_with_picture(jump);
+      pipette_.jump_with_picture(jump);
+      if (last_on_membrane_) {
+        *last_on_membrane_ += jump;
+      }
+    }
+    if (!mouth) {
+      return true;
+    }
+  }
+  undecided_ = 0;
+  mouth_ = mouth;
+  tip_ = n.ok ? std::optional(n.tip + motion_.speed * motion_.axis) : std::nullopt;
+  return true;
 }
 
 void SeenNeedle::put_right_by_membrane(const ClearedPicture& picture, const FollowedMembrane& outer,

@@ -40,9 +40,10 @@ class SeenNeedle {
   void clear_way(ClearedPicture& picture) { picture.grey = specks_.without(picture.grey); }
   // Once per frame, before anything else. stage: as in Tracker::process.
   void begin(const std::optional<Point>& stage);
-  // at_once: where it is missing, all of its search is done in this frame.
+  // mouth: of the holding pipette, where this frame shows it. at_once: where it is missing, all of its search
+  // is done in this frame.
   [[nodiscard]] NeedlePose locate(const ClearedPicture& picture, const FollowedMembrane& outer,
-                                  const Touch& touch, bool at_once);
+                                  const Touch& touch, const std::optional<Point>& mouth, bool at_once);
   // Takes in what is seen of it while nothing touches its tip. gap_px: empty where no cell is near.
   void learn(const ClearedPicture& picture, const NeedlePose& now, const std::optional<double>& gap_px);
   void end_frame(const NeedlePose& now) {
@@ -67,6 +68,8 @@ class SeenNeedle {
   [[nodiscard]] double wall_px() const noexcept { return wall_px_; }
   [[nodiscard]] Point on_membrane(const NeedlePose& now) const;
   [[nodiscard]] const std::optional<Point>& last_on_membrane() const noexcept { return last_on_membrane_; }
+  // By which it, and where it lay, moved in this frame with the whole picture, px.
+  [[nodiscard]] const Point& jump() const noexcept { return jump_; }
   // Log odds that the membrane is not on the tip, by what is seen across the mouth of the lumen.
   [[nodiscard]] double membrane_gone_odds() const noexcept { return gone_odds_; }
   // Standard deviation of what is seen on its tip: of the membrane that it pushes, px.
@@ -77,6 +80,9 @@ class SeenNeedle {
   void learn_tip_again(const ClearedPicture& picture, const FollowedMembrane& outer);
   [[nodiscard]] bool search(const ClearedPicture& picture, const FollowedMembrane& outer, const Touch& touch,
                             bool at_once);
+  [[nodiscard]] Point jump_of_mouth(const std::optional<Point>& mouth) const;
+  [[nodiscard]] NeedlePose find(const ClearedPicture& picture, const std::optional<Point>& mouth);
+  [[nodiscard]] bool stays_or_jumps(const NeedlePose& n, const std::optional<Point>& mouth);
   void put_right_by_membrane(const ClearedPicture& picture, const FollowedMembrane& outer, NeedlePose& n);
   void put_right_by_stage(const ClearedPicture& picture, const Touch& touch, NeedlePose& n);
   void forget();
@@ -93,6 +99,12 @@ class SeenNeedle {
   double on_tip_sd_px_ = 0;
   double wall_px_ = 0, gone_odds_ = 0;
   std::optional<Point> last_on_membrane_;
+  // While a holding pipette has jumped or is not seen, and the needle is not where it is expected: where both
+  // were before; the needle as it was; the frames since.
+  std::optional<Point> mouth_, tip_;
+  std::optional<InjectionPipette> before_;
+  int undecided_ = 0;
+  Point jump_;
   TipOnMembrane tip_on_membrane_;
   StillSpecks specks_;
   TipMotion motion_;

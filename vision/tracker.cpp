@@ -158,17 +158,24 @@ const Result& Tracker::Impl::process(const hal::Frame& frame, const std::optiona
   needle.clear_way(picture);
   needle.begin(stage);
   holder.begin();
-  picture.compute_gradient(area_to_search(starting));
   result.us.prepare = watch.lap_us();
+  if (config.holder && !holder.due()) {  // its jump tells where all else is looked for
+    result.holder = holder.locate(picture, holder_sides());
+    result.us.holder = watch.lap_us();
+  }
+  picture.compute_gradient(area_to_search(starting));
+  result.us.prepare += watch.lap_us();
 
   if (config.needle) {
     if (!needle.recognised(picture)) {
       events.forget_puncture(result);
     }
-    result.needle = needle.locate(picture, cell.outer(), events.touch(), first_picture);
+    result.needle =
+        needle.locate(picture, cell.outer(), events.touch(),
+                      result.holder.ok ? std::optional(result.holder.mouth) : std::nullopt, first_picture);
     result.us.needle = watch.lap_us();
   }
-  if (config.holder) {
+  if (config.holder && holder.due()) {
     result.holder = holder.locate(picture, holder_sides());
     result.us.holder = watch.lap_us();
   }
@@ -183,7 +190,7 @@ const Result& Tracker::Impl::process(const hal::Frame& frame, const std::optiona
     result.us.start = watch.lap_us();
   }
   if (found) {
-    cell.follow(picture, needle, events.touch(), result, watch);
+    cell.follow(picture, holder, needle, events.touch(), result, watch);
     found = cell.measure(picture, events.touch(), needle.hidden(result.needle), holder.found(), result);
     result.us.measure = watch.lap_us();
   }
@@ -254,6 +261,9 @@ cv::Rect Tracker::Impl::area_to_search(bool starting) const {
     constexpr double kShaft_px = 180;  // of the shaft tell its direction
     box |= square_round(*tip.last, 40);
     box |= square_round(*tip.last - kShaft_px * tip.axis, 24) & cv::Rect2d(0, 0, width, height);
+  }
+  if (const auto jump = holder.jump()) {
+    box |= box + cv::Point2d(*jump);
   }
   return whole & cv::Rect(static_cast<int>(box.x), static_cast<int>(box.y), static_cast<int>(box.width),
                           static_cast<int>(box.height));

@@ -15,6 +15,12 @@ struct TipMotion {
   double speed = 0;  // px per frame along the axis, > 0 into the cell, smoothed
 
   void update(const NeedlePose& needle);
+  // All that the picture shows lies elsewhere, by that.
+  void jump_with_picture(const Point& by) {
+    if (last) {
+      *last += by;
+    }
+  }
 };
 
 struct PhaseInput {

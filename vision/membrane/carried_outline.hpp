@@ -15,6 +15,8 @@ class CarriedOutline {
   };
   void update(const SeenOutline& seen, const Change& pushed);
 
+  void jump_with_picture(const Point& by) { centre_ += by; }
+
   [[nodiscard]] Contour contour() const;
   [[nodiscard]] Vector<double> sd() const;  // px, per point of the contour
 

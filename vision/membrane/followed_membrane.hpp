@@ -44,6 +44,13 @@ struct FollowedMembrane {
            : sign < -kTold              ? Polarity::darker_out
                                         : Polarity::any;
   }
+  // All that the picture shows of the cell lies elsewhere, by that.
+  void jump_with_picture(const Point& by) {
+    centre += by;
+    rest.centre += by;
+    carried.jump_with_picture(by);
+    recoil.jump_with_picture(by);
+  }
   [[nodiscard]] Contour contour() const { return from_polar(centre, r); }
   [[nodiscard]] bool lost() const noexcept { return lost_frames >= 2; }  // one frame may fail
 };

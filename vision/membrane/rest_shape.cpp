@@ -219,6 +219,19 @@ LearntUndeformed::Moved LearntUndeformed::update(const Undeformed& now, bool tou
   return {};
 }
 
+void LearntUndeformed::jump_with_picture(const Point& by) {
+  face_.centre += by;
+  if (shape_) {
+    shape_->circle.centre += by;
+    for (Point& p : shape_->shape) {
+      p += by;
+    }
+  }
+  if (mouth_) {
+    *mouth_ += by;
+  }
+}
+
 Point LearntUndeformed::moved(const std::optional<Mouth>& mouth) {
   if (!mouth_) {
     return face_.reliable() && cv::norm(face_.drift) > kLeastDrift_px ? face_.drift : Point();

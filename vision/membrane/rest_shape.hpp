@@ -62,6 +62,7 @@ class LearntUndeformed {
   // The contour of a frame in which nothing touches it, seen from `centre`.
   void learn_outline(const Contour& contour, const Point& centre);
   void forget();
+  void jump_with_picture(const Point& by);
   [[nodiscard]] bool known() const noexcept { return shape_.has_value(); }
   [[nodiscard]] const std::optional<Undeformed>& shape() const noexcept { return shape_; }
   // Its shape is the outline as it was seen, if it ever was. Not before it is known.

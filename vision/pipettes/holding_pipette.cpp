@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "vision/image/correlation.hpp"
 #include "vision/pipettes/wide_tube.hpp"
@@ -13,6 +14,7 @@ namespace {
 
 constexpr int kBlurred_px = 8;            // the smoothing before the gradient reaches so far
 constexpr std::array kStill_px = {1, 3};  // a frame moves it by less
+constexpr int kDoubledMost = 2;           // times that its window is, while it is not seen
 constexpr double kCertainMouth_px = 1;    // of a mouth that is less certain nothing is claimed
 
 }  // namespace
@@ -99,7 +101,7 @@ HolderPose HoldingPipette::find(const cv::Mat& grey) {
       search(kStill_px[k]);
     }
     if (!found()) {
-      search(config_.window_px);
+      search(config_.window_px << std::min(lost_, kDoubledMost));
     }
   } else {
     p = peak(correlation_map(grey, template_));
@@ -121,8 +123,7 @@ HolderPose HoldingPipette::find(const cv::Mat& grey) {
   // Eq. 1 is near 1 on any bright patch. The centred correlation tells whether it is the pipette.
   holder.ok = holder.score >= config_.min_score && holder.similarity >= 0.4;
   if (holder.ok) {
-    last_ = corner;
-    lost_ = 0;
+    before_ = {std::exchange(last_, corner), std::exchange(lost_, 0)};
   } else {
     holder.reason = holder.score < config_.min_score ? "correlation too low" : "pattern not recognised";
     ++lost_;
@@ -138,6 +139,8 @@ void HoldingPipette::refine(const cv::Mat& grey, HolderPose& holder) {
   if (!place || place->sd > kCertainMouth_px) {
     holder.ok = false;
     holder.reason = "its place is not certain";
+    last_ = before_.last;
+    lost_ = before_.lost + 1;
     return;
   }
   holder.box.x = place->corner.x;

@@ -58,6 +58,10 @@ class HoldingPipette {
   Point mouth_in_template_;
   std::optional<Point> last_;  // top left corner of the template
   int lost_ = 0;               // frames in a row
+  struct {
+    std::optional<Point> last;
+    int lost = 0;
+  } before_;  // it was found in this frame
 };
 
 }  // namespace punctum::vision

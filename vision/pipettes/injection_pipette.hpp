@@ -41,6 +41,8 @@ class InjectionPipette {
                                     bool keep_tube, GatheredFrames* frames = nullptr);
   // moved: what the manipulator has moved it by since the last frame, px, where that is known.
   [[nodiscard]] NeedlePose find(const GradientField& field, double noise, const std::optional<Point>& moved);
+  // All that the picture shows lies elsewhere, by that, and it was found there.
+  void jump_with_picture(const Point& by) { velocity_ -= by; }
   // Where advance_start found it, in the frame that showed its end.
   [[nodiscard]] NeedlePose as_found(double noise) const;
   // It is known to be elsewhere along its axis than the picture shows.

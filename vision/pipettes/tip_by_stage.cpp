@@ -41,6 +41,16 @@ void TipByStage::begin(const std::optional<Point>& stage) {
   variance_ += squared(kStageDrift_px);
 }
 
+void TipByStage::jump_with_picture(const Point& by) {
+  constexpr double kUncertain_px = 0.3;
+  off_ += by;
+  variance_ += squared(kUncertain_px);
+  disagreements_ = 0;
+  if (rest_) {
+    rest_->tip += by;
+  }
+}
+
 void TipByStage::after_gap() {
   constexpr double kDrift_px = 1;
   stage_.reset();

@@ -23,6 +23,8 @@ class TipByStage {
   // Takes in how far off the stage is. Only while nothing touches the tip.
   void learn(const NeedlePose& seen);
   [[nodiscard]] double sd() const;  // of tip() along the axis, px
+  // All that the picture shows lies elsewhere, by that.
+  void jump_with_picture(const Point& by);
   // No frame was seen for a while: it may have drifted, and moved by any distance.
   void after_gap();
   void forget();  // all but where the stage is

@@ -10,6 +10,7 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -559,6 +560,99 @@ TEST(Tracker, outlives_a_pose_that_jumps) {
   const Drawing drawn{.tip = tip, .seed = 99};
   EXPECT_TRUE(tracker.process(frame_of(draw(drawn), n), Point(tip, kCentre.y)).needle.ok);
 }
+
+// Everything from that column on stays.
+cv::Mat moved_up_to(const cv::Mat& picture, const cv::Point& by, int column) {
+  cv::Mat out = picture.clone();
+  for (int y = 0; y < picture.rows; ++y) {
+    for (int x = 0; x < column; ++x) {
+      out.at<std::uint8_t>(y, x) = picture.at<std::uint8_t>(std::clamp(y - by.y, 0, picture.rows - 1),
+                                                            std::clamp(x - by.x, 0, picture.cols - 1));
+    }
+  }
+  return out;
+}
+
+// Somebody knocks against the microscope: the manipulator tells nothing of it.
+class JumpingPicture : public testing::TestWithParam<std::tuple<cv::Point, bool>> {
+ protected:
+  // The needle's way, from where it touches: into the membrane, and through it, if it punctures.
+  void go(double from, double to) {
+    const double surface = kCentre.x + kR;
+    for (double d = from; d <= to; d += 1) {
+      const bool through = d > kHolds;
+      drawn_ = draw({.tip = surface - d, .dent = through ? 0 : std::max(d, 0.0), .seed = ++seed_});
+      tip_ = {surface - d, kCentre.y};
+      (void)look(drawn_);
+    }
+  }
+  const Result& look(const cv::Mat& picture) {
+    const Point told = tip_ + Point(3, -2);
+    return tracker_.process(frame_of(picture, frames_++),
+                            std::get<1>(GetParam()) ? std::optional(told) : std::nullopt);
+  }
+  void expect_the_same_after_the_jump(bool contact, bool punctured) {
+    const cv::Point by = std::get<0>(GetParam());
+    const cv::Mat jumped = moved_up_to(drawn_, by, kW);
+    const int settles = cv::norm(by) < 16 ? 0 : 3;  // further than the holding pipette is looked for at once
+    for (int k = 0; k < 6; ++k) {
+      const Result& r = look(jumped);
+      EXPECT_EQ(r.punctured, punctured) << k;
+      if (k >= settles) {
+        EXPECT_EQ(r.verdict, "ok") << k;
+        EXPECT_EQ(r.contact, contact) << k;
+        EXPECT_LT(cv::norm(r.needle.tip - tip_ - Point(by)), 1.2) << k;
+        ASSERT_TRUE(r.undeformed) << k;
+        EXPECT_LT(cv::norm(r.undeformed->centre - kCentre - Point(by)), 0.5) << k;
+      }
+    }
+  }
+
+  static constexpr double kHolds = 12;  // px that the membrane is pushed in by before it gives way
+  Tracker tracker_{{}, kW, kH};
+  cv::Mat drawn_;
+  Point tip_;
+  std::uint64_t frames_ = 0;
+  unsigned seed_ = 0;
+};
+
+TEST_P(JumpingPicture, leaves_the_needle_before_the_cell) {
+  go(-24, -12);
+  expect_the_same_after_the_jump(false, false);
+}
+
+TEST_P(JumpingPicture, punctures_nothing_and_loses_no_contact) {
+  go(-14, 9);
+  expect_the_same_after_the_jump(true, false);
+}
+
+TEST_P(JumpingPicture, leaves_a_needle_in_the_cell) {
+  go(-14, 24);
+  expect_the_same_after_the_jump(true, true);
+}
+
+TEST_P(JumpingPicture, is_none_where_the_holding_pipette_is_moved_with_its_cell) {
+  const cv::Point by = std::get<0>(GetParam());
+  if (cv::norm(by) > 16) {
+    return;  // into the needle
+  }
+  go(-34, -22);
+  const Point centre = kCentre + Point(by);
+  const cv::Mat held_elsewhere = moved_up_to(drawn_, by, static_cast<int>(tip_.x) - 6);
+  for (int k = 0; k < 6; ++k) {
+    const Result& r = look(held_elsewhere);
+    EXPECT_EQ(r.verdict, "ok") << k;
+    EXPECT_FALSE(r.contact || r.punctured) << k;
+    EXPECT_LT(cv::norm(r.needle.tip - tip_), 1.2) << k;
+    ASSERT_TRUE(r.undeformed) << k;
+    EXPECT_LT(cv::norm(r.undeformed->centre - centre), 0.5) << k;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Tracker, JumpingPicture,
+                         testing::Combine(testing::Values(cv::Point(5, 0), cv::Point(-6, 0), cv::Point(0, 7),
+                                                          cv::Point(-11, -4), cv::Point(19, 7)),
+                                          testing::Bool()));
 
 // Of a camera that stops for some frames.
 TEST(Tracker, finds_a_needle_again_wherever_along_its_line_it_has_gone) {

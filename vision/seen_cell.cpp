@@ -17,6 +17,7 @@ namespace {
 
 constexpr double kMayTouch_px = 8;  // nearer, the needle may touch the membrane
 constexpr double kClear_px = 3;     // further away, it does not: its blur ends before
+constexpr int kOthersAfter = 25;  // frames in which a cell that was touched is missing: no other came before
 
 }  // namespace
 
@@ -46,6 +47,14 @@ bool SeenCell::start(const ClearedPicture& picture, const Touch& touch, bool at_
     return false;
   }
   result.outer.reason = begun->reason;
+  const bool touched = touch.contact || touch.punctured;
+  if (touched && outer_.known && outer_.rest.reliable() && ++frames_lost_ < kOthersAfter &&
+      !(begun->outer.known &&
+        undeformed_.same_cell(begun->outer.contour(), begun->outer.centre, result.needle))) {
+    result.outer.reason = "not the cell that was touched";
+    return false;
+  }
+  frames_lost_ = 0;
   take(std::move(*begun), touch, result);
   return outer_.known || inner_.known;
 }
@@ -87,25 +96,30 @@ void SeenCell::doubt_outer(const ClearedPicture& picture, const Touch& touch, co
 }
 
 // With what holds it, or with the picture: where its edge is seen there rather than here.
-bool SeenCell::jumps_by(const ClearedPicture& picture, const Point& by) {
-  const Contour contour = outermost().contour();
+void SeenCell::begin(const ClearedPicture& picture, const SeenHolder& holder) {
+  carried_ = holder.moved();
+  jump_ = {};
+  const auto by = holder.jump();
+  if (!by || !outermost().known) {
+    return;
+  }
   double here = 0, there = 0;
-  for (const Point& p : contour) {
-    const Point slope_here = picture.field.gradient(p), slope_there = picture.field.gradient(p + by);
-    here += std::abs(slope_here.dot(p - outermost().centre));
-    there += std::abs(slope_there.dot(p - outermost().centre));
+  for (const Point& p : outermost().contour()) {
+    const Point outwards = p - outermost().centre;
+    here += std::abs(picture.field.gradient(p).dot(outwards));
+    there += std::abs(picture.field.gradient(p + *by).dot(outwards));
   }
-  if (!(there > here)) {
-    return false;
+  if (there > here) {
+    outer_.jump_with_picture(*by);
+    inner_.jump_with_picture(*by);
+    undeformed_.jump_with_picture(*by);
+    jump_ = *by;
+    carried_ = Point();
   }
-  outer_.jump_with_picture(by);
-  inner_.jump_with_picture(by);
-  undeformed_.jump_with_picture(by);
-  return true;
 }
 
-void SeenCell::follow(const ClearedPicture& picture, const SeenHolder& holder, const SeenNeedle& needle,
-                      const Touch& touch, Result& result, Stopwatch& watch) {
+void SeenCell::follow(const ClearedPicture& picture, const SeenNeedle& needle, const Touch& touch,
+                      Result& result, Stopwatch& watch) {
   if (config_.method == Method::paper) {
     follow_snakes(picture, result, watch);
     return;
@@ -114,12 +128,7 @@ void SeenCell::follow(const ClearedPicture& picture, const SeenHolder& holder, c
   NeedlePose on_membrane = result.needle;  // its tip where the membrane on it is seen
   on_membrane.tip = needle.on_membrane(result.needle);
   // Everything is told as if neither it nor the needle had jumped.
-  std::optional<Point> carried = holder.moved();
-  Point jump;
-  if (holder.jump() && jumps_by(picture, *holder.jump())) {
-    jump = *std::exchange(carried, Point());
-  }
-  const Point needle_alone = needle.jump() - jump;
+  const Point needle_alone = needle.jump() - jump_;
   std::optional<Point> last_tip = needle.last_on_membrane();
   if (last_tip) {
     *last_tip -= needle_alone;
@@ -129,7 +138,7 @@ void SeenCell::follow(const ClearedPicture& picture, const SeenHolder& holder, c
         .needle = on_membrane,
         .last_tip = last_tip,
         .expected_px = needle.expected_px(result.needle) + needle_alone.dot(result.needle.axis),
-        .carried = carried,
+        .carried = carried_,
         .gone_odds = needle.membrane_gone_odds(),
         .punctured = touch.punctured,
         .wall_px = config_.px(config_.h_m),

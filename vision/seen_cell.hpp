@@ -34,13 +34,15 @@ class SeenCell {
   [[nodiscard]] bool must_start() const {
     return outer_.known ? outer_.lost() : !inner_.known || inner_.lost();
   }
+  // Once per frame, before anything else: it goes where the holding pipette has gone.
+  void begin(const ClearedPicture& picture, const SeenHolder& holder);
   // Once, when another one was found than the one that was touched.
   [[nodiscard]] bool is_another() noexcept { return std::exchange(another_, false); }
   // at_once: all of the search is done in this frame. False while no membrane is known.
   [[nodiscard]] bool start(const ClearedPicture& picture, const Touch& touch, bool at_once, Result& result);
   // Sets the membranes of the result.
-  void follow(const ClearedPicture& picture, const SeenHolder& holder, const SeenNeedle& needle,
-              const Touch& touch, Result& result, Stopwatch& watch);
+  void follow(const ClearedPicture& picture, const SeenNeedle& needle, const Touch& touch, Result& result,
+              Stopwatch& watch);
   // Sets its undeformed membrane, its entry and its gap. needle_hidden: it may touch the cell. False where it
   // is larger or smaller than cells of the scene: then it is none, and given up.
   [[nodiscard]] bool measure(const ClearedPicture& picture, const Touch& touch, bool needle_hidden,
@@ -49,7 +51,6 @@ class SeenCell {
  private:
   [[nodiscard]] std::optional<StartedMembranes> search(const ClearedPicture& picture, bool at_once);
   void take(StartedMembranes&& begun, const Touch& touch, const Result& result);
-  [[nodiscard]] bool jumps_by(const ClearedPicture& picture, const Point& by);
   void doubt_outer(const ClearedPicture& picture, const Touch& touch, const Result& result);
   void follow_snakes(const ClearedPicture& picture, Result& result, Stopwatch& watch);
   [[nodiscard]] bool round_as_if_untouched(const ClearedPicture& picture, const Touch& touch,
@@ -70,6 +71,11 @@ class SeenCell {
   LearntUndeformed undeformed_;                       // of the outer one
   double entry_sd_px_ = 0;
   bool another_ = false;
+  // By which it moved with the holding pipette since the last frame, px; and in one jump, which all that is
+  // kept of it has gone along with.
+  std::optional<Point> carried_;
+  Point jump_;
+  int frames_lost_ = 0;  // that showed another one than that which was touched
 };
 
 }  // namespace punctum::vision

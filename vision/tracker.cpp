@@ -164,6 +164,7 @@ const Result& Tracker::Impl::process(const hal::Frame& frame, const std::optiona
     result.us.holder = watch.lap_us();
   }
   picture.compute_gradient(area_to_search(starting));
+  cell.begin(picture, holder);
   result.us.prepare += watch.lap_us();
 
   if (config.needle) {
@@ -190,7 +191,7 @@ const Result& Tracker::Impl::process(const hal::Frame& frame, const std::optiona
     result.us.start = watch.lap_us();
   }
   if (found) {
-    cell.follow(picture, holder, needle, events.touch(), result, watch);
+    cell.follow(picture, needle, events.touch(), result, watch);
     found = cell.measure(picture, events.touch(), needle.hidden(result.needle), holder.found(), result);
     result.us.measure = watch.lap_us();
   }

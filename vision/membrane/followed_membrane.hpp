@@ -49,7 +49,7 @@ struct FollowedMembrane {
     centre += by;
     rest.centre += by;
     carried.jump_with_picture(by);
-    recoil.jump_with_picture(by);
+    recoil.forget();
   }
   [[nodiscard]] Contour contour() const { return from_polar(centre, r); }
   [[nodiscard]] bool lost() const noexcept { return lost_frames >= 2; }  // one frame may fail

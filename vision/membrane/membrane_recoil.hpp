@@ -23,7 +23,6 @@ class MembraneRecoil {
                                              const Point& entry, std::optional<double> carried_px,
                                              double moved_px, double level, double below_px);
   void forget() noexcept { seen_ = false; }
-  void jump_with_picture(const Point& by) { entry_ += by; }
 
  private:
   static constexpr std::size_t kOneSide = 12, kLanes = 2 * kOneSide;  // lanes along the needle, beside it

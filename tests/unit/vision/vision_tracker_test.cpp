@@ -594,8 +594,8 @@ class JumpingPicture : public testing::TestWithParam<std::tuple<cv::Point, bool>
   void expect_the_same_after_the_jump(bool contact, bool punctured) {
     const cv::Point by = std::get<0>(GetParam());
     const cv::Mat jumped = moved_up_to(drawn_, by, kW);
-    const int settles = cv::norm(by) < 16 ? 0 : 3;  // further than the holding pipette is looked for at once
-    for (int k = 0; k < 6; ++k) {
+    const int settles = cv::norm(by) < 16 ? 0 : 4;  // further than the holding pipette is looked for at once
+    for (int k = 0; k < 8; ++k) {
       const Result& r = look(jumped);
       EXPECT_EQ(r.punctured, punctured) << k;
       if (k >= settles) {

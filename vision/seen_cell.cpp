@@ -95,7 +95,8 @@ void SeenCell::doubt_outer(const ClearedPicture& picture, const Touch& touch, co
   }
 }
 
-// With what holds it, or with the picture: where its edge is seen there rather than here.
+// With what holds it, or with the picture: where its edge is seen there rather than here, or where a frame
+// between did not show what holds it, in which anything may have been taken for its edge.
 void SeenCell::begin(const ClearedPicture& picture, const SeenHolder& holder) {
   carried_ = holder.moved();
   jump_ = {};
@@ -109,7 +110,7 @@ void SeenCell::begin(const ClearedPicture& picture, const SeenHolder& holder) {
     here += std::abs(picture.field.gradient(p).dot(outwards));
     there += std::abs(picture.field.gradient(p + *by).dot(outwards));
   }
-  if (there > here) {
+  if (there > here || !holder.moved()) {
     outer_.jump_with_picture(*by);
     inner_.jump_with_picture(*by);
     undeformed_.jump_with_picture(*by);

@@ -382,6 +382,13 @@ class ReliefFrames : public testing::TestWithParam<Relief> {
   fs::path folder;
 };
 
+cv::Mat moved(const cv::Mat& picture, const cv::Point& by) {
+  cv::Mat out;
+  const int x = std::abs(by.x), y = std::abs(by.y);
+  cv::copyMakeBorder(picture, out, y, y, x, x, cv::BORDER_REPLICATE);
+  return out(cv::Rect(x - by.x, y - by.y, picture.cols, picture.rows)).clone();
+}
+
 TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
   nlohmann::json truth;
   std::ifstream(folder / "truth.json") >> truth;
@@ -475,6 +482,17 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
       still.colRange(0, still.cols - 1).copyTo(picture.colRange(1, picture.cols));
     }
     EXPECT_FALSE(shaken.process(frame_of(picture, static_cast<std::uint64_t>(k))).punctured) << k;
+  }
+
+  // A knock while the needle pushes: from then on the picture lies elsewhere.
+  ASSERT_TRUE(begun["contact"]);
+  const int pushes = (*begun["contact"] + deepest) / 2;
+  for (const cv::Point by : {cv::Point(6, 0), {-9, 4}, {20, -8}, {-25, 0}}) {
+    Tracker knocked(config, size.width, size.height);
+    for (int k = 0; k <= deepest; ++k) {
+      const cv::Mat still = drawn(folder, k), picture = k < pushes ? still : moved(still, by);
+      EXPECT_FALSE(knocked.process(frame_of(picture, static_cast<std::uint64_t>(k))).punctured) << by << k;
+    }
   }
 }
 

@@ -654,6 +654,39 @@ INSTANTIATE_TEST_SUITE_P(Tracker, JumpingPicture,
                                                           cv::Point(-11, -4), cv::Point(19, 7)),
                                           testing::Bool()));
 
+// Something hides the zona for a while: what is left within it is smaller than the cell that was touched.
+TEST(Tracker, takes_no_part_of_a_punctured_cell_for_another_one) {
+  Tracker tracker({}, kW, kH);
+  const double surface = kCentre.x + kR;
+  unsigned n = 0;
+  for (double d = -14; d <= 24; d += 1) {
+    (void)tracker.process(
+        frame_of(draw({.tip = surface - d, .dent = d > 12 ? 0 : std::max(d, 0.0), .seed = n + 1}), n));
+    ++n;
+  }
+  for (int k = 0; k < 24; ++k) {
+    const cv::Mat whole = draw({.tip = surface - 24, .seed = n + 1}),
+                  ooplasm = draw({.tip = surface - 24, .seed = n + 1, .cell = false});
+    cv::Mat picture = whole.clone();
+    for (int y = 0; y < kH; ++y) {
+      for (int x = 0; x < kW; ++x) {
+        const double r = cv::norm(Point(x, y) - kCentre);
+        if (k < 12 && r > kInner + 2) {
+          picture.at<std::uint8_t>(y, x) = ooplasm.at<std::uint8_t>(y, x);
+        }
+      }
+    }
+    const Result& r = tracker.process(frame_of(picture, n++));
+    EXPECT_TRUE(r.punctured) << k;
+    if (r.undeformed) {
+      EXPECT_NEAR(r.undeformed->r, kR, 1) << k;
+    }
+    if (k >= 16) {
+      EXPECT_TRUE(r.outer.ok) << k << r.verdict;
+    }
+  }
+}
+
 // Of a camera that stops for some frames.
 TEST(Tracker, finds_a_needle_again_wherever_along_its_line_it_has_gone) {
   for (const double back : {30.0, 45.0, 60.0}) {

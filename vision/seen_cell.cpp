@@ -76,6 +76,33 @@ void SeenCell::take(StartedMembranes&& begun, const Touch& touch, const Result& 
   }
 }
 
+// A bubble, or a cell that lies about, is given up for the one at the mouth of the holding pipette.
+void SeenCell::look_for_a_held_one(const ClearedPicture& picture, const Touch& touch, const Result& result) {
+  constexpr int kMostFrames = 200;
+  if (touch.contact || touch.punctured || !picture.holder_face ||
+      is_held({outermost().centre, median_of(outermost().r)}, picture)) {
+    held_.reset();
+    not_held_ = 0;
+    next_look_ = kFirstLook;
+    return;
+  }
+  if (!held_) {
+    if (++not_held_ >= next_look_) {
+      held_.emplace(std::nullopt);  // in the next frame, of which the whole picture is made ready
+    }
+    return;
+  }
+  if (auto begun = held_->advance(picture, config_)) {
+    held_.reset();
+    not_held_ = 0;
+    next_look_ = std::min(2 * next_look_, kMostFrames);
+    const FollowedMembrane& found = begun->outer.known ? begun->outer : begun->inner;
+    if (found.known && is_held({found.centre, median_of(found.r)}, picture)) {
+      take(std::move(*begun), touch, result);
+    }
+  }
+}
+
 // What is followed as the outer membrane may be another edge for a part of the way, or all of it. Then no
 // inner one is seen; a start in the present picture may show both.
 void SeenCell::doubt_outer(const ClearedPicture& picture, const Touch& touch, const Result& result) {
@@ -125,6 +152,7 @@ void SeenCell::follow(const ClearedPicture& picture, const SeenNeedle& needle, c
     follow_snakes(picture, result, watch);
     return;
   }
+  look_for_a_held_one(picture, touch, result);
   doubt_outer(picture, touch, result);
   NeedlePose on_membrane = result.needle;  // its tip where the membrane on it is seen
   on_membrane.tip = needle.on_membrane(result.needle);

@@ -31,6 +31,8 @@ class SeenCell {
   // Standard deviation of where the needle's axis meets it at rest, px.
   [[nodiscard]] double entry_sd_px() const noexcept { return entry_sd_px_; }
 
+  // Beside one that is followed, and somewhere in the picture.
+  [[nodiscard]] bool looks_for_another() const noexcept { return held_.has_value(); }
   [[nodiscard]] bool must_start() const {
     return outer_.known ? outer_.lost() : !inner_.known || inner_.lost();
   }
@@ -51,6 +53,7 @@ class SeenCell {
  private:
   [[nodiscard]] std::optional<StartedMembranes> search(const ClearedPicture& picture, bool at_once);
   void take(StartedMembranes&& begun, const Touch& touch, const Result& result);
+  void look_for_a_held_one(const ClearedPicture& picture, const Touch& touch, const Result& result);
   void doubt_outer(const ClearedPicture& picture, const Touch& touch, const Result& result);
   void follow_snakes(const ClearedPicture& picture, Result& result, Stopwatch& watch);
   [[nodiscard]] bool round_as_if_untouched(const ClearedPicture& picture, const Touch& touch,
@@ -61,12 +64,15 @@ class SeenCell {
   void give_up(Result& result);
   void measure_gap(int fitted_points, Result& result);
 
+  static constexpr int kFirstLook = 25;  // frames with one that is not held; after twice as many again, ..
   static constexpr int kFirstDoubt = 5;  // frames without the inner membrane; after twice as many again, ..
 
   const VisionConfig& config_;
   std::optional<Circle> seed_;
   FollowedMembrane outer_, inner_;
   std::optional<CellSearch> search_;                  // while there is more to do
+  std::optional<CellSearch> held_;                    // of one that is held, beside another one
+  int not_held_ = 0, next_look_ = kFirstLook;         // frames
   int inner_missing_ = 0, next_doubt_ = kFirstDoubt;  // frames
   LearntUndeformed undeformed_;                       // of the outer one
   double entry_sd_px_ = 0;

@@ -248,7 +248,7 @@ Vector<Side> Tracker::Impl::holder_sides() const {
 cv::Rect Tracker::Impl::area_to_search(bool starting) const {
   const cv::Rect whole(0, 0, width, height);
   const TipMotion& tip = needle.motion();
-  if (starting || needle.due() || (needle.started() && !tip.last)) {
+  if (starting || cell.looks_for_another() || needle.due() || (needle.started() && !tip.last)) {
     return whole;
   }
   const FollowedMembrane& m = cell.outermost();

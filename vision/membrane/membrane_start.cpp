@@ -319,6 +319,17 @@ double texture(const GradientField& field) {
 
 }  // namespace
 
+bool is_held(const Circle& c, const ClearedPicture& picture) {
+  constexpr double kWithin = 0.3, kBeyond = 0.8, kAside = 0.6;  // of the radius
+  if (!picture.holder_face) {
+    return false;
+  }
+  const Point to_centre = c.centre - picture.holder_face->mouth;
+  const double ahead = to_centre.dot(picture.holder_face->axis),
+               aside = std::abs(to_centre.cross(picture.holder_face->axis));
+  return aside < kAside * c.r && ahead > (1 - kWithin) * c.r && ahead < (1 + kBeyond) * c.r;
+}
+
 CellSearch::CellSearch(const std::optional<Circle>& seed, const std::optional<Circle>& last_seen)
     : seeded_(seed), last_seen_(last_seen), parts_voted_(seed ? kVotingParts : 0) {
   if (seed) {
@@ -337,7 +348,7 @@ std::optional<StartedMembranes> CellSearch::advance(const ClearedPicture& pictur
     return std::nullopt;
   }
   if (auto votes = std::exchange(votes_, std::nullopt)) {
-    choose_circles(*votes);
+    choose_circles(*votes, picture);
     if (!circles_.empty()) {
       return std::nullopt;
     }
@@ -350,7 +361,7 @@ std::optional<StartedMembranes> CellSearch::advance(const ClearedPicture& pictur
     try_circles(picture, config);
     return std::nullopt;
   }
-  if (!candidates_.empty() && (!alone_ || candidates_.front().strength > alone_strength_)) {
+  if (!candidates_.empty() && (!alone_ || candidates_.front().rank > alone_rank_)) {
     if (auto begun = try_strongest(picture, config)) {
       return begun;
     }
@@ -382,7 +393,7 @@ std::optional<StartedMembranes> CellSearch::try_strongest(const ClearedPicture& 
   }
   if (begun && (begun->outer.known || begun->inner.known)) {
     alone_ = std::move(begun);
-    alone_strength_ = strongest.strength;
+    alone_rank_ = strongest.rank;
   } else if (begun) {
     reason_ = begun->reason;
   }
@@ -410,12 +421,15 @@ void CellSearch::vote(const ClearedPicture& picture, const VisionConfig& config)
   ++parts_voted_;
 }
 
-void CellSearch::choose_circles(CircleSearch& votes) {
-  for (const CircleCandidate& c : votes.best(kCircles)) {
+void CellSearch::choose_circles(CircleSearch& votes, const ClearedPicture& picture) {
+  for (const CircleCandidate& c : votes.best(picture.holder_face ? 2 * kCircles : kCircles)) {
     if (c.score >= kCircleScore) {
       circles_.push_back(c.circle);
     }
   }
+  std::stable_partition(circles_.begin(), circles_.end(),
+                        [&picture](const Circle& c) { return is_held(c, picture); });
+  circles_.resize(std::min<std::size_t>(circles_.size(), kCircles));
   // A long cell gives a circle at either end: the mean of the circles is tried as well.
   if (circles_.size() > 2) {
     Circle mean = circles_[0];
@@ -433,10 +447,11 @@ void CellSearch::try_circles(const ClearedPicture& picture, const VisionConfig& 
       continue;
     }
     saturation_ = edge->path.saturation;
-    const Candidate c{{edge->centre, circle.r}, edge->path.mean_strength};
+    const Circle found{edge->centre, circle.r};
+    const Candidate c{found, {is_held(found, picture), edge->path.mean_strength}};
     candidates_.insert(
         std::upper_bound(candidates_.begin(), candidates_.end(), c,
-                         [](const Candidate& l, const Candidate& r) { return l.strength > r.strength; }),
+                         [](const Candidate& l, const Candidate& r) { return l.rank > r.rank; }),
         c);
   }
 }

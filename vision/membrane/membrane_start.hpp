@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "vision/image/hough_circles.hpp"
 #include "vision/image/kept_vector.hpp"
@@ -15,6 +16,9 @@ struct StartedMembranes {
   FollowedMembrane outer, inner;  // either may stay unknown
   std::string reason;             // when none was found
 };
+
+// Where the holding pipette's mouth is on a cell, or as far outside of it as a zona may be round its ooplasm.
+[[nodiscard]] bool is_held(const Circle& cell, const ClearedPicture& picture);
 
 // The search of a cell of which nothing is known, in parts of about the same cost: where a frame has no time
 // for all of them, each does its part in its own picture.
@@ -30,12 +34,15 @@ class CellSearch {
                                                         const VisionConfig& config);
 
  private:
+  // A cell that is held comes before any bubble, and before other cells, however clear; then the strength of
+  // the closed edge round it counts.
+  using Rank = std::pair<bool, double>;
   struct Candidate {
     Circle circle;
-    double strength = 0;  // of the closed edge round it
+    Rank rank;
   };
   void vote(const ClearedPicture& picture, const VisionConfig& config);
-  void choose_circles(CircleSearch& votes);
+  void choose_circles(CircleSearch& votes, const ClearedPicture& picture);
   void try_circles(const ClearedPicture& picture, const VisionConfig& config);
   void look_round(const Circle& circle);
   [[nodiscard]] std::optional<StartedMembranes> try_strongest(const ClearedPicture& picture,
@@ -51,10 +58,10 @@ class CellSearch {
   Vector<Circle> circles_;        // still to be tried
   Vector<Point> tried_;           // centres of the edges round those that were
   double saturation_ = 0;         // grey levels per px, the same for all circles
-  Vector<Candidate> candidates_;  // the strongest first
+  Vector<Candidate> candidates_;  // the highest rank first
   // A membrane that was found alone, which may be a part of a cell.
   std::optional<StartedMembranes> alone_;
-  double alone_strength_ = 0;
+  Rank alone_rank_;
   int looks_ = 0;
   std::string reason_;  // why the last edge that was told apart is none
 };

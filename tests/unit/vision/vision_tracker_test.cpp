@@ -654,6 +654,48 @@ INSTANTIATE_TEST_SUITE_P(Tracker, JumpingPicture,
                                                           cv::Point(-11, -4), cv::Point(19, 7)),
                                           testing::Bool()));
 
+void add_bubble(cv::Mat& picture, const Point& at, double r) {
+  for (int y = 0; y < picture.rows; ++y) {
+    for (int x = 0; x < picture.cols; ++x) {
+      const double off = cv::norm(Point(x, y) - at) - r;
+      const double g =
+          (off < 0 ? 20 : 0) - 100 * std::exp(-off * off / 18) + 40 * std::exp(-(off - 6) * (off - 6) / 12);
+      auto& grey = picture.at<std::uint8_t>(y, x);
+      grey = cv::saturate_cast<std::uint8_t>(grey + g);
+    }
+  }
+}
+
+TEST(Tracker, finds_the_cell_that_is_held_beside_bubbles) {
+  for (const double r : {40.0, 56.0}) {
+    for (const Point& at : {Point(300, 60), Point(430, 330)}) {
+      cv::Mat picture = draw({.tip = 430, .noise = 5});
+      add_bubble(picture, at, r);
+      Tracker tracker({}, kW, kH);
+      const Result& seen = tracker.process(frame_of(picture, 0));
+      EXPECT_EQ(seen.verdict, "ok") << r << at;
+      ASSERT_TRUE(seen.undeformed) << r << at;
+      EXPECT_LT(cv::norm(seen.undeformed->centre - kCentre), 1) << r << at;
+      EXPECT_NEAR(seen.undeformed->r, kR, 1) << r << at;
+    }
+  }
+}
+
+TEST(Tracker, leaves_a_bubble_for_a_cell_that_is_held) {
+  Tracker tracker({}, kW, kH);
+  int found = -1;
+  for (unsigned k = 0; k < 90; ++k) {
+    cv::Mat picture = draw({.tip = 480, .seed = k + 1, .cell = k >= 20});
+    add_bubble(picture, {430, 320}, 45);
+    const Result& seen = tracker.process(frame_of(picture, k));
+    const bool right = seen.undeformed && cv::norm(seen.undeformed->centre - kCentre) < 1;
+    EXPECT_TRUE(right || found < 0) << k << seen.verdict;
+    found = right && found < 0 ? static_cast<int>(k) : found;
+  }
+  EXPECT_GE(found, 20);
+  EXPECT_LE(found, 80);
+}
+
 // Something hides the zona for a while: what is left within it is smaller than the cell that was touched.
 TEST(Tracker, takes_no_part_of_a_punctured_cell_for_another_one) {
   Tracker tracker({}, kW, kH);

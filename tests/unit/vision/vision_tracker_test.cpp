@@ -681,6 +681,23 @@ TEST(Tracker, finds_the_cell_that_is_held_beside_bubbles) {
   }
 }
 
+// The other one lies in better focus.
+TEST(Tracker, finds_the_cell_that_is_held_beside_another_one) {
+  const cv::Rect cell(cv::Point(kCentre) - cv::Point(80, 80), cv::Size(160, 160));
+  cv::Mat picture, clear = draw({.noise = 0, .needle = false, .holder = false})(cell);
+  cv::GaussianBlur(draw({.tip = 430, .noise = 0}), picture, cv::Size(0, 0), 2);
+  clear.copyTo(picture(cell + cv::Point(200, 130)));
+  cv::Mat noise(picture.size(), CV_16S);
+  cv::theRNG().state = 1;
+  cv::randn(noise, 0, 5);
+  cv::add(picture, noise, picture, cv::noArray(), CV_8U);
+  Tracker tracker({}, kW, kH);
+  const Result& seen = tracker.process(frame_of(picture, 0));
+  EXPECT_EQ(seen.verdict, "ok");
+  ASSERT_TRUE(seen.undeformed);
+  EXPECT_LT(cv::norm(seen.undeformed->centre - kCentre), 1);
+}
+
 TEST(Tracker, leaves_a_bubble_for_a_cell_that_is_held) {
   Tracker tracker({}, kW, kH);
   int found = -1;

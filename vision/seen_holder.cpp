@@ -22,6 +22,7 @@ void SeenHolder::go_on_from(SeenHolder& before) {
 void SeenHolder::begin() {
   constexpr int kEvery = 8;  // frames between two searches for a tube that was not found
   due_ = config_.holder && !tube_ && frames_++ % kEvery == 0;
+  ++ago_;
 }
 
 HolderPose SeenHolder::locate(ClearedPicture& picture, std::span<const Side> sides) {
@@ -52,11 +53,13 @@ HolderPose SeenHolder::locate(ClearedPicture& picture, std::span<const Side> sid
 
 void SeenHolder::compare(const HolderPose& holder) {
   way_.reset();
-  ++ago_;
   if (holder.ok && holder.sd > 0) {
     if (seen_at_) {
       way_ = holder.mouth - *seen_at_;
       apart_ = ago_;
+      if (tube_ && jump()) {
+        tube_->root += *jump();
+      }
     }
     seen_at_ = holder.mouth;
     ago_ = 0;

@@ -27,6 +27,8 @@ class SeenHolder {
   void begin();
   [[nodiscard]] bool due() const noexcept { return due_; }
   [[nodiscard]] bool found() const noexcept { return tube_.has_value(); }
+  // Of this frame, where it shows it exactly.
+  [[nodiscard]] std::optional<Point> mouth() const { return ago_ == 0 ? seen_at_ : std::nullopt; }
   // Its mouth, since the last frame, px; empty where one of the two does not show it exactly.
   [[nodiscard]] std::optional<Point> moved() const { return apart_ == 1 ? way_ : std::nullopt; }
   // Since the last frame that shows it, where that is further than it drifts: alone or with the whole

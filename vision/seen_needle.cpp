@@ -14,9 +14,8 @@ namespace punctum::vision {
 namespace {
 
 constexpr int kNeedleAtOnce = 6, kNeedleEvery = 8;  // frames between two tries, after so many of them
-constexpr const char* kJumped = "the picture has jumped";
-constexpr double kUntouched_px = 12;  // further outside, nothing touches the tip
-constexpr double kEndShows_px = 2;    // further outside, the end of the needle shows beside the membrane
+constexpr double kUntouched_px = 12;                // further outside, nothing touches the tip
+constexpr double kEndShows_px = 2;  // further outside, the end of the needle shows beside the membrane
 constexpr double kWall_px =
     0.4;  // from the membrane, which is what is seen on the tip, to the outermost glass
 constexpr double kAtMembrane_px = 0.3, kInside_px = 1.5;  // to which the picture alone shows the tip there
@@ -71,6 +70,7 @@ void SeenNeedle::forget() {
   tries_ = 0;
   by_stage_.forget();
   tip_on_membrane_ = {};
+  mouth_.reset();
 }
 
 // Frames are kept while the needle is missing in noise, or was found in few of them. Whether there are enough
@@ -138,12 +138,13 @@ NeedlePose SeenNeedle::locate(const ClearedPicture& picture, const FollowedMembr
                               const Touch& touch, const std::optional<Point>& mouth, bool at_once) {
   pipette_.in_relief(outer.known && outer.polarity == Polarity::relief);
   wall_px_ = gone_odds_ = 0;
+  before_.reset();
   NeedlePose n =
       search(picture, outer, touch, at_once) ? pipette_.as_found(picture.noise) : find(picture, mouth);
   on_tip_sd_px_ = n.sd;
   if (!stays_or_jumps(n, mouth)) {
     n.ok = seen_.ok = false;
-    n.reason = kJumped;
+    n.reason = "the picture has jumped";
     return n;
   }
   if (config_.method == Method::tracker && n.ok && touch.at_membrane() && outer.known) {
@@ -169,7 +170,6 @@ Point SeenNeedle::jump_of_mouth(const std::optional<Point>& mouth) const {
 NeedlePose SeenNeedle::find(const ClearedPicture& picture, const std::optional<Point>& mouth) {
   const std::optional<Point> moved = by_stage_.moved();
   const Point jump = jump_of_mouth(mouth);
-  before_.reset();
   if (mouth_ && (!mouth || jump != Point())) {
     before_ = pipette_;
   }
@@ -192,7 +192,7 @@ bool SeenNeedle::stays_or_jumps(const NeedlePose& n, const std::optional<Point>&
   constexpr int kMostFrames = 12;
   jump_ = {};
   const auto told = by_stage_.tip(), expected = told ? told : tip_;
-  if (before_ && expected && ++undecided_ < kMostFrames) {
+  if (before_ && ++undecided_ < kMostFrames && expected) {
     const Point jump = jump_of_mouth(mouth), off = n.tip - *expected;
     const double of_picture = std::max(told ? kSame_px : kSameAlone_px, 2 * n.sd),
                  near = mouth ? std::min(of_picture, kShare * cv::norm(jump)) : of_picture;
@@ -209,13 +209,15 @@ bool SeenNeedle::stays_or_jumps(const NeedlePose& n, const std::optional<Point>&
         *last_on_membrane_ += jump;
       }
     }
-    if (!mouth) {
-      return true;
-    }
   }
-  undecided_ = 0;
-  mouth_ = mouth;
-  tip_ = n.ok ? std::optional(n.tip + motion_.speed * motion_.axis) : std::nullopt;
+  const Point way = motion_.speed * motion_.axis;
+  if (mouth || !before_ || undecided_ >= kMostFrames) {
+    undecided_ = 0;
+    mouth_ = mouth;
+    tip_ = n.ok ? std::optional(n.tip + way) : std::nullopt;
+  } else if (tip_) {
+    *tip_ += way;
+  }
   return true;
 }
 

@@ -171,9 +171,7 @@ const Result& Tracker::Impl::process(const hal::Frame& frame, const std::optiona
     if (!needle.recognised(picture)) {
       events.forget_puncture(result);
     }
-    result.needle =
-        needle.locate(picture, cell.outer(), events.touch(),
-                      result.holder.ok ? std::optional(result.holder.mouth) : std::nullopt, first_picture);
+    result.needle = needle.locate(picture, cell.outer(), events.touch(), holder.mouth(), first_picture);
     result.us.needle = watch.lap_us();
   }
   if (config.holder && holder.due()) {

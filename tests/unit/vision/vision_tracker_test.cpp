@@ -684,8 +684,8 @@ TEST(Tracker, finds_the_cell_that_is_held_beside_bubbles) {
 // The other one lies in better focus.
 TEST(Tracker, finds_the_cell_that_is_held_beside_another_one) {
   const cv::Rect cell(cv::Point(kCentre) - cv::Point(80, 80), cv::Size(160, 160));
-  cv::Mat picture, clear = draw({.noise = 0, .needle = false, .holder = false})(cell);
-  cv::GaussianBlur(draw({.tip = 430, .noise = 0}), picture, cv::Size(0, 0), 2);
+  cv::Mat picture, clear = draw({.noise = 0.1, .needle = false, .holder = false})(cell);
+  cv::GaussianBlur(draw({.tip = 430, .noise = 0.1}), picture, cv::Size(0, 0), 2);
   clear.copyTo(picture(cell + cv::Point(200, 130)));
   cv::Mat noise(picture.size(), CV_16S);
   cv::theRNG().state = 1;

@@ -422,13 +422,13 @@ void CellSearch::vote(const ClearedPicture& picture, const VisionConfig& config)
 }
 
 void CellSearch::choose_circles(CircleSearch& votes, const ClearedPicture& picture) {
+  Vector<Circle> others;
   for (const CircleCandidate& c : votes.best(picture.holder_face ? 2 * kCircles : kCircles)) {
     if (c.score >= kCircleScore) {
-      circles_.push_back(c.circle);
+      (is_held(c.circle, picture) ? circles_ : others).push_back(c.circle);
     }
   }
-  std::stable_partition(circles_.begin(), circles_.end(),
-                        [&picture](const Circle& c) { return is_held(c, picture); });
+  circles_.insert(circles_.end(), others.begin(), others.end());
   circles_.resize(std::min<std::size_t>(circles_.size(), kCircles));
   // A long cell gives a circle at either end: the mean of the circles is tried as well.
   if (circles_.size() > 2) {

@@ -122,12 +122,34 @@ void SeenCell::doubt_outer(const ClearedPicture& picture, const Touch& touch, co
   }
 }
 
+void SeenCell::see_edge(ClearedPicture& picture) {
+  if (!outermost().known || outermost().lost()) {
+    pattern_.forget();
+  }
+  if (!pattern_.known()) {
+    return;
+  }
+  auto by = pattern_.nearby(picture.field);
+  if (!by) {
+    picture.compute_gradient({0, 0, picture.grey.cols, picture.grey.rows});
+    by = pattern_.anywhere(picture.field);
+  }
+  if (by) {
+    landmark_.seen(pattern_centre_ + *by);
+  }
+}
+
 // With what holds it, or with the picture: where its edge is seen there rather than here, or where a frame
 // between did not show what holds it, in which anything may have been taken for its edge.
-void SeenCell::begin(const ClearedPicture& picture, const SeenHolder& holder) {
-  carried_ = holder.moved();
+void SeenCell::begin(ClearedPicture& picture, const SeenHolder& holder) {
+  landmark_.begin();
+  if (!holder.found()) {
+    see_edge(picture);
+  }
+  const Landmark& landmark = holder.found() ? holder.landmark() : landmark_;
+  carried_ = holder.landmark().moved();
   jump_ = {};
-  const auto by = holder.jump();
+  const auto by = landmark.jump();
   if (!by || !outermost().known) {
     return;
   }
@@ -137,7 +159,7 @@ void SeenCell::begin(const ClearedPicture& picture, const SeenHolder& holder) {
     here += std::abs(picture.field.gradient(p).dot(outwards));
     there += std::abs(picture.field.gradient(p + *by).dot(outwards));
   }
-  if (there > here || !holder.moved()) {
+  if (there > here || !landmark.moved()) {
     outer_.jump_with_picture(*by);
     inner_.jump_with_picture(*by);
     undeformed_.jump_with_picture(*by);
@@ -147,7 +169,7 @@ void SeenCell::begin(const ClearedPicture& picture, const SeenHolder& holder) {
 }
 
 void SeenCell::follow(const ClearedPicture& picture, const SeenNeedle& needle, const Touch& touch,
-                      Result& result, Stopwatch& watch) {
+                      bool holder_found, Result& result, Stopwatch& watch) {
   if (config_.method == Method::paper) {
     follow_snakes(picture, result, watch);
     return;
@@ -195,6 +217,11 @@ void SeenCell::follow(const ClearedPicture& picture, const SeenNeedle& needle, c
       result.inner = std::move(inner);
     }
     result.us.inner = watch.lap_us();
+  }
+  const Membrane& outermost_now = outer_.known ? result.outer : result.inner;
+  if (!holder_found && outermost_now.ok) {
+    pattern_.learn(picture, outermost_now.contour);
+    pattern_centre_ = outermost().centre;
   }
 }
 

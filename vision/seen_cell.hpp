@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "vision/membrane/edge_pattern.hpp"
 #include "vision/membrane/membrane_start.hpp"
 #include "vision/result.hpp"
 #include "vision/seen_holder.hpp"
@@ -36,15 +37,18 @@ class SeenCell {
   [[nodiscard]] bool must_start() const {
     return outer_.known ? outer_.lost() : !inner_.known || inner_.lost();
   }
-  // Once per frame, before anything else: it goes where the holding pipette has gone.
-  void begin(const ClearedPicture& picture, const SeenHolder& holder);
+  // Once per frame, before anything else: it goes where the holding pipette has gone, or where its edge is
+  // seen to have gone, which takes the gradient of the whole picture.
+  void begin(ClearedPicture& picture, const SeenHolder& holder);
+  // Its edge, where no holding pipette is known.
+  [[nodiscard]] const Landmark& landmark() const noexcept { return landmark_; }
   // Once, when another one was found than the one that was touched.
   [[nodiscard]] bool is_another() noexcept { return std::exchange(another_, false); }
   // at_once: all of the search is done in this frame. False while no membrane is known.
   [[nodiscard]] bool start(const ClearedPicture& picture, const Touch& touch, bool at_once, Result& result);
   // Sets the membranes of the result.
-  void follow(const ClearedPicture& picture, const SeenNeedle& needle, const Touch& touch, Result& result,
-              Stopwatch& watch);
+  void follow(const ClearedPicture& picture, const SeenNeedle& needle, const Touch& touch, bool holder_found,
+              Result& result, Stopwatch& watch);
   // Sets its undeformed membrane, its entry and its gap. needle_hidden: it may touch the cell. False where it
   // is larger or smaller than cells of the scene: then it is none, and given up.
   [[nodiscard]] bool measure(const ClearedPicture& picture, const Touch& touch, bool needle_hidden,
@@ -55,6 +59,7 @@ class SeenCell {
   void take(StartedMembranes&& begun, const Touch& touch, const Result& result);
   void look_for_a_held_one(const ClearedPicture& picture, const Touch& touch, const Result& result);
   void doubt_outer(const ClearedPicture& picture, const Touch& touch, const Result& result);
+  void see_edge(ClearedPicture& picture);
   void follow_snakes(const ClearedPicture& picture, Result& result, Stopwatch& watch);
   [[nodiscard]] bool round_as_if_untouched(const ClearedPicture& picture, const Touch& touch,
                                            const Result& result) const;
@@ -77,6 +82,9 @@ class SeenCell {
   LearntUndeformed undeformed_;                       // of the outer one
   double entry_sd_px_ = 0;
   bool another_ = false;
+  EdgePattern pattern_;  // of the outermost one, where no holding pipette is known; learnt with this middle
+  Point pattern_centre_;
+  Landmark landmark_;
   // By which it moved with the holding pipette since the last frame, px; and in one jump, which all that is
   // kept of it has gone along with.
   std::optional<Point> carried_;

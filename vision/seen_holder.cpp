@@ -22,7 +22,7 @@ void SeenHolder::go_on_from(SeenHolder& before) {
 void SeenHolder::begin() {
   constexpr int kEvery = 8;  // frames between two searches for a tube that was not found
   due_ = config_.holder && !tube_ && frames_++ % kEvery == 0;
-  ++ago_;
+  landmark_.begin();
 }
 
 HolderPose SeenHolder::locate(ClearedPicture& picture, std::span<const Side> sides) {
@@ -42,33 +42,18 @@ HolderPose SeenHolder::locate(ClearedPicture& picture, std::span<const Side> sid
       follow_mouth(holder);
     }
   }
-  compare(holder);
+  if (holder.ok && holder.sd > 0) {
+    landmark_.seen(holder.mouth);
+    if (tube_ && landmark_.jump()) {
+      tube_->root += *landmark_.jump();
+    }
+  }
   if (tube_) {
     // The middle of a given template need not be the mouth.
     const Point mouth = holder.ok && !template_given_ ? holder.mouth : tube_->end();
     picture.holder_face = {mouth, tube_->axis, tube_->end_half_width};
   }
   return holder;
-}
-
-void SeenHolder::compare(const HolderPose& holder) {
-  way_.reset();
-  if (holder.ok && holder.sd > 0) {
-    if (seen_at_) {
-      way_ = holder.mouth - *seen_at_;
-      apart_ = ago_;
-      if (tube_ && jump()) {
-        tube_->root += *jump();
-      }
-    }
-    seen_at_ = holder.mouth;
-    ago_ = 0;
-  }
-}
-
-std::optional<Point> SeenHolder::jump() const {
-  constexpr double kDrift_px = 2;  // per frame: more is no drift
-  return way_ && cv::norm(*way_) > kDrift_px * apart_ ? way_ : std::nullopt;
 }
 
 // One picture tells it less surely than all of them.

@@ -6,6 +6,7 @@
 #include <span>
 
 #include "vision/config.hpp"
+#include "vision/image/landmark.hpp"
 #include "vision/membrane/cleared_picture.hpp"
 #include "vision/membrane/followed_membrane.hpp"
 #include "vision/pipettes/drifting_place.hpp"
@@ -27,13 +28,8 @@ class SeenHolder {
   void begin();
   [[nodiscard]] bool due() const noexcept { return due_; }
   [[nodiscard]] bool found() const noexcept { return tube_.has_value(); }
-  // Of this frame, where it shows it exactly.
-  [[nodiscard]] std::optional<Point> mouth() const { return ago_ == 0 ? seen_at_ : std::nullopt; }
-  // Its mouth, since the last frame, px; empty where one of the two does not show it exactly.
-  [[nodiscard]] std::optional<Point> moved() const { return apart_ == 1 ? way_ : std::nullopt; }
-  // Since the last frame that shows it, where that is further than it drifts: alone or with the whole
-  // picture.
-  [[nodiscard]] std::optional<Point> jump() const;
+  // Its mouth, where it is seen exactly.
+  [[nodiscard]] const Landmark& landmark() const noexcept { return landmark_; }
   // Tells the picture its face as well. sides: the borders that it may enter through.
   [[nodiscard]] HolderPose locate(ClearedPicture& picture, std::span<const Side> sides);
   // What is erased of it, where it is found. The paper's snake needs the membrane that the pipette touches:
@@ -42,14 +38,11 @@ class SeenHolder {
 
  private:
   void follow_mouth(HolderPose& holder);
-  void compare(const HolderPose& holder);
 
   const VisionConfig& config_;
   HoldingPipette pipette_;
   DriftingPlace mouth_;
-  std::optional<Point> seen_at_;  // its mouth, in the last frame that showed it
-  std::optional<Point> way_;      // there from the one before, if that is this frame
-  int apart_ = 0, ago_ = 0;       // those two frames; the last of them and this one
+  Landmark landmark_;
   std::optional<TubeTrace> tube_;
   bool template_given_ = false;
   bool due_ = false;

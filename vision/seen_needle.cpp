@@ -70,7 +70,7 @@ void SeenNeedle::forget() {
   tries_ = 0;
   by_stage_.forget();
   tip_on_membrane_ = {};
-  mouth_.reset();
+  landmark_.reset();
 }
 
 // Frames are kept while the needle is missing in noise, or was found in few of them. Whether there are enough
@@ -135,14 +135,14 @@ bool SeenNeedle::search(const ClearedPicture& picture, const FollowedMembrane& o
 }
 
 NeedlePose SeenNeedle::locate(const ClearedPicture& picture, const FollowedMembrane& outer,
-                              const Touch& touch, const std::optional<Point>& mouth, bool at_once) {
+                              const Touch& touch, const std::optional<Point>& landmark, bool at_once) {
   pipette_.in_relief(outer.known && outer.polarity == Polarity::relief);
   wall_px_ = gone_odds_ = 0;
   before_.reset();
   NeedlePose n =
-      search(picture, outer, touch, at_once) ? pipette_.as_found(picture.noise) : find(picture, mouth);
+      search(picture, outer, touch, at_once) ? pipette_.as_found(picture.noise) : find(picture, landmark);
   on_tip_sd_px_ = n.sd;
-  if (!stays_or_jumps(n, mouth)) {
+  if (!stays_or_jumps(n, landmark)) {
     n.ok = seen_.ok = false;
     n.reason = "the picture has jumped";
     return n;
@@ -160,17 +160,16 @@ NeedlePose SeenNeedle::locate(const ClearedPicture& picture, const FollowedMembr
 }
 
 // Since the needle was last where it was expected; none where that is no more than it may drift.
-Point SeenNeedle::jump_of_mouth(const std::optional<Point>& mouth) const {
-  constexpr double kDrift_px = 2;
-  const Point way = mouth && mouth_ ? *mouth - *mouth_ : Point();
-  return cv::norm(way) > kDrift_px ? way : Point();
+Point SeenNeedle::jump_of_landmark(const std::optional<Point>& landmark) const {
+  const Point way = landmark && landmark_ ? *landmark - *landmark_ : Point();
+  return cv::norm(way) > Landmark::kDrift_px ? way : Point();
 }
 
 // First where it would be if the whole picture had jumped.
-NeedlePose SeenNeedle::find(const ClearedPicture& picture, const std::optional<Point>& mouth) {
+NeedlePose SeenNeedle::find(const ClearedPicture& picture, const std::optional<Point>& landmark) {
   const std::optional<Point> moved = by_stage_.moved();
-  const Point jump = jump_of_mouth(mouth);
-  if (mouth_ && (!mouth || jump != Point())) {
+  const Point jump = jump_of_landmark(landmark);
+  if (landmark_ && (!landmark || jump != Point())) {
     before_ = pipette_;
   }
   if (jump != Point()) {
@@ -184,19 +183,19 @@ NeedlePose SeenNeedle::find(const ClearedPicture& picture, const std::optional<P
   return pipette_.find(picture.field, picture.noise, moved);
 }
 
-// A picture that jumps moves the holding pipette and the needle by the same; neither hand nor manipulator has
-// moved the needle then. False while it is neither where it was, nor as far from there as a holding pipette
-// that has jumped; or not where it was, and that is out of sight.
-bool SeenNeedle::stays_or_jumps(const NeedlePose& n, const std::optional<Point>& mouth) {
+// A picture that jumps moves landmark and needle by the same; neither hand nor manipulator has moved the
+// needle then. False while it is neither where it was, nor as far from there as a landmark that has jumped;
+// or not where it was, and that is out of sight.
+bool SeenNeedle::stays_or_jumps(const NeedlePose& n, const std::optional<Point>& landmark) {
   constexpr double kSame_px = 1.5, kSameAlone_px = 4, kShare = 0.4;
   constexpr int kMostFrames = 12;
   jump_ = {};
   const auto told = by_stage_.tip(), expected = told ? told : tip_;
   if (before_ && ++undecided_ < kMostFrames && expected) {
-    const Point jump = jump_of_mouth(mouth), off = n.tip - *expected;
+    const Point jump = jump_of_landmark(landmark), off = n.tip - *expected;
     const double of_picture = std::max(told ? kSame_px : kSameAlone_px, 2 * n.sd),
-                 near = mouth ? std::min(of_picture, kShare * cv::norm(jump)) : of_picture;
-    if (!n.ok ? mouth.has_value() : std::min(cv::norm(off), cv::norm(off - jump)) > near) {
+                 near = landmark ? std::min(of_picture, kShare * cv::norm(jump)) : of_picture;
+    if (!n.ok ? landmark.has_value() : std::min(cv::norm(off), cv::norm(off - jump)) > near) {
       pipette_ = *before_;
       return false;
     }
@@ -211,9 +210,9 @@ bool SeenNeedle::stays_or_jumps(const NeedlePose& n, const std::optional<Point>&
     }
   }
   const Point way = motion_.speed * motion_.axis;
-  if (mouth || !before_ || undecided_ >= kMostFrames) {
+  if (landmark || !before_ || undecided_ >= kMostFrames) {
     undecided_ = 0;
-    mouth_ = mouth;
+    landmark_ = landmark;
     tip_ = n.ok ? std::optional(n.tip + way) : std::nullopt;
   } else if (tip_) {
     *tip_ += way;

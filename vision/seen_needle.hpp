@@ -6,6 +6,7 @@
 
 #include "vision/config.hpp"
 #include "vision/events/phase.hpp"
+#include "vision/image/landmark.hpp"
 #include "vision/membrane/cleared_picture.hpp"
 #include "vision/membrane/followed_membrane.hpp"
 #include "vision/membrane/membrane_on_needle.hpp"
@@ -40,10 +41,12 @@ class SeenNeedle {
   void clear_way(ClearedPicture& picture) { picture.grey = specks_.without(picture.grey); }
   // Once per frame, before anything else. stage: as in Tracker::process.
   void begin(const std::optional<Point>& stage);
-  // mouth: of the holding pipette, where this frame shows it. at_once: where it is missing, all of its search
-  // is done in this frame.
+  // landmark: of the rest of the picture, where this frame shows it. at_once: where it is missing, all of its
+  // search is done in this frame.
   [[nodiscard]] NeedlePose locate(const ClearedPicture& picture, const FollowedMembrane& outer,
-                                  const Touch& touch, const std::optional<Point>& mouth, bool at_once);
+                                  const Touch& touch, const std::optional<Point>& landmark, bool at_once);
+  // Another landmark takes its place.
+  void forget_landmark() { landmark_.reset(); }
   // Takes in what is seen of it while nothing touches its tip. gap_px: empty where no cell is near.
   void learn(const ClearedPicture& picture, const NeedlePose& now, const std::optional<double>& gap_px);
   void end_frame(const NeedlePose& now) {
@@ -80,9 +83,9 @@ class SeenNeedle {
   void learn_tip_again(const ClearedPicture& picture, const FollowedMembrane& outer);
   [[nodiscard]] bool search(const ClearedPicture& picture, const FollowedMembrane& outer, const Touch& touch,
                             bool at_once);
-  [[nodiscard]] Point jump_of_mouth(const std::optional<Point>& mouth) const;
-  [[nodiscard]] NeedlePose find(const ClearedPicture& picture, const std::optional<Point>& mouth);
-  [[nodiscard]] bool stays_or_jumps(const NeedlePose& n, const std::optional<Point>& mouth);
+  [[nodiscard]] Point jump_of_landmark(const std::optional<Point>& landmark) const;
+  [[nodiscard]] NeedlePose find(const ClearedPicture& picture, const std::optional<Point>& landmark);
+  [[nodiscard]] bool stays_or_jumps(const NeedlePose& n, const std::optional<Point>& landmark);
   void put_right_by_membrane(const ClearedPicture& picture, const FollowedMembrane& outer, NeedlePose& n);
   void put_right_by_stage(const ClearedPicture& picture, const Touch& touch, NeedlePose& n);
   void forget();
@@ -99,9 +102,9 @@ class SeenNeedle {
   double on_tip_sd_px_ = 0;
   double wall_px_ = 0, gone_odds_ = 0;
   std::optional<Point> last_on_membrane_;
-  // While a holding pipette has jumped or is not seen, and the needle is not where it is expected: where both
-  // were before; the needle as it was; the frames since.
-  std::optional<Point> mouth_, tip_;
+  // While the landmark has jumped or is not seen, and the needle is not where it is expected: where both were
+  // before; the needle as it was; the frames since.
+  std::optional<Point> landmark_, tip_;
   std::optional<InjectionPipette> before_;
   int undecided_ = 0;
   Point jump_;

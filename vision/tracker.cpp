@@ -171,11 +171,15 @@ const Result& Tracker::Impl::process(const hal::Frame& frame, const std::optiona
     if (!needle.recognised(picture)) {
       events.forget_puncture(result);
     }
-    result.needle = needle.locate(picture, cell.outer(), events.touch(), holder.mouth(), first_picture);
+    const Landmark& landmark = holder.found() ? holder.landmark() : cell.landmark();
+    result.needle = needle.locate(picture, cell.outer(), events.touch(), landmark.place(), first_picture);
     result.us.needle = watch.lap_us();
   }
   if (config.holder && holder.due()) {
     result.holder = holder.locate(picture, holder_sides());
+    if (holder.found()) {
+      needle.forget_landmark();
+    }
     result.us.holder = watch.lap_us();
   }
 
@@ -189,7 +193,7 @@ const Result& Tracker::Impl::process(const hal::Frame& frame, const std::optiona
     result.us.start = watch.lap_us();
   }
   if (found) {
-    cell.follow(picture, needle, events.touch(), result, watch);
+    cell.follow(picture, needle, events.touch(), holder.found(), result, watch);
     found = cell.measure(picture, events.touch(), needle.hidden(result.needle), holder.found(), result);
     result.us.measure = watch.lap_us();
   }
@@ -261,7 +265,7 @@ cv::Rect Tracker::Impl::area_to_search(bool starting) const {
     box |= square_round(*tip.last, 40);
     box |= square_round(*tip.last - kShaft_px * tip.axis, 24) & cv::Rect2d(0, 0, width, height);
   }
-  if (const auto jump = holder.jump()) {
+  if (const auto jump = holder.landmark().jump()) {
     box |= box + cv::Point2d(*jump);
   }
   return whole & cv::Rect(static_cast<int>(box.x), static_cast<int>(box.y), static_cast<int>(box.width),

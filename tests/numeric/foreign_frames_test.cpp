@@ -487,11 +487,16 @@ TEST_P(ReliefFrames, show_the_cell_and_a_needle_that_is_ground_sharp) {
   // A knock while the needle pushes: from then on the picture lies elsewhere.
   ASSERT_TRUE(begun["contact"]);
   const int pushes = (*begun["contact"] + deepest) / 2;
-  for (const cv::Point by : {cv::Point(6, 0), {-9, 4}, {20, -8}, {-25, 0}}) {
-    Tracker knocked(config, size.width, size.height);
-    for (int k = 0; k <= deepest; ++k) {
-      const cv::Mat still = drawn(folder, k), picture = k < pushes ? still : moved(still, by);
-      EXPECT_FALSE(knocked.process(frame_of(picture, static_cast<std::uint64_t>(k))).punctured) << by << k;
+  VisionConfig no_holder = config;
+  no_holder.holder.reset();
+  for (const VisionConfig& scene : {config, no_holder}) {
+    for (const cv::Point by : {cv::Point(6, 0), {-5, 0}, {-9, 4}, {20, -8}, {-25, 0}}) {
+      Tracker knocked(scene, size.width, size.height);
+      for (int k = 0; k <= deepest; ++k) {
+        const cv::Mat still = drawn(folder, k), picture = k < pushes ? still : moved(still, by);
+        EXPECT_FALSE(knocked.process(frame_of(picture, static_cast<std::uint64_t>(k))).punctured)
+            << by << k << (scene.holder ? "" : "no holding pipette");
+      }
     }
   }
 }

@@ -574,7 +574,9 @@ cv::Mat moved_up_to(const cv::Mat& picture, const cv::Point& by, int column) {
 }
 
 // Somebody knocks against the microscope: the manipulator tells nothing of it.
-class JumpingPicture : public testing::TestWithParam<std::tuple<cv::Point, bool>> {
+// By how much, whether the manipulator tells where it has the needle, and whether the scene has a holding
+// pipette.
+class JumpingPicture : public testing::TestWithParam<std::tuple<cv::Point, bool, bool>> {
  protected:
   // The needle's way, from where it touches: into the membrane, and through it, if it punctures.
   void go(double from, double to) {
@@ -594,7 +596,8 @@ class JumpingPicture : public testing::TestWithParam<std::tuple<cv::Point, bool>
   void expect_the_same_after_the_jump(bool contact, bool punctured) {
     const cv::Point by = std::get<0>(GetParam());
     const cv::Mat jumped = moved_up_to(drawn_, by, kW);
-    const int settles = cv::norm(by) < 16 ? 0 : 4;  // further than the holding pipette is looked for at once
+    // Further than the holding pipette is looked for at once.
+    const int settles = std::get<2>(GetParam()) && cv::norm(by) > 16 ? 4 : 0;
     for (int k = 0; k < 8; ++k) {
       const Result& r = look(jumped);
       EXPECT_EQ(r.punctured, punctured) << k;
@@ -608,8 +611,16 @@ class JumpingPicture : public testing::TestWithParam<std::tuple<cv::Point, bool>
     }
   }
 
+  static VisionConfig config() {
+    VisionConfig config;
+    if (!std::get<2>(GetParam())) {
+      config.holder.reset();
+    }
+    return config;
+  }
+
   static constexpr double kHolds = 12;  // px that the membrane is pushed in by before it gives way
-  Tracker tracker_{{}, kW, kH};
+  Tracker tracker_{config(), kW, kH};
   cv::Mat drawn_;
   Point tip_;
   std::uint64_t frames_ = 0;
@@ -634,7 +645,7 @@ TEST_P(JumpingPicture, leaves_a_needle_in_the_cell) {
 INSTANTIATE_TEST_SUITE_P(Tracker, JumpingPicture,
                          testing::Combine(testing::Values(cv::Point(5, 0), cv::Point(-6, 0), cv::Point(0, 7),
                                                           cv::Point(-11, -4), cv::Point(19, 7)),
-                                          testing::Bool()));
+                                          testing::Bool(), testing::Bool()));
 
 class MovedHolder : public JumpingPicture {};
 
@@ -656,7 +667,7 @@ TEST_P(MovedHolder, takes_its_cell_along_and_leaves_the_needle) {
 INSTANTIATE_TEST_SUITE_P(Tracker, MovedHolder,
                          testing::Combine(testing::Values(cv::Point(5, 0), cv::Point(-6, 0), cv::Point(0, 7),
                                                           cv::Point(-11, -4)),
-                                          testing::Bool()));
+                                          testing::Bool(), testing::Bool()));
 
 void add_bubble(cv::Mat& picture, const Point& at, double r) {
   for (int y = 0; y < picture.rows; ++y) {

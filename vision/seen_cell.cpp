@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <utility>
 
@@ -218,6 +219,9 @@ void SeenCell::follow(const ClearedPicture& picture, const SeenNeedle& needle, c
     }
     result.us.inner = watch.lap_us();
   }
+  if (!outer_.known && result.inner.ok) {
+    result.outer.reason = "not found round the inner one (vision.inner = false follows that alone)";
+  }
   const Membrane& outermost_now = outer_.known ? result.outer : result.inner;
   if (!holder_found && outermost_now.ok) {
     pattern_.learn(picture, outermost_now.contour);
@@ -262,6 +266,7 @@ bool SeenCell::round_as_if_untouched(const ClearedPicture& picture, const Touch&
 
 bool SeenCell::measure(const ClearedPicture& picture, const Touch& touch, bool needle_hidden,
                        bool holder_found, Result& result) {
+  ahead_of_tip_px_.reset();
   if (inner_.known && result.inner.ok) {
     result.inner_radius_px = mean_radius(result.inner.contour);
   }
@@ -366,6 +371,18 @@ void SeenCell::measure_gap(int fitted_points, Result& result) {
   result.gap_px = (*result.entry - n.point()).dot(n.axis);
   entry_sd_px_ = 3 * result.outer.residual_px / std::sqrt(fitted_points);
   result.gap_sd_px = math::hypot(n.sd, entry_sd_px_);
+  // Beside the needle, whose picture covers its own.
+  constexpr double kBeside_px = 4, kDent_px = 3;
+  const Point aside = (n.half_width + kBeside_px) * Point(-n.axis.y, n.axis.x);
+  double dent = std::numeric_limits<double>::infinity();
+  for (const Point& through : {n.tip + aside, n.tip - aside}) {
+    const auto now = entry_point(result.outer.contour, through, n.axis),
+               rest = entry_point(undeformed_.at_rest().shape, through, n.axis);
+    dent = now && rest ? std::min(dent, (*now - *rest).dot(n.axis)) : 0;
+  }
+  if (dent > kDent_px) {
+    ahead_of_tip_px_ = *result.gap_px + dent;
+  }
 }
 
 }  // namespace punctum::vision

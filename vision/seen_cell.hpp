@@ -31,6 +31,8 @@ class SeenCell {
   [[nodiscard]] Undeformed at_rest() const { return undeformed_.at_rest(); }
   // Standard deviation of where the needle's axis meets it at rest, px.
   [[nodiscard]] double entry_sd_px() const noexcept { return entry_sd_px_; }
+  // By how much it lies further in than the tip of the needle, where it is dented to either side of that, px.
+  [[nodiscard]] const std::optional<double>& ahead_of_tip_px() const noexcept { return ahead_of_tip_px_; }
 
   // Beside one that is followed, and somewhere in the picture.
   [[nodiscard]] bool looks_for_another() const noexcept { return held_.has_value(); }
@@ -81,6 +83,7 @@ class SeenCell {
   int inner_missing_ = 0, next_doubt_ = kFirstDoubt;  // frames
   LearntUndeformed undeformed_;                       // of the outer one
   double entry_sd_px_ = 0;
+  std::optional<double> ahead_of_tip_px_;
   bool another_ = false;
   EdgePattern pattern_;  // of the outermost one, where no holding pipette is known; learnt with this middle
   Point pattern_centre_;

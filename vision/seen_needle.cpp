@@ -310,4 +310,23 @@ void SeenNeedle::learn(const ClearedPicture& picture, const NeedlePose& now,
   }
 }
 
+void SeenNeedle::learn_from_dent(const NeedlePose& now, const std::optional<double>& ahead_px) {
+  constexpr double kLeast_px = 3, kLeast_sd = 2;
+  constexpr int kFrames = 2;
+  const bool pushes = seen_.ok && ahead_px && *ahead_px > std::max(kLeast_px, kLeast_sd * now.sd);
+  pushes_unseen_ = pushes ? pushes_unseen_ + 1 : 0;
+  if (pushes_unseen_ < kFrames) {
+    return;
+  }
+  pushes_unseen_ = 0;
+  const Point by = *ahead_px * now.axis;
+  pipette_.reaches_further(*ahead_px);
+  by_stage_.jump_with_picture(by);
+  motion_.jump_with_picture(by);
+  if (last_on_membrane_) {
+    *last_on_membrane_ += by;
+  }
+  tip_on_membrane_ = {};
+}
+
 }  // namespace punctum::vision

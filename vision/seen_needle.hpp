@@ -49,6 +49,9 @@ class SeenNeedle {
   void forget_landmark() { landmark_.reset(); }
   // Takes in what is seen of it while nothing touches its tip. gap_px: empty where no cell is near.
   void learn(const ClearedPicture& picture, const NeedlePose& now, const std::optional<double>& gap_px);
+  // A membrane that it has not gone through yet lies ahead of its tip by that: it is pushed by glass that is
+  // not seen.
+  void learn_from_dent(const NeedlePose& now, const std::optional<double>& ahead_px);
   void end_frame(const NeedlePose& now) {
     motion_.update(now);
     last_on_membrane_ = now.ok ? std::optional<Point>(on_membrane(now)) : std::nullopt;
@@ -101,6 +104,7 @@ class SeenNeedle {
   NeedlePose seen_;  // as the picture alone tells it
   double on_tip_sd_px_ = 0;
   double wall_px_ = 0, gone_odds_ = 0;
+  int pushes_unseen_ = 0;  // frames in a row
   std::optional<Point> last_on_membrane_;
   // While the landmark has jumped or is not seen, and the needle is not where it is expected: where both were
   // before; the needle as it was; the frames since.

@@ -205,6 +205,7 @@ const Result& Tracker::Impl::process(const hal::Frame& frame, const std::optiona
         events.forget_puncture(result);
       }
       events.decide(picture, needle, cell, result, watch);
+      needle.learn_from_dent(result.needle, result.punctured ? std::nullopt : cell.ahead_of_tip_px());
     }
     if (!result.contact && !events.touch().contact) {  // nor while a touched cell is out of sight
       needle.learn(picture, result.needle, result.gap_px);

@@ -16,14 +16,14 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr double kDimpleReach = 6;     // half-widths of the needle to either side
-constexpr double kAbove_px = 4;        // above the outline at rest
-constexpr double kPast_px = 1;         // past the tip
-constexpr double kStepOfDepth_px = 1;  // the blur is wider
-constexpr int kLeastReach = 8;         // rays to either side: a thin needle hides two or three
-constexpr int kLeastRays = 6;          // fewer tell nothing
-constexpr double kModel = 0.08;        // variance of an edge that looks unusual, in squared usual edges
-constexpr double kOneSample_px = 3.5;  // along the membrane, by the smoothing
+constexpr double kDimpleReach = 6;         // half-widths of the needle to either side
+constexpr double kAbove_px = 4;            // above the outline at rest
+constexpr double kPast_px = 1, kPast = 4;  // past the tip, at least; in its deviations
+constexpr double kStepOfDepth_px = 1;      // the blur is wider
+constexpr int kLeastReach = 8;             // rays to either side: a thin needle hides two or three
+constexpr int kLeastRays = 6;              // fewer tell nothing
+constexpr double kModel = 0.08;            // variance of an edge that looks unusual, in squared usual edges
+constexpr double kOneSample_px = 3.5;      // along the membrane, by the smoothing
 // A membrane that has let go of the tip is further from it: px, and share of its depth.
 constexpr double kOnTip_px = 3, kOnTip = 0.25;
 constexpr double kTip_px = 1.6;  // to which the tip is known: shapes are learnt from dimples that end there
@@ -56,17 +56,23 @@ constexpr std::array<Shape, kDimpleShapes> kShapes{{{2, Wall::bump},
                                                     {4, Wall::bump},
                                                     {4.6, Wall::bump},
                                                     {5.3, Wall::bump},
+                                                    {6.1, Wall::bump},
+                                                    {7, Wall::bump},
+                                                    {8.1, Wall::bump},
+                                                    {9.4, Wall::bump},
                                                     {18, Wall::logarithmic},
                                                     {100, Wall::logarithmic},
                                                     {1.5, Wall::cusp},
                                                     {2.2, Wall::cusp},
-                                                    {3.3, Wall::cusp}}};
+                                                    {3.3, Wall::cusp},
+                                                    {5, Wall::cusp},
+                                                    {7.5, Wall::cusp}}};
 
 struct Shapes {
   std::size_t first, end;
 };
 Shapes shapes_under(const NeedlePose& needle) {
-  constexpr std::size_t kBlunt = 10;
+  constexpr std::size_t kBlunt = 14;
   return needle.point_aside == 0 ? Shapes{0, kBlunt} : Shapes{kBlunt, kDimpleShapes};
 }
 
@@ -172,7 +178,7 @@ PUNCTUM_WIDE_LOOP void look_along(const Ways& ways, const float* depths, float* 
 // A dimple of that shape is not deeper: the needle hides a steeper wall.
 double deepest_of(const Shape& shape, double deepest, const MembraneSearch& search) {
   const double steep = steepness(shape), most = kSteepest * search.surroundings.needle.half_width;
-  return steep > 0 ? std::min(deepest + kPast_px, most / steep) : deepest + kPast_px;
+  return steep > 0 ? std::min(deepest, most / steep) : deepest;
 }
 
 // Dimples of one membrane in one picture: its points at rest, pushed along the needle.
@@ -329,7 +335,7 @@ class WithinTells {
     if (!dimples.meets_the_cell()) {
       return;
     }
-    dimples.look(deepest + kPast_px);
+    dimples.look(deepest);
     first_ = dimples.depth(0);
     const double tip = std::max(dimples.depth_of_tip(), 0.0);
     on_tip_from_ = tip - std::max(kOnTip_px, kOnTip * tip);
@@ -403,17 +409,22 @@ std::optional<SeenDimple> likeliest_dimple(const MembraneSearch& search) {
   if (deepest < 1) {
     return std::nullopt;
   }
-  dimples.look(deepest + kPast_px);
+  // A tip that is told too far back pushes the membrane all the same.
+  const double tip_sd = search.surroundings.needle.sd, to = deepest + std::max(kPast_px, kPast * tip_sd);
+  const auto past_tip = [tip_sd](double past) {
+    return past > kPast_px ? -0.5 * past * past / (tip_sd * tip_sd) : 0;
+  };
+  dimples.look(to);
   std::optional<WithinTells> inner;
   if (const FollowedMembrane* w = search.surroundings.within;
       !within && m.polarity == Polarity::relief && w && w->known && !w->lost() && !w->rest.r.empty()) {
-    inner.emplace(search, *w, deepest);
+    inner.emplace(search, *w, to);
   }
   std::optional<SeenDimple> pushed, free;
   std::array<double, kDimpleShapes> best;
   best.fill(-1e9);
   for (auto [k, end] = shapes_under(search.surroundings.needle); k < end; ++k) {
-    dimples.choose(kShapes[k], deepest_of(kShapes[k], deepest, search));
+    dimples.choose(kShapes[k], deepest_of(kShapes[k], to, search));
     for (std::size_t step = 0; step < dimples.steps(); ++step) {
       const double depth = dimples.depth(step);
       // What the needle does not push does not sink.
@@ -426,12 +437,12 @@ std::optional<SeenDimple> likeliest_dimple(const MembraneSearch& search) {
         continue;
       }
       const bool on_tip = depth > on_tip_from;
-      if (by_the_outer || depth > deepest - kTip_px) {
+      if (depth <= deepest + kPast_px && (by_the_outer || depth > deepest - kTip_px)) {
         best[k] = std::max(best[k], *evidence);
       }
       std::optional<SeenDimple>& kept = on_tip ? pushed : free;
       const double with_odds = *evidence + m.dimple_odds[k] - (on_tip ? 0 : kSinking * sunk) +
-                               (inner ? inner->evidence(k, depth, on_tip) : 0);
+                               past_tip(depth - deepest) + (inner ? inner->evidence(k, depth, on_tip) : 0);
       if (!kept || with_odds > kept->evidence) {
         kept = SeenDimple{depth, with_odds, k, on_tip, m.dimple_odds};
       }

@@ -14,7 +14,7 @@
 
 namespace punctum::vision {
 
-constexpr std::size_t kDimpleShapes = 13;
+constexpr std::size_t kDimpleShapes = 19;
 
 struct FollowedMembrane {
   bool known = false;

@@ -18,6 +18,7 @@ constexpr double kSaturation = 0.7;  // times the usual edge: a stronger one is 
 constexpr double kTouching_px = 1;   // a tip that is deeper pushes the membrane, or is through it
 constexpr double kStep_px = 0.75, kFineStep_px = 0.5;  // between samples of a clear edge, of a faint one
 constexpr double kClearEdge = 5;                       // times the noise of the gradient
+constexpr double kDimpleStep_px = 1;                   // between the depths of a dimple that are tried
 constexpr double kFreeHalf_px = 7;  // a free membrane is looked for so near to its outline at rest
 
 }  // namespace
@@ -183,7 +184,8 @@ EdgeFound outer_pushed_or_free(const MembraneSearch& s) {
       EdgeBand band = band_along(s, *dimple);
       band.anchors = s.end_face();
       if (s.m.polarity == Polarity::relief) {
-        const double short_of_tip = std::max(s.depth_of_tip() - dimple->depth, 0.0);
+        const double off = s.depth_of_tip() - dimple->depth,
+                     short_of_tip = off < -kDimpleStep_px ? off : std::max(off, 0.0);
         const bool sharp = s.surroundings.needle.point_aside != 0;
         for (auto& [i, r] : band.anchors) {
           r = sharp ? band.middle[static_cast<std::size_t>(i)] : r + short_of_tip;

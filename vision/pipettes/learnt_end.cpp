@@ -135,6 +135,7 @@ bool LearntEnd::learn_outermost(const NeedlePose& needle, const Point& followed)
     return false;
   }
   glass_ahead_ = (needle.tip - followed).dot(needle.axis);
+  unseen_ahead_ = 0;
   return true;
 }
 
@@ -153,7 +154,7 @@ bool LearntEnd::learn_by_glass(const GradientField& field, double noise, NeedleP
   if (walls_agree_) {
     needle.tip = end_by_walls;
   }
-  glass_ahead_ = glass_scatter_ = glass_blur_ = 0;
+  glass_ahead_ = unseen_ahead_ = glass_scatter_ = glass_blur_ = 0;
   glass_frames_ = 0;
   followed_ = false;
   lumen_ = needle.half_width >= kLeastLumen_px;
@@ -266,7 +267,7 @@ void LearntEnd::learn_point(const GradientField& field, double noise, const Need
 void LearntEnd::weigh(const GradientField& field, double noise, NeedlePose& needle) const {
   constexpr double kReach_px = 6;
   NeedlePose middle = needle;
-  middle.tip -= ahead_of_middle(bevel_, needle, glass_blur_) * needle.axis;
+  middle.tip -= (unseen_ahead_ + ahead_of_middle(bevel_, needle, glass_blur_)) * needle.axis;
   if (const auto end = end_of_known_cut(field, noise, middle, bevel_, glass_blur_, kReach_px)) {
     needle.tip += end->ahead * needle.axis;
     needle.sd = std::max(needle.sd, math::hypot(end->sd, needle.constant_sd));
@@ -276,7 +277,7 @@ void LearntEnd::weigh(const GradientField& field, double noise, NeedlePose& need
 bool LearntEnd::ends_apart() const noexcept { return bevel_.radius > 0 || std::abs(bevel_.tangent) > kSteep; }
 
 NeedlePose LearntEnd::told(NeedlePose needle, double noise) const {
-  needle.tip += glass_ahead_ * needle.axis;
+  needle.tip += glass_ahead() * needle.axis;
   if (by_point()) {
     needle.point_aside = bevel_.point_aside;
   } else {

@@ -59,7 +59,9 @@ class LearntEnd {
   // The pose with the outermost glass as its tip, and how certain that is.
   [[nodiscard]] NeedlePose told(NeedlePose followed, double noise) const;
   // The outermost glass over the end that is followed, px.
-  [[nodiscard]] double glass_ahead() const noexcept { return glass_ahead_; }
+  [[nodiscard]] double glass_ahead() const noexcept { return glass_ahead_ + unseen_ahead_; }
+  // It reaches further than it is seen, by that.
+  void reaches_further(double px) noexcept { unseen_ahead_ += px; }
   [[nodiscard]] bool glass_is_known() const noexcept { return glass_frames_ > 0; }
   // Walls and what lies between them were told apart at the start.
   [[nodiscard]] bool shows_lumen() const noexcept { return lumen_; }
@@ -117,6 +119,7 @@ class LearntEnd {
   int point_frames_ = 0;            // that bevel_.point_ahead was learnt from
   double half_width_at_start_ = 0;  // px
   double glass_ahead_ = 0;          // of the end that is followed: the outermost glass, px
+  double unseen_ahead_ = 0;         // of that: glass which only a membrane tells, px
   int glass_frames_ = 0;            // that it was learnt from
   double glass_scatter_ = 0;        // variance of where the end that is followed seems to be from it, px^2
   double glass_blur_ = 0;           // px

@@ -64,7 +64,6 @@ StageLimits::StageLimits(const LimitParams& limits, const MappingParams& mapping
 
 void StageLimits::place(const hal::Vec3& tip_m) NONBLOCKING {
   set_point_.tip_m = tip_m;
-  clear_m_ = 0;
   for (Eigen::Index i = 0; i < 3; ++i) {
     low_here_m_[i] = std::min(low_m_[i], tip_m[i]);
     high_here_m_[i] = std::max(high_m_[i], tip_m[i]);
@@ -97,7 +96,8 @@ void StageLimits::look_for_regions() NONBLOCKING {
     return;
   }
   const NeedlePose needle{set_point_.tip_m, set_point_.axis};
-  if (seen_.left_m(needle) > kNear_m + kSurface_m) {
+  room_left_m_ = seen_.left_m(needle);
+  if (room_left_m_ > kNear_m + kSurface_m) {
     return;
   }
   seen_ = {needle, std::numeric_limits<double>::infinity()};
@@ -113,13 +113,11 @@ void StageLimits::look_for_regions() NONBLOCKING {
     }
     seen_.room_m = std::min(seen_.room_m, gap.apart_m);
   }
+  room_left_m_ = seen_.room_m;
 }
 
 StageLimits::Checked StageLimits::check(const hal::Vec3& wanted_m, const StageConstraint& c) const
     NONBLOCKING {
-  if (is_clear(wanted_m)) {
-    return {wanted_m, 0};
-  }
   if (c.frozen || !hal::is_finite(wanted_m)) {
     return {set_point_.tip_m, 0};
   }
@@ -266,7 +264,7 @@ double StageLimits::clearance_m(const StageConstraint& c) const NONBLOCKING {
     clear_m = std::min({clear_m, here[i] - clear_low_m_[i], clear_high_m_[i] - here[i]});
   }
   if (regions_) {
-    clear_m = std::min(clear_m, seen_.left_m(here));
+    clear_m = std::min(clear_m, room_left_m_);
   }
   if (c.insertion) {
     clear_m = std::min(clear_m, limits_.lateral_m - beside(*c.insertion, here).norm());
@@ -280,6 +278,11 @@ double StageLimits::clearance_m(const StageConstraint& c) const NONBLOCKING {
 
 bool StageLimits::is_clear(const hal::Vec3& point_m) const NONBLOCKING {
   return (point_m - set_point_.tip_m).norm() < clear_m_;
+}
+
+StageLimits::Checked StageLimits::check_unless_clear(const hal::Vec3& wanted_m,
+                                                     const StageConstraint& c) const NONBLOCKING {
+  return is_clear(wanted_m) ? Checked{wanted_m, 0} : check(wanted_m, c);
 }
 
 // A convex body lies wholly behind a plane across any direction in which the needle is apart from it.
@@ -499,35 +502,36 @@ const hal::StageCommand& StageLimits::step(const hal::StageCommand& target, cons
     restart(set_point_.tip_m, set_point_.axis);
     return set_point_;
   }
-  const hal::Vec3 here = set_point_.tip_m;
   clear_m_ = clearance_m(c);
-  const Checked goal = check(finite_ ? target.tip_m : stops_at_m(), c);
+  const Checked goal = check_unless_clear(finite_ ? target.tip_m : stops_at_m(), c);
   alarms_ |= goal.alarms;
   advance(goal.point_m, c);
 
   // Position last: what momentum would carry across a limit stops at it.
   const hal::Vec3 wanted_m = bounds_jerk_.step(ahead_m_);
-  Checked next = check(wanted_m, c);
-  alarms_ |= next.alarms;
   const double longest_m = limits_.stage_velocity_m_s * dt_s_ * (1 + 1e-9);
+  const double way_m = (wanted_m - set_point_.tip_m).norm();
+  place(way_m < clear_m_ && way_m <= longest_m ? wanted_m : held(wanted_m, longest_m, c));
+  if (finite_ && !(axis_stands_ && target.axis == turned_to_)) {
+    turn(target.axis);
+  }
+  look_for_regions();
+  return set_point_;
+}
+
+hal::Vec3 StageLimits::held(const hal::Vec3& wanted_m, double longest_m, const StageConstraint& c)
+    NONBLOCKING {
+  const hal::Vec3& here = set_point_.tip_m;
+  Checked next = check_unless_clear(wanted_m, c);
+  alarms_ |= next.alarms;
   if ((next.point_m - here).norm() > longest_m) {
-    next = check(here + shortened(next.point_m - here, limits_.stage_velocity_m_s * dt_s_), c);
+    next = check_unless_clear(here + shortened(next.point_m - here, limits_.stage_velocity_m_s * dt_s_), c);
     if ((next.point_m - here).norm() > longest_m) {
       next.point_m = here;
     }
   }
   settle(wanted_m, next.point_m);
-  place(next.point_m);
-  if (!finite_) {
-    look_for_regions();
-    return set_point_;
-  }
-
-  if (!axis_stands_ || target.axis != turned_to_) {
-    turn(target.axis);
-  }
-  look_for_regions();
-  return set_point_;
+  return next.point_m;
 }
 
 void StageLimits::turn(const hal::Vec3& target) NONBLOCKING {

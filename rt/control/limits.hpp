@@ -164,10 +164,15 @@ class StageLimits {
   template <Region region>
   [[nodiscard]] bool hold_before(hal::Vec3& point_m, bool stops) const NONBLOCKING;
   [[nodiscard]] bool is_clear(const hal::Vec3& point_m) const NONBLOCKING;  // of every limit, within a step
+  [[nodiscard]] Checked check_unless_clear(const hal::Vec3& wanted_m, const StageConstraint& c) const
+      NONBLOCKING;
   // From the set-point, after it was moved.
   void look_for_regions() NONBLOCKING;
   [[nodiscard]] bool may_point(const hal::Vec3& axis) const NONBLOCKING;
   void turn(const hal::Vec3& target) NONBLOCKING;
+  // What the limits leave of the next set-point.
+  [[nodiscard]] hal::Vec3 held(const hal::Vec3& wanted_m, double longest_m, const StageConstraint& c)
+      NONBLOCKING;
   // The set-point was held at held_m instead: its way across that limit begins from rest.
   void settle(const hal::Vec3& wanted_m, const hal::Vec3& held_m) NONBLOCKING;
   void advance(const hal::Vec3& goal_m, const StageConstraint& c) NONBLOCKING;
@@ -188,8 +193,9 @@ class StageLimits {
   std::optional<ForbiddenRegions> regions_;
   // Directions in which needle and regions lie apart: as long as they do, nothing more is computed.
   std::array<hal::Vec3, std::size(kRegions)> away_{hal::Vec3::UnitX(), hal::Vec3::UnitX()};
-  SeenRoom seen_;       // of the set-point, before the regions
-  double clear_m_ = 0;  // clearance_m() of this step; 0 between steps, when the constraint is another
+  SeenRoom seen_;  // of the set-point, before the regions
+  double room_left_m_ = 0;
+  double clear_m_ = 0;  // clearance_m() of this step
   double dt_s_;
   double hardest_m_s2_;  // of which the window bounds the jerk
   double slowest_m_s_;

@@ -69,7 +69,7 @@ const EffectSum& Rendering::sum_effects(const RenderInput& in, const Readings& r
   e.new_cell = task.new_cell;
   e.insertion = task.insertion;
 
-  const EffectSum& sum = effects_.step(e, in.effect_gain);
+  const EffectSum& sum = effects_.step(e, in.reduced_effects);
   const bool outside_the_law = effects_.membrane() && e.depth_m > 0 && !effects_.membrane()->state().shallow;
   alarms_ = outside_the_law ? alarm_model_invalid : 0U;
   return sum;

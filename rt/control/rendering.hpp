@@ -24,7 +24,7 @@ struct RenderInput {
   hal::Vec3 needle_axis = -hal::Vec3::UnitX();      // as commanded
   double position_scale = 500;
   double commanded_scale = 1;
-  EffectGains effect_gain = kFullGains;
+  const EffectGains* reduced_effects = nullptr;  // their gains, unless all are full
 };
 
 class Rendering {

@@ -59,6 +59,7 @@ void Requests::approach_targets(double dt_s) NONBLOCKING {
   for (std::size_t i = 0; i < effect_count; ++i) {
     approach(requested_.effect_gain[i], effect_gain_target_[i], most);
   }
+  requested_.reduces_effects = requested_.effect_gain != kFullGains;
   approach(requested_.hand_force_N, hand_force_target_N_, most * most_hand_force_N_);
   approach(requested_.depth_limit_m, depth_target_m_, most * most_depth_m_);
   at_targets_ =

@@ -27,6 +27,7 @@ struct Requested {
   bool end_here = false;                 // end of the task wherever the needle is
   double force_scale = 1;                // 0 .. 1, ramped
   EffectGains effect_gain = kFullGains;  // 0 .. 1, ramped
+  bool reduces_effects = false;          // these are not all 1
   double hand_force_N = 0;               // limit, ramped; never above the scene's
   double depth_limit_m = 0;              // past the membrane, ramped; never above the scene's
   double position_scale = 500;           // taken over while hand and needle are uncoupled

@@ -107,17 +107,18 @@ const TaskFacts& Servo::advance_phase(const TickTime& time, const Readings& read
 const EffectSum& Servo::sum_force_effects(const TickTime& time, const Readings& readings,
                                           const Requested& requested, const CellFacts& cell,
                                           const hal::Vec3& velocity_m_s, const TaskFacts& task) NONBLOCKING {
-  return rendering_.sum_effects({.dt_s = time.dt_s,
-                                 .last_running = last_.output.running,
-                                 .coupled = stage_set_point_.anchored(),
-                                 .ending = task_.ending(requested),
-                                 .hand_velocity_m_s = velocity_m_s,
-                                 .hand_point_m = stage_set_point_.hand_point_m(),
-                                 .needle_axis = stage_set_point_.set_point().axis,
-                                 .position_scale = stage_set_point_.position_scale(),
-                                 .commanded_scale = requested.force_scale,
-                                 .effect_gain = requested.effect_gain},
-                                readings, cell, task);
+  return rendering_.sum_effects(
+      {.dt_s = time.dt_s,
+       .last_running = last_.output.running,
+       .coupled = stage_set_point_.anchored(),
+       .ending = task_.ending(requested),
+       .hand_velocity_m_s = velocity_m_s,
+       .hand_point_m = stage_set_point_.hand_point_m(),
+       .needle_axis = stage_set_point_.set_point().axis,
+       .position_scale = stage_set_point_.position_scale(),
+       .commanded_scale = requested.force_scale,
+       .reduced_effects = requested.reduces_effects ? &requested.effect_gain : nullptr},
+      readings, cell, task);
 }
 
 ModulusEstimate Servo::fit_modulus(const TickTime& time, const Readings& readings, const CellFacts& cell,

@@ -96,12 +96,12 @@ Effects::Effects(const EffectParams& params, const EffectSetup& setup) NONBLOCKI
 #undef PUNCTUM_EFFECT
 }
 
-const EffectSum& Effects::step(const EffectInput& in, const EffectGains& gain) NONBLOCKING {
+const EffectSum& Effects::step(const EffectInput& in, const EffectGains* reduced) NONBLOCKING {
   ForceParts& parts = sum_.parts;
   clear(parts);
   Sums sums;
-  const bool full = gain == kFullGains;
-  const bool scaled = !full || !last_full_;  // rarely
+  const EffectGains& gain = reduced != nullptr ? *reduced : kFullGains;
+  const bool scaled = reduced != nullptr || !last_full_;  // rarely
   const auto take = [&]<class Class>(std::optional<Class>& effect, Effect which) {
     if (!effect) {
       return;
@@ -147,7 +147,7 @@ const EffectSum& Effects::step(const EffectInput& in, const EffectGains& gain) N
   last_fixture_gain_ = in.fixture_gain;
   if (scaled) {
     last_gain_ = gain;
-    last_full_ = full;
+    last_full_ = reduced == nullptr;
   }
   for (std::size_t i = 0; i < sums.other_count; ++i) {  // at most effect_count rounds
     const Energy& other = sums.others[i];

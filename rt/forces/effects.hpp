@@ -30,8 +30,9 @@ class Effects {
  public:
   Effects(const EffectParams& params, const EffectSetup& setup) NONBLOCKING;
 
-  // Once per tick. Real-time safe. `gain`: 0 .. 1 of each effect, as commanded; the caller ramps it.
-  const EffectSum& step(const EffectInput& in, const EffectGains& gain = kFullGains) NONBLOCKING;
+  // Once per tick. Real-time safe. `reduced`: 0 .. 1 of each effect, as commanded, unless all are full; the
+  // caller ramps it.
+  const EffectSum& step(const EffectInput& in, const EffectGains* reduced = nullptr) NONBLOCKING;
 
   [[nodiscard]] const EffectSum& sum() const NONBLOCKING { return sum_; }
   [[nodiscard]] const std::optional<Membrane>& membrane() const NONBLOCKING { return membrane_; }

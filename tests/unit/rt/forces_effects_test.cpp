@@ -58,7 +58,7 @@ TEST(Effects, give_half_the_force_and_energy_at_half_a_commanded_gain) {
   half.fill(0.5);
   for (int k = 0; k < 2000; ++k) {
     (void)whole.step(in_the_guide());
-    (void)halved.step(in_the_guide(), half);
+    (void)halved.step(in_the_guide(), &half);
   }
   ASSERT_GT(whole.sum().force_N.norm(), 0);
   EXPECT_LT((halved.sum().force_N - 0.5 * whole.sum().force_N).norm(), 1e-12);
@@ -73,13 +73,13 @@ TEST(Effects, count_the_energy_that_a_changed_gain_gives_to_a_standing_hand) {
   Effects effects(params, kForcesScaled);
   EffectGains gains = kFullGains;
   for (int k = 0; k < 3000; ++k) {  // the guide's own ramp is over
-    (void)effects.step(in_the_guide(), gains);
+    (void)effects.step(in_the_guide(), &gains);
   }
   const double stored_J = effects.sum().stored_J, injected_J = effects.sum().injected_J;
   ASSERT_GT(stored_J, 0);
   for (int k = 1; k <= 500; ++k) {
     gains[effect_cone] = 1 - k * 1e-3;
-    (void)effects.step(in_the_guide(), gains);
+    (void)effects.step(in_the_guide(), &gains);
   }
   EXPECT_NEAR(effects.sum().stored_J, 0.5 * stored_J, 1e-9 * stored_J);
   EXPECT_NEAR(effects.sum().injected_J - injected_J, -0.5 * stored_J, 1e-9 * stored_J);

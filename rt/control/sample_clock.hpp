@@ -34,21 +34,13 @@ class SampleClock {
 
   // A fresh sample counts as the newest one from here on.
   [[nodiscard]] SampleIs take(std::int64_t sample_ns, std::int64_t now_ns) NONBLOCKING {
-    double older_s = 0;
-    if (begun_ && sample_ns == newest_ns_) {
-      older_s = 1e-9 * static_cast<double>(now_ns - sample_ns) - age_s();
-      // It arrived when the clock was wrong: two readings in a row say that it is older.
-      age_at_arrival_s_ += std::max(0.0, std::min(older_s, was_older_s_));
-    }
-    was_older_s_ = older_s;
+    const bool later = sample_ns >= newest_ns_ + kNearest_ns;
+    was_older_s_ = later ? 0 : grown_older_s(sample_ns, now_ns);
     if (sample_ns > now_ns + kAhead_ns || sample_ns < now_ns - timeout_ns_) {
       return SampleIs::untimely;
     }
     // A device that has been silent for too long begins anew, but not with the sample that it had.
-    if (sample_ns == newest_ns_) {
-      return SampleIs::repeated;
-    }
-    if (begun_ && sample_ns < newest_ns_ + kNearest_ns) {
+    if (!later && (begun_ || sample_ns == newest_ns_)) {
       return sample_ns < newest_ns_ ? SampleIs::untimely : SampleIs::repeated;
     }
     newest_ns_ = sample_ns;
@@ -63,6 +55,17 @@ class SampleClock {
   [[nodiscard]] bool timed_out() const NONBLOCKING { return age_s() > longest_s_; }
 
  private:
+  // By how much a repeated sample is older than it was counted.
+  [[nodiscard]] double grown_older_s(std::int64_t sample_ns, std::int64_t now_ns) NONBLOCKING {
+    if (!begun_ || sample_ns != newest_ns_) {
+      return 0;
+    }
+    const double older_s = 1e-9 * static_cast<double>(now_ns - sample_ns) - age_s();
+    // It arrived when the clock was wrong: two readings in a row say that it is older.
+    age_at_arrival_s_ += std::max(0.0, std::min(older_s, was_older_s_));
+    return older_s;
+  }
+
   // A device takes its sample after the tick has read the clock and before the tick reads the device: at most
   // a tick of the slowest servo ahead.
   static constexpr std::int64_t kAhead_ns = 1'000'000;

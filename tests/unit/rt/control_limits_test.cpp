@@ -472,6 +472,21 @@ TEST(StageLimits, draw_a_needle_back_blind_no_further_than_the_workspace) {
   EXPECT_NE(stage.alarms() & alarm_travel_limited, 0U);
 }
 
+TEST(StageLimits, hold_a_needle_that_came_back_into_the_workspace) {
+  const MappingParams mapping;
+  const double end_m = mapping.workspace_max_m.y();
+  StageLimits stage(LimitParams{}, mapping, 1000);
+  stage.restart(Vec3(0, end_m + 20e-6, 0), -Vec3::UnitX());
+  const auto go = [&stage](const Vec3& to_m) {
+    for (int k = 0; k < 2000; ++k) {
+      stage.step({to_m, -Vec3::UnitX()}, {});
+    }
+    return stage.set_point().tip_m.y();
+  };
+  EXPECT_NEAR(go(Vec3(0, end_m - 20e-6, 0)), end_m - 20e-6, 1e-9);
+  EXPECT_NEAR(go(Vec3(0, end_m + 20e-6, 0)), end_m, 1e-9);
+}
+
 TEST(StageLimits, say_which_limit_holds_the_needle) {
   const LimitParams limits;
   StageLimits stage(limits, MappingParams{}, 1000);

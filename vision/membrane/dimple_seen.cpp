@@ -56,10 +56,6 @@ constexpr std::array<Shape, kDimpleShapes> kShapes{{{2, Wall::bump},
                                                     {4, Wall::bump},
                                                     {4.6, Wall::bump},
                                                     {5.3, Wall::bump},
-                                                    {6.1, Wall::bump},
-                                                    {7, Wall::bump},
-                                                    {8.1, Wall::bump},
-                                                    {9.4, Wall::bump},
                                                     {18, Wall::logarithmic},
                                                     {100, Wall::logarithmic},
                                                     {1.5, Wall::cusp},
@@ -72,7 +68,7 @@ struct Shapes {
   std::size_t first, end;
 };
 Shapes shapes_under(const NeedlePose& needle) {
-  constexpr std::size_t kBlunt = 14;
+  constexpr std::size_t kBlunt = 10;
   return needle.point_aside == 0 ? Shapes{0, kBlunt} : Shapes{kBlunt, kDimpleShapes};
 }
 

@@ -14,7 +14,7 @@
 
 namespace punctum::vision {
 
-constexpr std::size_t kDimpleShapes = 19;
+constexpr std::size_t kDimpleShapes = 15;
 
 struct FollowedMembrane {
   bool known = false;

@@ -1,5 +1,5 @@
 // Whether a membrane has gone back against the needle, by its motion between two pictures of a texture that
-// is moved as a dimple moves it.
+// is moved as a dimple moves it; and by how much the edge of a cell has jumped with the picture.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,6 +9,7 @@
 #include <random>
 
 #include "tests/support/pictures.hpp"
+#include "vision/membrane/edge_pattern.hpp"
 #include "vision/membrane/membrane_recoil.hpp"
 
 namespace punctum::vision {
@@ -153,6 +154,82 @@ TEST(MembraneRecoil, tells_nothing_where_the_needle_jumps_further_than_it_can_se
   (void)scene.see(20, 20, 1);
   EXPECT_EQ(scene.see(0, 0, -20), std::nullopt);
   EXPECT_LT(scene.see(0, 0, 0).value(), 0);
+}
+
+// An ooplasm in its zona, lit along x: above and below hardly anything is seen of either.
+struct LitCell {
+  static constexpr double kR = 70;
+  static constexpr int kSide = 240;
+  Point centre{120, 116};
+  double noise = 5, contrast = 40;
+  std::mt19937 random{3};
+  cv::Mat pixels;
+
+  ClearedPicture look(const Point& moved) {
+    std::normal_distribution<double> grain(0, 1);
+    pixels.create(kSide, kSide, CV_8U);
+    for (int y = 0; y < kSide; ++y) {
+      for (int x = 0; x < kSide; ++x) {
+        const Point off = Point(x, y) - centre - moved;
+        const double r = cv::norm(off), lit = contrast * off.x / std::max(r, 1.0), zona = (r - kR) / 2.5,
+                     ooplasm = (r - kR + 10) / 2.5;
+        const double grey = 130 + lit * (std::exp(-zona * zona / 2) + 0.8 * std::exp(-ooplasm * ooplasm / 2));
+        pixels.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(grey + noise * grain(random));
+      }
+    }
+    ClearedPicture out;
+    out.grey = pixels;
+    out.noise = noise;
+    out.compute_gradient({0, 0, kSide, kSide});
+    out.cover({});
+    return out;
+  }
+  [[nodiscard]] Contour zona() const {
+    Contour out;
+    for (int i = 0; i < 256; ++i) {
+      out.push_back(on_ray(centre, i, 256, kR + 2));
+    }
+    return out;
+  }
+};
+
+TEST(EdgePattern, is_found_wherever_the_picture_has_jumped) {
+  LitCell cell;
+  EdgePattern pattern;
+  EXPECT_FALSE(pattern.known());
+  pattern.learn(cell.look({}), cell.zona());
+  ASSERT_TRUE(pattern.known());
+  for (const Point& by : {Point(5, 0), Point(-5, 0), Point(0, 9), Point(0, -9), Point(-11, 3), Point(17, -13),
+                          Point(-31, 1), Point(0, 31)}) {
+    const ClearedPicture jumped = cell.look(by);
+    EXPECT_FALSE(pattern.nearby(jumped.field)) << by;
+    const auto found = pattern.anywhere(jumped.field);
+    ASSERT_TRUE(found) << by;
+    EXPECT_LT(cv::norm(*found - by), 0.7) << by << *found;
+  }
+  for (const Point& by : {Point(0, 0), Point(1.4, -0.6), Point(-0.5, 1.8)}) {
+    const auto found = pattern.nearby(cell.look(by).field);
+    ASSERT_TRUE(found) << by;
+    EXPECT_LT(cv::norm(*found - by), 0.7) << by << *found;
+  }
+}
+
+TEST(EdgePattern, is_found_nowhere_without_the_cell_and_not_known_in_noise) {
+  LitCell cell;
+  EdgePattern pattern;
+  pattern.learn(cell.look({}), cell.zona());
+  LitCell gone;
+  gone.contrast = 0;
+  const ClearedPicture empty = gone.look({});
+  EXPECT_FALSE(pattern.nearby(empty.field));
+  EXPECT_FALSE(pattern.anywhere(empty.field));
+
+  LitCell faint;
+  faint.contrast = 8;
+  faint.noise = 20;
+  EdgePattern unknown;
+  unknown.learn(faint.look({}), faint.zona());
+  EXPECT_FALSE(unknown.known());
 }
 
 }  // namespace

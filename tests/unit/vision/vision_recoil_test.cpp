@@ -200,7 +200,7 @@ TEST(EdgePattern, is_found_wherever_the_picture_has_jumped) {
   pattern.learn(cell.look({}), cell.zona());
   ASSERT_TRUE(pattern.known());
   for (const Point& by : {Point(5, 0), Point(-5, 0), Point(0, 9), Point(0, -9), Point(-11, 3), Point(17, -13),
-                          Point(-31, 1), Point(0, 31)}) {
+                          Point(10, 0), Point(-10, 0), Point(-31, 1), Point(0, 31)}) {
     const ClearedPicture jumped = cell.look(by);
     EXPECT_FALSE(pattern.nearby(jumped.field)) << by;
     const auto found = pattern.anywhere(jumped.field);

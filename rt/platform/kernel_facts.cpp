@@ -2,6 +2,7 @@
 
 #include <sys/utsname.h>
 
+#include <algorithm>
 #include <charconv>
 #include <fstream>
 #include <optional>
@@ -117,6 +118,34 @@ long fair_server_runtime_ns(int cpu, const std::string& root) {
       first_line(root + "/sys/kernel/debug/sched/fair_server/cpu" + std::to_string(cpu) + "/runtime");
   std::string_view rest = text;
   return take_number<long>(rest).value_or(-1);
+}
+
+std::string cpu_list(const std::vector<int>& cpus) {
+  std::string out;
+  for (std::size_t i = 0; i < cpus.size();) {
+    std::size_t end = i;
+    while (end + 1 < cpus.size() && cpus[end + 1] == cpus[end] + 1) {
+      ++end;
+    }
+    out += out.empty() ? "" : ",";
+    out += std::to_string(cpus[i]);
+    if (end > i) {
+      out += '-';
+      out += std::to_string(cpus[end]);
+    }
+    i = end + 1;
+  }
+  return out;
+}
+
+std::vector<int> cpus_beside(int cpu, const KernelFacts& facts) {
+  std::vector<int> others = facts.online_cpus;
+  std::erase(others, cpu);
+  std::vector<int> shared = others;
+  std::erase_if(shared, [&](int one) {
+    return std::count(facts.isolated_cpus.begin(), facts.isolated_cpus.end(), one) > 0;
+  });
+  return shared.empty() ? others : shared;
 }
 
 }  // namespace punctum::rt

@@ -33,7 +33,12 @@ struct KernelFacts {
 // Of the fair server of a CPU (6.12 and later), in ns; -1 = cannot be read.
 [[nodiscard]] long fair_server_runtime_ns(int cpu, const std::string& root = "");
 
-// "0-2,5" -> 0 1 2 5.
+// "0-2,5" -> 0 1 2 5, and back.
 [[nodiscard]] std::vector<int> parse_cpu_list(const std::string& text);
+[[nodiscard]] std::string cpu_list(const std::vector<int>& cpus);
+
+// The CPUs that are left for everything else where a loop has this one: not the isolated ones either, which
+// are kept free for something, too, unless no other is left.
+[[nodiscard]] std::vector<int> cpus_beside(int cpu, const KernelFacts& facts);
 
 }  // namespace punctum::rt

@@ -126,11 +126,14 @@ RightFound priority(const RightsWanted& wanted, bool apply) {
   if (right.got) {
     return right;
   }
+  const std::string most = std::to_string(std::max(level, 95));  // 95: what the packages grant
   right.remedy =
       has_capability(kCapSysNice) || limit >= static_cast<rlim_t>(level)
           ? "the control group grants no real-time time: see cpu.rt_runtime_us of its cgroup"
-          : "/etc/security/limits.d/punctum.conf: '@punctum - rtprio 95' and join group punctum; or "
-            "setcap cap_sys_nice,cap_ipc_lock=ep punctum-core; or systemd LimitRTPRIO=95";
+          : "/etc/security/limits.d/punctum.conf: '@punctum - rtprio " + most +
+                "' and join group punctum; or setcap cap_sys_nice,cap_ipc_lock=ep punctum-core; or systemd "
+                "LimitRTPRIO=" +
+                most;
   return right;
 }
 
@@ -193,6 +196,7 @@ RightFound affinity(const RightsWanted& wanted, const KernelFacts& facts, bool a
     right.remedy = "name a CPU of its own in the scene";
     return right;
   }
+  right.required = true;  // on another one, none of what was made ready for this loop holds
   const std::string text = "CPU " + std::to_string(wanted.cpu);
   cpu_set_t set;
   CPU_ZERO(&set);
@@ -211,8 +215,8 @@ RightFound affinity(const RightsWanted& wanted, const KernelFacts& facts, bool a
   right.got = possible;
   right.detail = possible ? text : text + " is not available";
   if (!possible) {
-    right.remedy = "this machine has " + std::to_string(facts.online_cpus.size()) +
-                   " CPUs online; name one that the process may use";
+    right.remedy = "name a CPU that is online (" + cpu_list(facts.online_cpus) +
+                   ") and that the process may use; nosmt takes the second thread of each core";
   }
   return right;
 }
@@ -225,8 +229,13 @@ RightFound isolation(const RightsWanted& wanted, const KernelFacts& facts) {
                            : std::to_string(facts.isolated_cpus.size()) + " CPUs isolated";
   if (!right.got) {
     const std::string cpu = wanted.cpu >= 0 ? std::to_string(wanted.cpu) : "N";
-    right.remedy = "boot with isolcpus=" + cpu + " nohz_full=" + cpu + " rcu_nocbs=" + cpu +
-                   " irqaffinity=0, and give the scene that CPU";
+    const std::string others = cpu_list(cpus_beside(wanted.cpu, facts));
+    right.remedy = others.empty() ? "a machine with a second CPU"
+                   : wanted.cpu == 0
+                       ? "take another CPU: on CPU 0 the kernel keeps time and serves interrupts"
+                       : "boot with isolcpus=" + cpu + " nohz_full=" + cpu + " rcu_nocbs=" + cpu +
+                             " irqaffinity=" + (wanted.cpu < 0 ? "0" : others) +
+                             ", and give the scene that CPU";
   }
   return right;
 }
@@ -249,7 +258,7 @@ RightFound dma_latency(bool apply, int& fd) {
   }
   if (!right.got) {
     right.remedy =
-        "/etc/udev/rules.d/60-punctum.rules: "
+        "/etc/udev/rules.d/61-punctum-machine.rules: "
         "KERNEL==\"cpu_dma_latency\", GROUP=\"punctum\", MODE=\"0660\"";
   }
   return right;
@@ -270,7 +279,7 @@ RightFound frequency(const RightsWanted& wanted, const KernelFacts& facts) {
   right.got = other.empty();
   right.detail = !right.got ? other : scaling ? "performance" : "no frequency scaling here";
   if (!right.got) {
-    right.remedy = "cpupower frequency-set -g performance";
+    right.remedy = "cpupower frequency-set -g performance (Debian: apt-get install linux-cpupower)";
   }
   return right;
 }

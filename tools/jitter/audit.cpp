@@ -14,6 +14,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <set>
 #include <sstream>
 #include <utility>
 
@@ -24,26 +25,18 @@
 namespace punctum::jitter {
 namespace {
 
+// Where a plan is installed, below the root of the machine.
+constexpr const char *kPlannedBootLine = "/etc/default/grub.d/punctum.cfg",
+                     *kPlannedCommands = "/etc/punctum/machine",
+                     *kPlannedRules = "/etc/udev/rules.d/61-punctum-machine.rules",
+                     *kPlannedLimits = "/etc/security/limits.d/punctum.conf";
+constexpr const char* kOrFailed = " || failed=1";
+
 std::string line_of(const std::string& path) {
   std::ifstream in(path);
   std::string line;
   std::getline(in, line);
   return line;
-}
-
-// "0-2,5" of 0 1 2 5.
-std::string cpu_list(const std::vector<int>& cpus) {
-  std::string out;
-  for (std::size_t i = 0; i < cpus.size();) {
-    std::size_t end = i;
-    while (end + 1 < cpus.size() && cpus[end + 1] == cpus[end] + 1) {
-      ++end;
-    }
-    out += (out.empty() ? "" : ",") + std::to_string(cpus[i]);
-    out += end > i ? "-" + std::to_string(cpus[end]) : "";
-    i = end + 1;
-  }
-  return out;
 }
 
 Finding clock_source(const std::string& root) {
@@ -81,6 +74,78 @@ Finding swap_areas(const std::string& root) {
   if (areas > 0) {
     f.remedy = "swapoff -a, and no swap line in /etc/fstab";
     f.mend.command = "swapoff -a";
+  }
+  return f;
+}
+
+// The kernel takes it out of nohz_full and always puts it into the default mask of interrupts.
+constexpr const char* kOtherThanBootCpu =
+    "CPU 0 is the one that the kernel boots on, keeps time with and sends interrupts to: take another one";
+
+// The words of the boot line that isolate CPUs, and those CPUs.
+struct Isolating {
+  std::vector<std::string> words;
+  std::set<int> cpus;
+};
+Isolating isolating(const std::string& boot_line) {
+  Isolating out;
+  std::istringstream words(boot_line);
+  for (std::string word; words >> word;) {
+    if (word.starts_with("isolcpus=") || word.starts_with("nohz_full=")) {
+      // "managed_irq,domain,3": flags before the CPUs.
+      const std::size_t flags =
+          word.find_last_of("abcdefghijklmnopqrstuvwxyz=,", word.find_first_of("0123456789"));
+      const std::vector<int> cpus =
+          rt::parse_cpu_list(word.substr(flags == std::string::npos ? 0 : flags + 1));
+      out.cpus.insert(cpus.begin(), cpus.end());
+      out.words.push_back(word);
+    }
+  }
+  return out;
+}
+
+// What isolates the loop's CPU beside those that the boot line isolates already: the kernel ignores one of
+// isolcpus= and nohz_full= that names others than the other one. Words that did not come from a plan stay
+// where they are, and so are a person's to change.
+void isolate(Finding& f, int cpu, const std::string& others, const std::string& root) {
+  if (others.empty()) {
+    f.remedy = "a machine with a second CPU";
+  } else if (cpu == 0) {
+    f.remedy = kOtherThanBootCpu;
+  } else {
+    Isolating now = isolating(line_of(root + "/proc/cmdline"));
+    now.cpus.insert(cpu);
+    const std::string words =
+        fmt::format("isolcpus=managed_irq,domain,{0} nohz_full={0} rcu_nocbs={0} irqaffinity={1}",
+                    rt::cpu_list({now.cpus.begin(), now.cpus.end()}), others);
+    std::ifstream planned(root + kPlannedBootLine);
+    const std::string ours(std::istreambuf_iterator<char>(planned), {});
+    if (std::all_of(now.words.begin(), now.words.end(), [&](const std::string& word) {
+          return ours.find(" " + word + " ") != std::string::npos ||
+                 ours.find(" " + word + "\"") != std::string::npos;
+        })) {
+      f.mend.boot = words;
+      f.remedy = "boot with " + words;
+    } else {
+      f.remedy = fmt::format("in the boot line, {} in place of {}", words, fmt::join(now.words, " "));
+    }
+  }
+}
+
+// A CPU that is only isolated still takes the tick of the timer and the callbacks of RCU.
+Finding timer_tick(int cpu, const std::string& others, const std::string& root) {
+  Finding f{"no timer tick", "this kernel cannot switch it off"};
+  std::ifstream in(root + "/sys/devices/system/cpu/nohz_full");
+  std::string cpus;
+  if (!std::getline(in, cpus)) {
+    return f;
+  }
+  const std::vector<int> off = rt::parse_cpu_list(cpus.find("null") == std::string::npos ? cpus : "");
+  f.found = off.empty() ? "on everywhere" : "off on CPU " + cpus;
+  if (cpu < 0) {
+    f.remedy = "name the loop's own CPU: --cpu N";
+  } else if (std::find(off.begin(), off.end(), cpu) == off.end()) {
+    isolate(f, cpu, others, root);
   }
   return f;
 }
@@ -135,6 +200,8 @@ Finding interrupts(int cpu, const std::string& others, const std::string& root) 
   }
   if (served && others.empty()) {
     f.found += "; there is no other CPU";
+  } else if (served && cpu == 0) {
+    f.remedy = kOtherThanBootCpu;
   } else if (served) {
     f.remedy = fmt::format("boot with irqaffinity={}", others);
     f.mend.boot = "irqaffinity=" + others;
@@ -207,6 +274,7 @@ Finding coalescing(const Machine& machine) {
   if (told && (told->rx_us > 0 || told->adaptive)) {
     f.remedy = f.mend.command =
         fmt::format("ethtool -C {} {}rx-usecs 0", interface, told->adaptive ? "adaptive-rx off " : "");
+    f.found += " (Debian: apt-get install ethtool)";
   }
   return f;
 }
@@ -232,13 +300,16 @@ Finding interrupt_of(const UsedDevice& device, const Interrupt& irq, int cpu, in
                                                            : std::string("of ordinary priority"));
     if (irq.thread_priority <= priority) {
       const int above = std::min(priority + 5, 98);
-      const auto set = [above](const std::string& pattern) {
+      const auto set = [above](const std::string& number, const char* then) {
         return fmt::format(
-            "for t in $(grep -lE '{}' /proc/[0-9]*/comm | cut -d/ -f3); do chrt -f -p {} $t; done", pattern,
-            above);
+            "for t in $(grep -l \"^irq/{}-\" /proc/[0-9]*/comm | cut -d/ -f3); do chrt -f -p {} $t{}; done",
+            number, above, then);
       };
-      now.push_back(set(fmt::format("^irq/{}-", irq.number)));
-      always.push_back(set("^irq/[0-9]+" + irq.thread.substr(irq.thread.find('-'))));
+      now.push_back(set(std::to_string(irq.number), ""));
+      // The kernel cuts a thread's name at 15 characters, and so more of it the longer the number is: the
+      // number is found by the name of the interrupt, which is whole. Where none is found, it has failed.
+      always.push_back(fmt::format("ok=false; for i in /proc/irq/*/'{}'; do n=${{i%/*}}; {}; done; $ok",
+                                   irq.names.front(), set("${n##*/}", " && ok=true")));
     }
   }
   f.remedy = fmt::format("{}", fmt::join(now, "; "));
@@ -286,7 +357,7 @@ std::vector<Finding> devices(const tools::Scene& scene, int cpu, int priority, c
 
 }  // namespace
 
-Finding finding_of(const rt::RightFound& right, int cpu, const std::string& others) {
+Finding finding_of(const rt::RightFound& right, int cpu, const std::string& others, const std::string& root) {
   Finding f{right.name,
             right.detail,
             right.got              ? ""
@@ -298,15 +369,12 @@ Finding finding_of(const rt::RightFound& right, int cpu, const std::string& othe
     return f;
   }
   if (right.name == "SCHED_FIFO priority") {
-    f.mend.limits = "@punctum - rtprio 95";
+    const std::size_t limit = right.remedy.find("@punctum - rtprio ");
+    f.mend.limits = limit == std::string::npos ? "@punctum - rtprio 95" : right.remedy.substr(limit, 20);
   } else if (right.name == "locked memory") {
     f.mend.limits = "@punctum - memlock unlimited";
-  } else if (right.name == "isolated CPU" && cpu >= 0 && others.empty()) {
-    f.remedy = "a machine with a second CPU";
   } else if (right.name == "isolated CPU" && cpu >= 0) {
-    f.mend.boot = fmt::format("isolcpus=managed_irq,domain,{0} nohz_full={0} rcu_nocbs={0} irqaffinity={1}",
-                              cpu, others);
-    f.remedy = "boot with " + f.mend.boot;
+    isolate(f, cpu, others, root);
   } else if (right.name == "CPU sleep held off") {
     f.mend.udev = R"(KERNEL=="cpu_dma_latency", SUBSYSTEM=="misc", GROUP="punctum", MODE="0660")";
   } else if (right.name == "performance governor") {
@@ -323,20 +391,21 @@ Finding finding_of(const rt::RightFound& right, int cpu, const std::string& othe
 std::vector<Finding> audit(int cpu, int priority, const tools::Scene* scene, const Machine& machine) {
   const std::string& root = machine.root;
   const rt::KernelFacts facts = rt::read_kernel_facts(root);
-  std::vector<int> other_cpus = facts.online_cpus;
-  std::erase(other_cpus, cpu);
-  // Another isolated CPU is kept free for something, too, unless no other one is left.
-  if (std::vector<int> shared = other_cpus;
-      std::erase_if(shared, [&](int one) {
-        return std::count(facts.isolated_cpus.begin(), facts.isolated_cpus.end(), one) > 0;
-      }) < other_cpus.size()) {
-    other_cpus = std::move(shared);
-  }
-  const std::string others = cpu >= 0 ? cpu_list(other_cpus) : "";
   rt::RightsWanted wanted;
   wanted.cpu = cpu;
   wanted.priority = priority;
   const auto rights = rt::RealTimeRights::examine(wanted);
+  // Nothing is planned for a CPU that is not there.
+  const int asked = cpu;
+  const bool absent = cpu >= 0 && !facts.online_cpus.empty() &&
+                      std::count(facts.online_cpus.begin(), facts.online_cpus.end(), cpu) == 0;
+  cpu = absent ? -1 : cpu;
+  const int first = instead_of_sibling(cpu, facts, root);
+  std::vector<int> other_cpus = rt::cpus_beside(cpu, facts);
+  if (facts.smt_active && first < 0) {  // nosmt, which is planned then, takes the second threads away
+    std::erase_if(other_cpus, [&](int one) { return instead_of_sibling(one, facts, root) >= 0; });
+  }
+  const std::string others = asked >= 0 ? rt::cpu_list(other_cpus) : "";
   std::vector<Finding> out;
   if (facts.online_cpus.empty()) {
     out.push_back(
@@ -345,9 +414,15 @@ std::vector<Finding> audit(int cpu, int priority, const tools::Scene* scene, con
          .remedy = "audit outside of this container, where /sys is mounted"});
   }
   for (const rt::RightFound& right : rights.table()) {
-    out.push_back(finding_of(right, cpu, others));
+    Finding& f = out.emplace_back(finding_of(right, cpu, others, root));
+    if (absent && right.name == "CPU affinity") {
+      f = {.name = right.name,
+           .found = fmt::format("CPU {} is not online", asked),
+           .remedy = "name one of " + rt::cpu_list(facts.online_cpus),
+           .required = true};
+    }
   }
-  if (const int first = instead_of_sibling(cpu, facts, root); first >= 0) {
+  if (first >= 0) {
     for (Finding& f : out) {
       f.mend.boot = f.name == "no SMT siblings" ? "" : f.mend.boot;  // it would take the loop's CPU away
     }
@@ -356,9 +431,13 @@ std::vector<Finding> audit(int cpu, int priority, const tools::Scene* scene, con
          .found = fmt::format("CPU {} is the second one of CPU {}: nosmt switches it off", cpu, first),
          .remedy = fmt::format("audit and run with --cpu {}", first)});
   }
+  out.push_back(timer_tick(cpu, others, root));
   out.push_back(clock_source(root));
   out.push_back(swap_areas(root));
-  out.push_back(interrupts(cpu, others, root));
+  out.push_back(interrupts(asked, others, root));
+  if (absent) {
+    out.back().mend = {};
+  }
   out.push_back(balancer(root));
   out.push_back(coalescing(machine));
   if (scene != nullptr) {
@@ -387,7 +466,7 @@ std::string audit_text(const std::vector<Finding>& findings) {
   return out + fmt::format("{} missing, {} advised\n", missing, advised);
 }
 
-std::map<std::string, std::string> plan(const std::vector<Finding>& findings) {
+std::map<std::string, std::string> plan(const std::vector<Finding>& findings, const std::string& root) {
   std::vector<std::string> boot, commands, udev, limits, by_hand;
   const auto add = [](std::vector<std::string>& to, const std::string& what) {
     if (!what.empty() && std::find(to.begin(), to.end(), what) == to.end()) {
@@ -410,6 +489,40 @@ std::map<std::string, std::string> plan(const std::vector<Finding>& findings) {
       by_hand.push_back(f.name + ": " + f.remedy);
     }
   }
+  // What an earlier plan has mended is ready by now, and is so no longer where its file is replaced.
+  const auto installed = [&](const std::string& path) {
+    std::ifstream in(root + path);
+    std::vector<std::string> lines;
+    for (std::string line; std::getline(in, line);) {
+      if (!line.empty() && !line.starts_with('#')) {
+        lines.push_back(line);
+      }
+    }
+    return lines;
+  };
+  for (const std::string& line : installed(kPlannedBootLine)) {
+    const std::string before = "GRUB_CMDLINE_LINUX=\"$GRUB_CMDLINE_LINUX ";
+    std::istringstream words(
+        line.starts_with(before) ? line.substr(before.size(), line.rfind('"') - before.size()) : "");
+    for (std::string word; words >> word;) {
+      const std::string key = word.substr(0, word.find('='));
+      if (std::none_of(boot.begin(), boot.end(),
+                       [&](const std::string& one) { return one.substr(0, one.find('=')) == key; })) {
+        boot.push_back(word);
+      }
+    }
+  }
+  for (const std::string& line : installed(kPlannedCommands)) {
+    if (const std::size_t end = line.rfind(kOrFailed); end != std::string::npos) {
+      add(commands, line.substr(0, end));
+    }
+  }
+  for (const std::string& line : installed(kPlannedRules)) {
+    add(udev, line);
+  }
+  for (const std::string& line : installed(kPlannedLimits)) {
+    add(limits, line);
+  }
   std::map<std::string, std::string> files;
   std::string readme = "What the audit of this machine found missing, as files. As root:\n\n";
   const auto text = [](const std::vector<std::string>& lines) {
@@ -419,22 +532,22 @@ std::map<std::string, std::string> plan(const std::vector<Finding>& findings) {
   if (!boot.empty()) {
     const std::string line = fmt::format("{}", fmt::join(boot, " "));
     files["boot-line"] = line + "\n";
-    files["etc/default/grub.d/punctum.cfg"] =
+    files[kPlannedBootLine + 1] =
         fmt::format("{}GRUB_CMDLINE_LINUX=\"$GRUB_CMDLINE_LINUX {}\"\n", kMade, line);
   }
   if (!udev.empty()) {
-    files["etc/udev/rules.d/61-punctum-machine.rules"] = kMade + text(udev);
+    files[kPlannedRules + 1] = kMade + text(udev);
   }
   if (!limits.empty()) {
-    files["etc/security/limits.d/punctum.conf"] = kMade + text(limits);
+    files[kPlannedLimits + 1] = kMade + text(limits);
   }
   if (!commands.empty()) {
     // One that fails stops no other, and is not hidden by those after it.
     std::string script = fmt::format("#!/bin/sh\n{}failed=0\n", kMade);
     for (const std::string& command : commands) {
-      script += command + " || failed=1\n";
+      script += command + kOrFailed + "\n";
     }
-    files["etc/punctum/machine"] = script + "exit $failed\n";
+    files[kPlannedCommands + 1] = script + "exit $failed\n";
     // Before every run, for a CAN interface has an interrupt, and that a thread, only while it is up; buses
     // are brought up before network.target.
     files["etc/systemd/system/punctum-machine.service"] = fmt::format(
@@ -448,6 +561,10 @@ std::map<std::string, std::string> plan(const std::vector<Finding>& findings) {
     }
   }
   readme += files.empty() ? "    (there is nothing to install)\n" : "    cp -r etc /\n";
+  if (std::any_of(commands.begin(), commands.end(),
+                  [](const std::string& command) { return command.starts_with("ethtool "); })) {
+    readme += "    apt-get install ethtool\n";
+  }
   if (!boot.empty()) {
     readme += "    update-grub           # without GRUB: append boot-line to the kernel's boot line\n";
   }
@@ -466,11 +583,9 @@ std::map<std::string, std::string> plan(const std::vector<Finding>& findings) {
   if (!boot.empty()) {
     readme += "    reboot\n";
   }
-  const auto isolated = std::find_if(boot.begin(), boot.end(),
-                                     [](const std::string& word) { return word.starts_with("nohz_full="); });
-  if (isolated != boot.end()) {
-    readme += fmt::format("\nThe scene then names the loop's own CPU: [servo] cpu = {}\n",
-                          isolated->substr(isolated->find('=') + 1));
+  if (std::any_of(boot.begin(), boot.end(),
+                  [](const std::string& word) { return word.starts_with("nohz_full="); })) {
+    readme += "\nThe scene then names the loop's own CPU, that of --cpu: [servo] cpu = N\n";
   }
   if (!by_hand.empty()) {
     readme += "\nBy hand:\n\n";

@@ -44,12 +44,15 @@ struct Machine {
 [[nodiscard]] std::vector<Finding> audit(int cpu, int priority, const tools::Scene* scene = nullptr,
                                          const Machine& machine = {});
 // One of them, of a right; others: the CPUs that are not the loop's, as the kernel lists them.
-[[nodiscard]] Finding finding_of(const rt::RightFound& right, int cpu, const std::string& others);
+[[nodiscard]] Finding finding_of(const rt::RightFound& right, int cpu, const std::string& others,
+                                 const std::string& root = {});
 
 [[nodiscard]] std::string audit_text(const std::vector<Finding>& findings);
 
 // The files that mend what was found, by their paths below the root of the machine, and a README beside them.
-[[nodiscard]] std::map<std::string, std::string> plan(const std::vector<Finding>& findings);
+// They keep what an earlier plan has put there.
+[[nodiscard]] std::map<std::string, std::string> plan(const std::vector<Finding>& findings,
+                                                      const std::string& root = {});
 // Writes them below `folder`, which must be new or empty.
 [[nodiscard]] tl::expected<void, std::string> write_plan(const std::map<std::string, std::string>& files,
                                                          const std::string& folder);

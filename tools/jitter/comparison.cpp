@@ -1,12 +1,16 @@
 #include "tools/jitter/comparison.hpp"
 
 #include <fmt/format.h>
+#include <signal.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -31,8 +35,11 @@ constexpr int kBins = 2000;      // as the loop's own histogram
 // A folder that goes with the object.
 class Folder {
  public:
-  Folder() : path_(fs::temp_directory_path() / fmt::format("punctum-jitter-{}", getpid())) {
-    fs::create_directories(path_);
+  Folder() {
+    std::string path = (fs::temp_directory_path() / "punctum-jitter-XXXXXX").string();
+    if (mkdtemp(path.data()) != nullptr) {
+      path_ = path;
+    }
   }
   Folder(const Folder&) = delete;
   Folder& operator=(const Folder&) = delete;
@@ -40,6 +47,7 @@ class Folder {
     std::error_code ignored;
     fs::remove_all(path_, ignored);
   }
+  [[nodiscard]] bool is_there() const { return !path_.empty(); }
   [[nodiscard]] std::string file(const char* name) const { return (path_ / name).string(); }
 
  private:
@@ -63,7 +71,7 @@ std::string run(const std::string& program, const std::vector<std::string>& argu
   tools::Ended how;
   while (!child->ended(how)) {
     if (tools::stop_signal::count() > 0) {
-      return "stopped";
+      return "--compare: stopped";  // and the child with it
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
@@ -139,6 +147,11 @@ tl::expected<Comparison, std::string> compare_with_cyclictest(const Wanted& want
   }
   const double slice_s = wanted.seconds / 2 / slices;
   const Folder folder;
+  if (!folder.is_there()) {
+    return tl::unexpected(fmt::format("--compare: no folder can be made in {}: {}",
+                                      fs::temp_directory_path().string(), std::strerror(errno)));
+  }
+  tools::stop_signal::watch({SIGINT, SIGTERM, SIGHUP});
   const std::string json = folder.file("loop.json"), histogram = folder.file("cyclictest.hist"),
                     log = folder.file("log");
   std::vector<std::string> loop{
@@ -172,6 +185,7 @@ tl::expected<Comparison, std::string> compare_with_cyclictest(const Wanted& want
     }
     add(ours->wake, out.loop);
     out.loop.missed += ours->missed;
+    out.loop.missed_in_parts.push_back(ours->missed);
     out.loop.machine = out.cyclictest.machine = ours->machine;
     if (const std::string failed = run("cyclictest", theirs, log); !failed.empty()) {
       return tl::unexpected(failed);

@@ -17,6 +17,7 @@ constexpr std::size_t kLeastBlocks = 6;
 constexpr int kDraws = 2000;
 constexpr double kResolution_us = 0.1;                   // of a quantile between the edges of its bin of 1 us
 constexpr double kAlpha = 0.05 / kQuantileParts.size();  // three questions, one answer
+constexpr double kMissedAlpha = 0.05;                    // another one
 
 using Chosen = std::vector<const Distribution*>;
 using Quantiles = std::array<double, kQuantileParts.size()>;
@@ -165,6 +166,12 @@ double variance_of_blocks(const std::vector<double>& x, std::size_t length) {
   return sum / static_cast<double>(n * n);
 }
 
+// Parts in a block, where neighbours hang together over so many.
+std::size_t parts_in_block(double longest, std::size_t parts_a, std::size_t parts_b) {
+  const std::size_t most = std::min(parts_a, parts_b) / kLeastBlocks;
+  return std::clamp<std::size_t>(static_cast<std::size_t>(std::ceil(2 * longest - 1)), 1, most);
+}
+
 std::size_t block_length(const Chosen& a, const Chosen& b) {
   double longest = 1;
   for (const Chosen* parts : {&a, &b}) {
@@ -173,8 +180,7 @@ std::size_t block_length(const Chosen& a, const Chosen& b) {
       longest = std::max(longest, correlation_length(later_than(limit, *parts)));
     }
   }
-  const std::size_t most = std::min(a.size(), b.size()) / kLeastBlocks;
-  return std::clamp<std::size_t>(static_cast<std::size_t>(std::ceil(2 * longest - 1)), 1, most);
+  return parts_in_block(longest, a.size(), b.size());
 }
 
 template <class Iterator>
@@ -195,9 +201,73 @@ Chosen drawn_from(const Blocks& blocks, std::mt19937& random) {
   return parts_of(out.begin(), out.end());
 }
 
+// Of one part: releases that were missed, and all.
+struct Releases {
+  double missed = 0, all = 0;
+};
+
+double share_of(const std::vector<Releases>& parts, std::size_t begin, std::size_t end) {
+  double missed = 0, all = 0;
+  for (std::size_t i = begin; i < end; ++i) {
+    missed += parts[i].missed;
+    all += parts[i].all;
+  }
+  return all > 0 ? missed / all : 0;
+}
+
+// Neighbouring parts that hang together become one.
+std::vector<Releases> releases_of(const Result& r, std::size_t length) {
+  std::vector<Releases> out;
+  for (std::size_t i = 0; i < r.parts.size(); ++i) {
+    Releases& block = i % length == 0 ? out.emplace_back() : out.back();
+    const auto missed = static_cast<double>(r.missed_in_parts[i]);
+    block.missed += missed;
+    block.all += missed + static_cast<double>(r.parts[i].entries());
+  }
+  return out;
+}
+
+MissedDifference missed_difference(const Result& a, const Result& b, std::mt19937& random) {
+  MissedDifference out{.a = a.missed, .b = b.missed};
+  if (a.missed_in_parts.size() != a.parts.size() || b.missed_in_parts.size() != b.parts.size()) {
+    return out;
+  }
+  double longest = 1;
+  for (const Result* one : {&a, &b}) {
+    const auto& missed = one->missed_in_parts;
+    longest = std::max(longest, correlation_length({missed.begin(), missed.end()}));
+    (one == &a ? out.parts_a : out.parts_b) =
+        static_cast<std::size_t>(std::count_if(missed.begin(), missed.end(), [](auto n) { return n > 0; }));
+  }
+  const std::size_t length = parts_in_block(longest, a.parts.size(), b.parts.size());
+  std::vector<Releases> all = releases_of(a, length);
+  const std::size_t of_a = all.size();
+  const std::vector<Releases> more = releases_of(b, length);
+  all.insert(all.end(), more.begin(), more.end());
+  const auto difference_now = [&] {
+    return std::abs(share_of(all, of_a, all.size()) - share_of(all, 0, of_a));
+  };
+  const double found = difference_now() * (1 - 1e-9);  // the same sum in another order
+  int as_large = 0;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    for (std::size_t i = all.size(); i > 1; --i) {
+      std::swap(all[i - 1], all[below(random, i)]);
+    }
+    as_large += difference_now() >= found ? 1 : 0;
+  }
+  out.chance = (as_large + 1.0) / (kDraws + 1.0);
+  out.differs = out.chance < kMissedAlpha;
+  return out;
+}
+
 }  // namespace
 
-tl::expected<std::vector<QuantileDifference>, std::string> difference(const Result& a, const Result& b) {
+bool Difference::any() const {
+  return missed.differs ||
+         std::any_of(quantiles.begin(), quantiles.end(), [](const auto& q) { return q.differs; });
+}
+
+tl::expected<Difference, std::string> difference(const Result& a, const Result& b) {
   const Chosen parts_a = all_of(a), parts_b = all_of(b);
   if (parts_a.size() < kLeastParts || parts_b.size() < kLeastParts) {
     return tl::unexpected(fmt::format("{} and {} parts with wake-ups, at least {} each are needed",
@@ -234,7 +304,8 @@ tl::expected<std::vector<QuantileDifference>, std::string> difference(const Resu
       as_large[q] += wider[q] * std::abs(dealt_b[q] - dealt_a[q]) >= std::abs(in_b[q] - in_a[q]) ? 1 : 0;
     }
   }
-  std::vector<QuantileDifference> out;
+  const Distribution whole_a = together(parts_a), whole_b = together(parts_b);
+  Difference out;
   for (std::size_t q = 0; q < kQuantileParts.size(); ++q) {
     std::vector<double>& d = drawn[q];
     std::sort(d.begin(), d.end());
@@ -246,13 +317,16 @@ tl::expected<std::vector<QuantileDifference>, std::string> difference(const Resu
     one.low_us = found_us + wider[q] * (at(kAlpha / 2) - found_us);
     one.high_us = found_us + wider[q] * (at(1 - kAlpha / 2) - found_us);
     const double chance = (as_large[q] + 1.0) / (kDraws + 1.0);
-    one.differs = chance < kAlpha && (one.low_us > kResolution_us || one.high_us < -kResolution_us);
-    out.push_back(one);
+    one.told = whole_a.tells(one.part) && whole_b.tells(one.part);
+    one.differs =
+        one.told && chance < kAlpha && (one.low_us > kResolution_us || one.high_us < -kResolution_us);
+    out.quantiles.push_back(one);
   }
+  out.missed = missed_difference(a, b, random);
   return out;
 }
 
-std::string difference_text(const std::vector<QuantileDifference>& found, const Result& a, const Result& b) {
+std::string difference_text(const Difference& found, const Result& a, const Result& b) {
   std::string out;
   if (a.machine != b.machine) {
     out += "the machines differ:\n  A: " + a.machine + "\n  B: " + b.machine + "\n";
@@ -274,12 +348,24 @@ std::string difference_text(const std::vector<QuantileDifference>& found, const 
     out += fmt::format("the rates differ: A {} Hz, B {} Hz\n", a.rate_Hz, b.rate_Hz);
   }
   out += "wake-up, us      A        B    B - A (95 % of all together)\n";
-  for (const QuantileDifference& q : found) {
+  for (const QuantileDifference& q : found.quantiles) {
+    if (!q.told) {
+      out += fmt::format("p{:<8} {:>8} {:>8}    (too few wake-ups)\n", 100 * q.part, "-", "-");
+      continue;
+    }
     out += fmt::format("p{:<8} {:>8.1f} {:>8.1f} {:>8.1f}  {:.1f} .. {:.1f}{}\n", 100 * q.part, q.a_us,
                        q.b_us, q.b_us - q.a_us, q.low_us, q.high_us, q.differs ? "  differs" : "");
   }
-  const bool any = std::any_of(found.begin(), found.end(), [](const auto& q) { return q.differs; });
-  return out + (any ? "they differ\n" : "no difference is shown\n");
+  out += fmt::format("{:<9} {:>8.1f} {:>8.1f}    (the latest one says little of all)\n", "max", a.wake.max_us,
+                     b.wake.max_us);
+  const MissedDifference& missed = found.missed;
+  out += fmt::format("{:<9} {:>8} {:>8}", "missed", missed.a, missed.b);
+  if (missed.parts_a + missed.parts_b > 0) {
+    out += fmt::format("    releases, in {} of {} and {} of {} parts; by chance in {:.1f} % of such pairs{}",
+                       missed.parts_a, a.parts.size(), missed.parts_b, b.parts.size(), 100 * missed.chance,
+                       missed.differs ? "  differs" : "");
+  }
+  return out + (found.any() ? "\nthey differ\n" : "\nno difference is shown\n");
 }
 
 }  // namespace punctum::jitter

@@ -10,9 +10,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstddef>
 #include <cstdlib>
+#include <cstring>
 #include <ctime>
+#include <string>
 #include <thread>
 #include <utility>
 
@@ -35,13 +38,21 @@ unsigned processors() { return std::max(1U, std::thread::hardware_concurrency())
   }
 }
 
-[[noreturn]] void write_disk() {
-  const char* folder = std::getenv("TMPDIR");
-  const int fd = open(folder != nullptr ? folder : "/var/tmp", O_TMPFILE | O_RDWR, 0600);
+// Its last name is gone at once; -1: it cannot be made.
+int nameless_file(const std::string& folder) {
+  std::string path = folder + "/punctum-jitter-XXXXXX";
+  const int fd = mkostemp(path.data(), O_CLOEXEC);
+  if (fd >= 0) {
+    (void)unlink(path.c_str());
+  }
+  return fd;
+}
+
+[[noreturn]] void write_disk(int fd) {
   static std::array<char, kWritten> block{};
   for (off_t at = 0;; at = (at + static_cast<off_t>(kWritten)) % kFile) {
-    if (fd < 0 || pwrite(fd, block.data(), block.size(), at) < 0 || fdatasync(fd) < 0) {
-      sleep(1);  // there is no disk to write to
+    if (pwrite(fd, block.data(), block.size(), at) < 0 || fdatasync(fd) < 0) {
+      sleep(1);  // it is full by now
     }
   }
 }
@@ -93,16 +104,24 @@ std::string Load::stated() {
 }
 
 tl::expected<Load, std::string> Load::start() {
+  const char* named = std::getenv("TMPDIR");
+  const std::string folder = named != nullptr ? named : "/var/tmp";
+  const int fd = nameless_file(folder);
+  if (fd < 0) {
+    return tl::unexpected(
+        fmt::format("--load: {}: no file can be written there: {}; TMPDIR names another folder", folder,
+                    std::strerror(errno)));
+  }
   Load load;
   std::array<int, 2> pair{};
   bool all = socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair.data()) == 0;
   for (unsigned i = 0; i < processors(); ++i) {
     all = all && load.add(fill_memory);
   }
-  all = all && load.add(write_disk) && load.add([&] { exchange_bytes(pair[0], true); }) &&
+  all = all && load.add([fd] { write_disk(fd); }) && load.add([&] { exchange_bytes(pair[0], true); }) &&
         load.add([&] { exchange_bytes(pair[1], false); }) && load.add(set_timers);
-  for (const int fd : pair) {
-    (void)close(fd);
+  for (const int used : {fd, pair[0], pair[1]}) {
+    (void)close(used);
   }
   if (!all) {
     return tl::unexpected(std::string("--load: its processes cannot be started"));

@@ -33,6 +33,7 @@
 #include "tools/shared/figure.hpp"
 #include "tools/shared/program_start.hpp"
 #include "tools/shared/say.hpp"
+#include "tools/shared/stop_signal.hpp"
 #include "tools/shared/version.hpp"
 #include "tools/shared/whole_file.hpp"
 
@@ -76,8 +77,7 @@ int diff(const std::vector<std::string>& files) {
     return bad(found.error());
   }
   say(jitter::difference_text(*found, *a, *b));
-  return std::any_of(found->begin(), found->end(), [](const auto& q) { return q.differs; }) ? kDiffers
-                                                                                            : kDone;
+  return found->any() ? kDiffers : kDone;
 }
 
 int audit(int cpu, int priority, const tools::Scene* scene, const std::string& plan_folder) {
@@ -98,7 +98,8 @@ int audit(int cpu, int priority, const tools::Scene* scene, const std::string& p
 int compare(const jitter::Wanted& wanted, const std::vector<std::string>& tick) {
   const auto both = jitter::compare_with_cyclictest(wanted, tick);
   if (!both) {
-    return bad(both.error());
+    complain(both.error());
+    return tools::stop_signal::count() > 0 ? kNotReady : kBadInput;
   }
   const auto found = jitter::difference(both->cyclictest, both->loop);
   if (!found) {
@@ -106,7 +107,6 @@ int compare(const jitter::Wanted& wanted, const std::vector<std::string>& tick) 
   }
   say("A: cyclictest, B: the loop of the core, in turns\n" +
       jitter::difference_text(*found, both->cyclictest, both->loop));
-  say(fmt::format("max{:>14.1f} {:>8.1f}\n", both->cyclictest.wake.max_us, both->loop.wake.max_us));
   return kDone;
 }
 
@@ -178,6 +178,10 @@ int measure(const jitter::Wanted& wanted, const std::string& load, const Files& 
       return kNotReady;
     }
   }
+  if (result->stopped_ticking) {
+    complain(fmt::format("--attach: {}: its core has stopped ticking", station));
+    return kNotReady;
+  }
   if (!gpio.empty() && result->answer.entries() == 0) {
     complain("--gpio: no change was answered: is ASK wired to IN, and OUT to SEEN?");
     return kNotReady;
@@ -204,8 +208,10 @@ int main_or_throw(int argc, char** argv) {
         "what of this machine is not ready, and what mends it"}},
       {{kDone, "it was measured; the machine is ready; no difference is shown"},
        {kNotReady,
-        "the audit found something missing that is required; the results differ; no GPIO line answered; what "
-        "was asked for could not be traced, written or said"},
+        "the audit found something missing that is required; the results differ; no GPIO line answered; the "
+        "core that was looked at has stopped ticking; --compare was stopped; a file or word that was asked "
+        "for, "
+        "a trace among them, could not be written"},
        {kBadInput, "bad input"}}));
   jitter::Wanted wanted;
   Files files;

@@ -41,6 +41,7 @@ namespace {
 constexpr std::size_t kMostSpikes = 64;
 constexpr std::chrono::milliseconds kLookAgain(10);
 constexpr int kParts = 60;
+constexpr std::chrono::milliseconds kPerhapsStopped(100), kStopped(1000);  // a running core without a tick
 constexpr std::int64_t kSetUp_ns = 200'000'000;  // from the start of the tick's work to the first release
 
 std::atomic<bool> end_loop{false};
@@ -121,14 +122,19 @@ Distribution distribution_of(const rt::TimeHistogram& histogram) { return since(
 class Parts {
  public:
   Parts(const rt::CoreStatus& status, double seconds, EmptyTick* tick)
-      : status_(status), tick_(tick), every_(seconds / kParts), before_(bins_of(status.wake)) {
+      : status_(status),
+        tick_(tick),
+        every_(seconds / kParts),
+        before_(bins_of(status.wake)),
+        missed_before_(status.missed.load()) {
     thread_ = ordinary_thread([this] { watch(); });
   }
   // The parts; of the last one nothing is told unless it was whole.
-  std::vector<Distribution> end() {
+  void end(Result& out) {
     over_.store(true);
     thread_.join();
-    return std::move(parts_);
+    out.parts = std::move(parts_);
+    out.missed_in_parts = std::move(missed_);
   }
 
  private:
@@ -152,6 +158,9 @@ class Parts {
           part.max_us = std::max(part.max_us, latest_us);
         }
         before_ = std::move(all);
+        const std::uint64_t missed = status_.missed.load();
+        missed_.push_back(missed - missed_before_);
+        missed_before_ = missed;
       }
     }
   }
@@ -160,8 +169,10 @@ class Parts {
   EmptyTick* tick_;
   std::chrono::duration<double> every_;
   Distribution before_;
+  std::uint64_t missed_before_;
   std::atomic<bool> over_{false};
   std::vector<Distribution> parts_;
+  std::vector<std::uint64_t> missed_;
   std::jthread thread_;
 };
 
@@ -339,7 +350,7 @@ tl::expected<Result, std::string> measure(const Wanted& wanted, const Work& work
   result.broke = empty_tick.broke();
   result.migrations = tools::late::rise(moved_before, migrations());
   result.smis = tools::late::rise(smis_before, tools::late::smi_count());
-  result.parts = parts.end();
+  parts.end(result);
   if (ended == rt::Executive::Ended::invalid) {
     return tl::unexpected(fmt::format("--rate: {} Hz: no period of a whole nanosecond", wanted.rate_Hz));
   }
@@ -401,21 +412,23 @@ tl::expected<Result, std::string> attach(const std::string& station, const Wante
   const std::chrono::duration<double> whole(wanted.seconds);
   std::uint64_t last = ticks;
   auto moved = begun;
-  bool stands = false;
-  while (!stands && !end_loop.load() && std::chrono::steady_clock::now() - begun < whole) {
+  // A core that has stopped shortly before the end is looked at until that is certain.
+  auto now = begun;
+  while (!result.stopped_ticking && !end_loop.load() &&
+         (now - begun < whole || now - moved > kPerhapsStopped)) {
     std::this_thread::sleep_for(kLookAgain);
     latest.look();
     witness.look();
-    const auto now = std::chrono::steady_clock::now();
+    now = std::chrono::steady_clock::now();
     if (status.ticks.load() != last) {
       last = status.ticks.load();
       moved = now;
     }
-    stands = now - moved > std::chrono::seconds(1);
+    result.stopped_ticking = now - moved > kStopped;
   }
-  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+  result.seconds = std::chrono::duration<double>((result.stopped_ticking ? moved : now) - begun).count();
   tools::late::Explanations explained = witness.end();
-  result.parts = parts.end();
+  parts.end(result);
   result.spikes = latest.spikes();
   result.explained = std::move(explained.ticks);
   result.unexplained = explained.more;

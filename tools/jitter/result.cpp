@@ -34,7 +34,7 @@ Json json_of(const Distribution& d) {
 Json with_quantiles(const Distribution& d) {
   Json out = json_of(d);
   for (const auto& [name, part] : kQuantiles) {
-    out[name] = d.entries() > 0 ? Json(d.quantile_us(part)) : Json(nullptr);
+    out[name] = d.tells(part) ? Json(d.quantile_us(part)) : Json(nullptr);
   }
   return out;
 }
@@ -117,6 +117,11 @@ double Distribution::quantile_us(double part) const {
   return max_us;
 }
 
+bool Distribution::tells(double part) const {
+  constexpr double kRounding = 1e-6;
+  return static_cast<double>(entries()) * (1 - part) >= 1 - kRounding;
+}
+
 Distribution since(const Distribution& before, const Distribution& after) {
   Distribution out = after;
   for (std::size_t k = 0; k < before.count.size(); ++k) {
@@ -142,6 +147,7 @@ std::string json_of(const Result& r) {
            {"missing", r.missing},
            {"ticks", r.ticks},
            {"missed", r.missed},
+           {"stopped_ticking", r.stopped_ticking},
            {"wake_us", with_quantiles(r.wake)},
            {"tick_us", with_quantiles(r.tick)},
            {"interval_us", with_quantiles(r.interval)},
@@ -176,8 +182,11 @@ std::string json_of(const Result& r) {
   out["late_unexplained"] = r.unexplained;
   out["untraced"] = r.untraced;
   out["parts"] = Json::array();
-  for (const Distribution& part : r.parts) {
-    out["parts"].push_back(json_of(part));
+  for (std::size_t i = 0; i < r.parts.size(); ++i) {
+    Json& part = out["parts"].emplace_back(json_of(r.parts[i]));
+    if (i < r.missed_in_parts.size()) {
+      part["missed"] = r.missed_in_parts[i];
+    }
   }
   return out.dump(1) + "\n";
 }
@@ -208,6 +217,12 @@ tl::expected<Result, std::string> result_of_json(std::string_view text) {
     }
     for (const Json& part : parts) {
       r.parts.push_back(distribution(part));
+      if (part.contains("missed")) {
+        r.missed_in_parts.push_back(number<std::uint64_t>(part, "missed"));
+      }
+    }
+    if (!r.missed_in_parts.empty() && r.missed_in_parts.size() != r.parts.size()) {
+      return tl::unexpected(std::string("parts: allowed: missed in each of them or in none"));
     }
     return r;
   } catch (const Json::parse_error& e) {
@@ -247,9 +262,7 @@ namespace {
 std::string quantile_line(const char* name, const Distribution& d) {
   std::string out = fmt::format("{:<10}", name);
   for (const auto& [label, part] : kQuantiles) {
-    // Fewer entries than it takes for one beyond the quantile tell only the largest.
-    const bool told = static_cast<double>(d.entries()) * (1 - part) >= 1;
-    out += told ? fmt::format(" {:>8.1f}", d.quantile_us(part)) : fmt::format("{:>9}", "-");
+    out += d.tells(part) ? fmt::format(" {:>8.1f}", d.quantile_us(part)) : fmt::format("{:>9}", "-");
   }
   return out + (d.entries() > 0 ? fmt::format(" {:>8.1f}\n", d.max_us) : fmt::format("{:>9}\n", "-"));
 }
@@ -341,6 +354,7 @@ std::string summary(const Result& r, int columns) {
   std::string out = fmt::format("{:.0f} Hz for {:.1f} s: {} ticks, {} releases missed", r.rate_Hz, r.seconds,
                                 r.ticks, r.missed);
   out += r.degraded ? "; WITHOUT real-time rights\n" : "\n";
+  out += r.stopped_ticking ? fmt::format("the core stopped ticking after {:.1f} s\n", r.seconds) : "";
   out += r.work.empty() ? "" : "each tick: " + r.work + "\n";
   out += r.load.empty() ? "" : "beside it: " + r.load + "\n";
   for (const std::string& one : r.missing) {

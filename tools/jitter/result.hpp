@@ -25,6 +25,8 @@ struct Distribution {
   // The value that `part` (0 .. 1) of all entries does not exceed, between the edges of its bin; max_us where
   // it is longer than the bins. 0 without entries.
   [[nodiscard]] double quantile_us(double part) const;
+  // Whether at least one entry lies beyond that quantile; else it only says how late the latest was.
+  [[nodiscard]] bool tells(double part) const;
 };
 
 // What a growing distribution holds more than it held before; after: with all its bins, be they empty. Of
@@ -62,6 +64,7 @@ struct Result {
   bool allocations_watched = false;
   // Wake-ups of equal parts of the measurement: what differs between them is not the machine's.
   std::vector<Distribution> parts;
+  std::vector<std::uint64_t> missed_in_parts;               // releases, of each part; empty: not told
   std::vector<std::pair<std::string, Distribution>> slots;  // of a tick that does something: execution times
   // Ticks that ended too late, each with its cause; of so many more there was no room or no time to tell.
   std::vector<tools::late::Explained> explained;
@@ -70,6 +73,7 @@ struct Result {
   std::string untraced;               // why the kernel's trace could not be asked
   std::string trace;                  // of the last explained tick
   bool broke = false;                 // a wake-up was too late and ended it
+  bool stopped_ticking = false;       // a running core that was looked at; seconds ends there
   std::string work;                   // that each tick did; empty: nothing
   std::string load;                   // that ran beside it; empty: none of ours
   std::string machine;  // kernel, processor, boot line: two results with the same text are comparable

@@ -430,14 +430,19 @@ std::string told_as_stolen(std::int64_t ns, const Counters& after) {
   return fmt::format("{} us counted as steal{}", ns / kNs, after.stolen_ns ? "" : ", in steps of 10 ms");
 }
 
+// What is counted beside the tick; in a long time it may have been another tick's.
+bool closely_around(const Episode& tick, const Counters& before, const Counters& after) {
+  return after.t_ns - before.t_ns - (tick.end_ns - tick.release_ns) <= kShort_ns;
+}
+
 // Time in which the processor did nothing that its kernel knows of. whose: the thread that was on it most of
 // that time, which may have switched interrupts off; empty: none.
-Verdict explain_silence(std::int64_t silent_ns, const Counters& before, const Counters& after,
-                        const Surroundings& surroundings, const std::string& whose = "") {
+Verdict explain_silence(const Episode& tick, std::int64_t silent_ns, const Counters& before,
+                        const Counters& after, const Surroundings& surroundings,
+                        const std::string& whose = "") {
   Verdict v;
   v.us = 1e-3 * static_cast<double>(silent_ns);
-  // In a long interval they may have been another tick's.
-  const bool short_interval = after.t_ns - before.t_ns <= kShort_ns;
+  const bool short_interval = closely_around(tick, before, after);
   if (const std::uint64_t smis = rise(before.smis, after.smis).value_or(0); smis > 0 && short_interval) {
     v.cause = Cause::smi;
     v.what = fmt::format("{} counted within {} ms around it", smis, (after.t_ns - before.t_ns) / kMs_ns);
@@ -556,7 +561,7 @@ Verdict explain(const Episode& tick, const std::vector<TraceEvent>& events, cons
     const auto on_it = std::max_element(account.silent_ns.begin(), account.silent_ns.end(),
                                         [](const auto& a, const auto& b) { return a.second < b.second; });
     const bool mostly = on_it != account.silent_ns.end() && 2 * on_it->second >= most->second;
-    return explain_silence(most->second, before, after, surroundings, mostly ? on_it->first : "");
+    return explain_silence(tick, most->second, before, after, surroundings, mostly ? on_it->first : "");
   }
   const Key* largest = nullptr;
   std::int64_t largest_ns = -1;
@@ -574,7 +579,7 @@ Verdict explain(const Episode& tick, const std::vector<TraceEvent>& events, cons
   // ms are too coarse to say that of an interrupt or another thread.
   const bool to_the_ns = before.stolen_ns && after.stolen_ns;
   if ((v.cause == Cause::own_computing || to_the_ns) && 2 * stolen_ns(before, after) >= most->second) {
-    Verdict taken = explain_silence(most->second, before, after, surroundings);
+    Verdict taken = explain_silence(tick, most->second, before, after, surroundings);
     if (v.cause == Cause::own_computing) {
       return taken;
     }
@@ -595,12 +600,13 @@ Verdict explain(const Episode& tick, const Counters& before, const Counters& aft
       after.minor_faults + after.major_faults - before.minor_faults - before.major_faults;
   const auto waited = static_cast<std::int64_t>(rise(before.waited_ns, after.waited_ns).value_or(0));
   const std::int64_t stolen = stolen_ns(before, after);
-  // Or it waited in the kernel.
-  const bool did_run =
-      static_cast<std::int64_t>(rise(before.ran_ns, after.ran_ns).value_or(0)) * 10 >= computed * 8;
+  // Or it waited in the kernel, and other ticks ran.
+  const double others_ns = tick.usual_share * static_cast<double>(after.t_ns - before.t_ns - all);
+  const bool did_run = static_cast<double>(rise(before.ran_ns, after.ran_ns).value_or(0)) - others_ns >=
+                       0.8 * static_cast<double>(computed);
   v.proof = Proof::counted;
   v.us = 1e-3 * static_cast<double>(all);
-  if (after.t_ns - before.t_ns > kShort_ns) {
+  if (!closely_around(tick, before, after)) {
     v.proof = Proof::none;
     v.what = fmt::format("nobody looked for {} ms around it", (after.t_ns - before.t_ns) / kMs_ns);
     return v;
@@ -613,7 +619,9 @@ Verdict explain(const Episode& tick, const Counters& before, const Counters& aft
     v.cause = Cause::preemption;
     v.what =
         fmt::format("the thread waited {} us for its processor; by whom only a trace tells", waited / kNs);
-  } else if (at_least_half(computed) && did_run && faults > 0) {
+  } else if (at_least_half(computed) && did_run && faults > 0 &&
+             (computed <= static_cast<std::int64_t>(faults) * kFault_ns ||
+              after.major_faults > before.major_faults)) {
     v.cause = Cause::page_fault;
     v.what = fmt::format("{} major among {}", after.major_faults - before.major_faults, faults);
   } else if (smis > 0) {  // it makes a wake-up late, or a slot long

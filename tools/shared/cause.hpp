@@ -46,6 +46,8 @@ struct Episode {
   int tid = 0;       // the loop's thread
   std::string slot;  // that took longest
   std::int64_t slot_ns = 0;
+  // Of a processor, which the thread's other ticks take on average: counters hold theirs, too.
+  double usual_share = 0;
 };
 
 struct TraceEvent {

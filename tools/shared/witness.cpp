@@ -100,6 +100,14 @@ Explained Witness::explain_one(const rt::LateTick& late, const std::vector<Trace
     out.slot = status_.slots[late.longest_slot].name.text;
   }
   Episode tick{late.release_ns, late.wake_ns, late.end_ns, tid_, out.slot, late.longest_slot_ns};
+  // Before this tick the others ran about as much as beside it.
+  const Counters& oldest = counters_.front();
+  const auto usual = [&](const Counters& before) {
+    const std::int64_t t_ns = before.t_ns - oldest.t_ns;
+    return t_ns > 0 ? static_cast<double>(rise(oldest.ran_ns, before.ran_ns).value_or(0)) /
+                          static_cast<double>(t_ns)
+                    : 1.0;  // nothing is known of them: they may have done all of it
+  };
   // The narrowest pair around it that is there.
   const Counters* before = &counters_.front();
   const Counters* after = &now;
@@ -111,6 +119,7 @@ Explained Witness::explain_one(const rt::LateTick& late, const std::vector<Trace
       break;
     }
   }
+  tick.usual_share = usual(*before);
   out.verdict = trace_ && late.end_ns <= traced_until_ns_
                     ? explain(tick, events, *before, *after, surroundings_)
                     : explain(tick, *before, *after);

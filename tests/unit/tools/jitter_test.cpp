@@ -13,6 +13,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -20,10 +21,14 @@
 #include <random>
 #include <sstream>
 #include <string>
+#include <thread>
 #include <tuple>
 #include <utility>
 #include <vector>
 
+#include "hal/ipc/rendezvous.hpp"
+#include "hal/ipc/segment.hpp"
+#include "rt/station/station.hpp"
 #include "tools/jitter/answer.hpp"
 #include "tools/jitter/audit.hpp"
 #include "tools/jitter/comparison.hpp"
@@ -34,6 +39,7 @@
 #include "tools/jitter/result.hpp"
 #include "tools/jitter/servo_tick.hpp"
 #include "tools/shared/cause.hpp"
+#include "tools/shared/station_segments.hpp"
 
 namespace {
 
@@ -108,7 +114,7 @@ Result measured(unsigned seed, double tail_us = 0, double all_us = 0, double kep
 bool differs(const Result& a, const Result& b, double part) {
   const auto found = difference(a, b);
   EXPECT_TRUE(found) << found.error();
-  return std::any_of(found->begin(), found->end(),
+  return std::any_of(found->quantiles.begin(), found->quantiles.end(),
                      [part](const auto& q) { return q.differs && (part == 0 || q.part == part); });
 }
 
@@ -183,11 +189,60 @@ TEST(Difference, of_three_microseconds_in_the_tail_is_found_where_it_is) {
 TEST(Difference, lies_in_its_interval) {
   const auto found = difference(measured(31), measured(32, 0, 5));
   ASSERT_TRUE(found);
-  for (const QuantileDifference& q : *found) {
+  for (const QuantileDifference& q : found->quantiles) {
     EXPECT_LE(q.low_us, 5) << q.part;
     EXPECT_GE(q.high_us, 5) << q.part;
     EXPECT_TRUE(q.differs) << q.part;
   }
+}
+
+// In `stopped` of its parts the machine stood still, and each time the loop missed a thousand releases.
+Result with_stops(unsigned seed, std::size_t stopped, std::uint64_t each = 1000) {
+  Result r = measured(seed);
+  r.missed_in_parts.assign(r.parts.size(), 0);
+  for (std::size_t i = 0; i < stopped; ++i) {
+    r.missed_in_parts[7 * i % r.parts.size()] = each;
+    r.missed += each;
+  }
+  return r;
+}
+
+TEST(Difference, of_missed_releases_is_one_though_no_quantile_tells_it) {
+  const Result still = with_stops(1, 0), stops = with_stops(1, 10);
+  const auto found = difference(still, stops);
+  ASSERT_TRUE(found);
+  EXPECT_TRUE(std::none_of(found->quantiles.begin(), found->quantiles.end(),
+                           [](const auto& q) { return q.differs; }));
+  EXPECT_TRUE(found->missed.differs) << found->missed.chance;
+  EXPECT_TRUE(found->any());
+  const std::string text = difference_text(*found, still, stops);
+  EXPECT_NE(text.find("10000"), std::string::npos) << text;
+  EXPECT_NE(text.find("10 of 60 parts"), std::string::npos) << text;
+  EXPECT_NE(text.find("they differ"), std::string::npos) << text;
+}
+
+TEST(Difference, of_missed_releases_counts_stops_and_not_releases) {
+  // Two stops in one of two measurements come by chance in every second pair, however long they are.
+  const auto found = difference(with_stops(1, 0), with_stops(1, 2, 100'000));
+  ASSERT_TRUE(found);
+  EXPECT_FALSE(found->missed.differs);
+  EXPECT_NEAR(found->missed.chance, 0.5, 0.1);
+  EXPECT_FALSE(difference(with_stops(1, 5), with_stops(1, 5))->missed.differs);
+  EXPECT_EQ(difference(measured(1), with_stops(1, 10))->missed.chance, 1) << "one does not tell them";
+}
+
+TEST(Difference, of_a_quantile_that_no_wake_up_lies_beyond_is_not_told) {
+  Result few = measured(1), many = measured(2, 0, 40);
+  few.parts.resize(8);
+  many.parts.resize(8);
+  for (Distribution& part : few.parts) {
+    part = of({10, 11, 12, 13, 14});
+  }
+  const auto found = difference(few, many);
+  ASSERT_TRUE(found);
+  EXPECT_TRUE(found->quantiles[0].told);
+  EXPECT_FALSE(found->quantiles[2].told);
+  EXPECT_FALSE(found->quantiles[2].differs);
 }
 
 TEST(Difference, needs_enough_parts) {
@@ -215,6 +270,24 @@ TEST(ResultFile, is_read_as_it_was_written) {
   EXPECT_EQ(again->wake.quantile_us(0.5), r.wake.quantile_us(0.5));
   ASSERT_EQ(again->parts.size(), r.parts.size());
   EXPECT_EQ(again->parts[7].quantile_us(0.9), r.parts[7].quantile_us(0.9));
+}
+
+TEST(ResultFile, tells_missed_releases_by_parts_or_not_at_all) {
+  EXPECT_EQ(result_of_json(json_of(with_stops(1, 3)))->missed_in_parts, with_stops(1, 3).missed_in_parts);
+  EXPECT_TRUE(result_of_json(json_of(measured(1)))->missed_in_parts.empty());
+  nlohmann::json mixed = nlohmann::json::parse(json_of(measured(1)));
+  mixed["parts"][3]["missed"] = 1;
+  EXPECT_FALSE(result_of_json(mixed.dump()));
+}
+
+TEST(ResultFile, tells_a_quantile_only_where_a_wake_up_lies_beyond_it) {
+  Result r = measured(1);
+  r.wake = of(std::vector<double>(1000, 20));
+  const nlohmann::json wake = nlohmann::json::parse(json_of(r))["wake_us"];
+  EXPECT_TRUE(wake["p99_9"].is_number());
+  EXPECT_TRUE(wake["p99_99"].is_null());
+  EXPECT_TRUE(of(std::vector<double>(10, 20)).tells(0.9));
+  EXPECT_FALSE(of(std::vector<double>(9, 20)).tells(0.9));
 }
 
 TEST(ResultFile, is_refused_with_one_line_that_says_where) {
@@ -278,6 +351,47 @@ TEST(TheLoad, ends_with_its_object_and_leaves_nobody_behind) {
     EXPECT_NE(children(), "");
   }
   EXPECT_EQ(children(), "");
+}
+
+TEST(TheLoad, is_refused_where_there_is_no_disk_to_write_to) {
+  const char* before = std::getenv("TMPDIR");
+  const std::string kept = before != nullptr ? before : "";
+  ASSERT_EQ(setenv("TMPDIR", "/nonexistent", 1), 0);
+  const auto load = Load::start();
+  before != nullptr ? setenv("TMPDIR", kept.c_str(), 1) : unsetenv("TMPDIR");
+  ASSERT_FALSE(load);
+  EXPECT_NE(load.error().find("/nonexistent"), std::string::npos) << load.error();
+}
+
+// A cyclictest that never ends, found before another one.
+TEST(Comparison, that_is_stopped_leaves_nobody_behind) {
+  const fs::path folder = fs::temp_directory_path() / ("punctum_comparison_" + std::to_string(getpid()));
+  fs::create_directories(folder / "tmp");
+  const std::string began = (folder / "began").string();
+  for (const char* program : {"cyclictest", "punctum-jitter"}) {
+    std::ofstream(folder / program) << "#!/bin/sh\necho $$ >" + began + "\nexec sleep 1000\n";
+    fs::permissions(folder / program, fs::perms::owner_all);
+  }
+  const pid_t comparing = fork();
+  if (comparing == 0) {
+    setenv("PATH", (folder.string() + ":" + std::getenv("PATH")).c_str(), 1);
+    setenv("TMPDIR", (folder / "tmp").c_str(), 1);
+    Wanted wanted;
+    wanted.seconds = 60;
+    _exit(compare_with_cyclictest(wanted, {}) ? 1 : 0);
+  }
+  pid_t child = 0;
+  while (child == 0) {
+    std::ifstream(began) >> child;
+    usleep(1000);
+  }
+  (void)kill(comparing, SIGTERM);
+  int status = 0;
+  ASSERT_EQ(waitpid(comparing, &status, 0), comparing);
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
+  EXPECT_NE(kill(child, 0), 0) << "its child goes on";
+  EXPECT_TRUE(fs::is_empty(folder / "tmp"));
+  fs::remove_all(folder);
 }
 
 // A machine made of files.
@@ -354,6 +468,98 @@ TEST_F(FileMachine, does_not_switch_off_the_cpu_of_the_loop) {
                            [](const Finding& f) { return f.name == "first thread of a core"; }));
 }
 
+TEST_F(FileMachine, has_no_plan_for_a_cpu_that_is_not_there) {
+  file("proc/irq/default_smp_affinity", "ff\n");
+  file("sys/devices/system/cpu/online", "0-3\n");
+  const Finding affinity = finding("CPU affinity", 7);
+  EXPECT_TRUE(affinity.required);
+  EXPECT_NE(affinity.found.find("CPU 7"), std::string::npos) << affinity.found;
+  EXPECT_NE(affinity.remedy.find("0-3"), std::string::npos) << affinity.remedy;
+  EXPECT_EQ(plan(audit(7, 80, nullptr, {.root = root_.string()}))["boot-line"].find("cpus="),
+            std::string::npos);
+}
+
+TEST_F(FileMachine, keeps_the_timer_tick_from_the_loop) {
+  file("sys/devices/system/cpu/online", "0-3\n");
+  EXPECT_EQ(finding("no timer tick").remedy, "") << "a kernel without it";
+  file("sys/devices/system/cpu/nohz_full", "(null)\n");
+  file("proc/cmdline", "quiet\n");
+  EXPECT_NE(finding("no timer tick").mend.boot.find("nohz_full=3 rcu_nocbs=3"), std::string::npos);
+  file("sys/devices/system/cpu/nohz_full", "2-3\n");
+  EXPECT_EQ(finding("no timer tick").remedy, "");
+  EXPECT_NE(finding("no timer tick", 1).remedy, "");
+}
+
+TEST_F(FileMachine, isolates_what_its_boot_line_isolates_already_too) {
+  file("sys/devices/system/cpu/online", "0-3\n");
+  file("sys/devices/system/cpu/isolated", "2\n");
+  file("sys/devices/system/cpu/nohz_full", "2\n");
+  file("proc/cmdline", "quiet isolcpus=managed_irq,domain,2 nohz_full=2\n");
+  EXPECT_EQ(finding("no timer tick").mend.boot, "") << "a second isolcpus= would be ignored";
+  EXPECT_NE(
+      finding("no timer tick")
+          .remedy.find("isolcpus=managed_irq,domain,2-3 nohz_full=2-3 rcu_nocbs=2-3 irqaffinity=0-1 in place "
+                       "of isolcpus=managed_irq,domain,2 nohz_full=2"),
+      std::string::npos)
+      << finding("no timer tick").remedy;
+  file("etc/default/grub.d/punctum.cfg",
+       "GRUB_CMDLINE_LINUX=\"$GRUB_CMDLINE_LINUX isolcpus=managed_irq,domain,2 nohz_full=2\"\n");
+  EXPECT_NE(finding("no timer tick").mend.boot.find("nohz_full=2-3"), std::string::npos) << "the plan's own";
+}
+
+TEST_F(FileMachine, does_not_isolate_the_cpu_that_it_boots_on) {
+  file("sys/devices/system/cpu/online", "0-3\n");
+  file("sys/devices/system/cpu/nohz_full", "(null)\n");
+  file("proc/irq/default_smp_affinity", "f\n");
+  for (const char* name : {"no timer tick", "interrupts elsewhere"}) {
+    EXPECT_NE(finding(name, 0).remedy.find("take another one"), std::string::npos) << finding(name, 0).remedy;
+    EXPECT_EQ(finding(name, 0).mend.boot, "");
+  }
+}
+
+TEST_F(FileMachine, sends_nothing_to_a_thread_that_its_plan_switches_off) {
+  file("sys/devices/system/cpu/online", "0-3\n");
+  file("sys/devices/system/cpu/smt/active", "1\n");
+  file("proc/irq/default_smp_affinity", "f\n");
+  for (const int cpu : {0, 1, 2, 3}) {
+    file("sys/devices/system/cpu/cpu" + std::to_string(cpu) + "/topology/thread_siblings_list",
+         cpu < 2 ? "0-1\n" : "2-3\n");
+  }
+  EXPECT_EQ(finding("interrupts elsewhere", 2).mend.boot, "irqaffinity=0");
+  file("sys/devices/system/cpu/online", "0-1\n");
+  EXPECT_EQ(finding("interrupts elsewhere", 0).mend.boot, "") << "one core";
+  EXPECT_NE(finding("interrupts elsewhere", 0).found.find("no other CPU"), std::string::npos);
+}
+
+TEST_F(FileMachine, keeps_what_an_earlier_plan_has_mended) {
+  file("proc/swaps", "Filename\n/dev/sda2\n");
+  file("sys/devices/system/cpu/online", "0-3\n");
+  file("proc/irq/default_smp_affinity", "f\n");
+  std::vector<Finding> first = audit(3, 80, nullptr, {.root = root_.string()});
+  first.push_back(finding_of({.name = "isolated CPU", .remedy = "by hand"}, 3, "0-2", root_.string()));
+  first.push_back(finding_of({.name = "SCHED_FIFO priority", .remedy = "by hand"}, 3, "0-2"));
+  first.push_back(finding_of({.name = "CPU sleep held off", .remedy = "by hand"}, 3, "0-2"));
+  ASSERT_TRUE(write_plan(plan(first, root_.string()), (root_ / "plan").string()));
+  fs::copy(root_ / "plan/etc", root_ / "etc", fs::copy_options::recursive);
+  // All of it was done, and another thing is found.
+  Finding other;
+  other.name = "SMT";
+  other.remedy = "by files";
+  other.mend = {
+      .boot = "nosmt irqaffinity=0-1", .command = "true", .udev = "RULE", .limits = "@punctum - nice -1"};
+  const auto files = plan({other}, root_.string());
+  const std::string& boot = files.at("boot-line");
+  for (const char* word : {"nosmt", "isolcpus=managed_irq,domain,3", "nohz_full=3", "irqaffinity=0-1"}) {
+    EXPECT_NE(boot.find(word), std::string::npos) << boot;
+  }
+  EXPECT_EQ(boot.find("irqaffinity"), boot.rfind("irqaffinity")) << boot;
+  for (const char* line : {"\nswapoff -a || failed=1\n", "\ntrue || failed=1\n"}) {
+    EXPECT_NE(files.at("etc/punctum/machine").find(line), std::string::npos) << line;
+  }
+  EXPECT_NE(files.at("etc/udev/rules.d/61-punctum-machine.rules").find("cpu_dma_latency"), std::string::npos);
+  EXPECT_NE(files.at("etc/security/limits.d/punctum.conf").find("rtprio"), std::string::npos);
+}
+
 TEST_F(FileMachine, that_shows_no_cpus_is_not_taken_for_one_of_a_single_cpu) {
   EXPECT_NE(finding("CPUs").remedy, "");
 }
@@ -365,6 +571,16 @@ TEST_F(FileMachine, that_is_ready_needs_nothing) {
   for (const char* name : {"no swap", "clock source", "interrupts elsewhere"}) {
     EXPECT_EQ(finding(name).remedy, "") << name;
   }
+}
+
+std::string output_of(const std::string& command) {
+  std::FILE* pipe = popen(command.c_str(), "r");
+  std::string out;
+  for (int c = 0; pipe != nullptr && (c = std::fgetc(pipe)) != EOF;) {
+    out += static_cast<char>(c);
+  }
+  EXPECT_EQ(pclose(pipe), 0) << command;
+  return out;
 }
 
 // A Falcon and a camera on one USB controller, a CAN card, GPIO lines without an interrupt.
@@ -442,6 +658,28 @@ TEST_F(FilesOfDevices, are_audited_by_the_interrupts_that_serve_them) {
             2);
 }
 
+// The kernel cuts a thread's name: with another number, another part of it is left. In place of /proc and
+// chrt, files and a word.
+TEST_F(FilesOfDevices, are_found_by_a_shell_after_their_numbers_changed) {
+  std::string command = named(found("loopback"), "irq 126 xhci_hcd").mend.command;
+  command = command.substr(command.find("ok=false"));
+  for (std::size_t at = 0; (at = command.find("/proc/", at)) != std::string::npos;
+       at += root_.string().size() + 6) {
+    command.insert(at, root_.string());
+  }
+  // Of the path, so much stands before the number.
+  command.replace(command.find("cut -d/ -f3"), 11, "rev | cut -d/ -f2 | rev");
+  command.replace(command.find("chrt"), 4, "echo");
+  file("proc/irq/1128/xhci_hcd/nothing", "");
+  thread(79, "irq/1128-xhci_h", 50, 1);
+  std::string said = output_of(command);
+  EXPECT_NE(said.find("-f -p 85 77"), std::string::npos) << said;
+  EXPECT_NE(said.find("-f -p 85 79"), std::string::npos) << said;
+  fs::remove_all(root_ / "proc/77");
+  fs::remove_all(root_ / "proc/79");
+  EXPECT_NE(std::system(command.c_str()), 0) << "it has done nothing";
+}
+
 TEST_F(FilesOfDevices, are_not_all_there_or_not_urgent_enough) {
   fs::remove(root_ / "sys/bus/usb/devices/1-1");
   thread(78, "irq/11-can0", 85, 0);  // of ordinary priority, whatever that field says
@@ -469,16 +707,6 @@ TEST_F(FilesOfDevices, and_the_network_in_use_are_told_what_to_do_at_once) {
   EXPECT_EQ(named(found("icsi"), "no irqbalance").remedy, "");
   file("proc/99/comm", "irqbalance\n");
   EXPECT_NE(named(found("icsi"), "no irqbalance").remedy, "");
-}
-
-std::string output_of(const std::string& command) {
-  std::FILE* pipe = popen(command.c_str(), "r");
-  std::string out;
-  for (int c = 0; pipe != nullptr && (c = std::fgetc(pipe)) != EOF;) {
-    out += static_cast<char>(c);
-  }
-  EXPECT_EQ(pclose(pipe), 0) << command;
-  return out;
 }
 
 TEST_F(FilesOfDevices, are_mended_by_files_that_a_shell_can_read) {
@@ -675,6 +903,44 @@ TEST(ServoTick, is_refused_in_one_line_where_a_measurement_would_move_something)
     EXPECT_NE(tick.error().find(word), std::string::npos) << tick.error();
     EXPECT_EQ(tick.error().find('\n'), std::string::npos) << tick.error();
   }
+}
+
+// A core that ticks every millisecond for a while and then no more.
+TEST(Attached, tells_of_a_core_that_stops_ticking_and_does_not_count_its_silence) {
+  const std::string station = "jitter-test-" + std::to_string(getpid());
+  using punctum::hal::Shared, punctum::rt::CoreSegment, punctum::tools::kCoreSegment;
+  const auto made = Shared<const CoreSegment>::create(kCoreSegment);
+  ASSERT_TRUE(made) << made.error();
+  auto segment = Shared<CoreSegment>::claim(kCoreSegment, made->segment().descriptor());
+  ASSERT_TRUE(segment) << segment.error();
+  auto rendezvous = punctum::hal::Rendezvous::open(station);
+  ASSERT_TRUE(rendezvous) << rendezvous.error();
+  rendezvous->offer(kCoreSegment, made->segment().read_only_descriptor().value());
+  punctum::rt::CoreStatus& status = (*segment)->status;
+  status.pid = static_cast<std::uint64_t>(getpid());
+  status.period_ns = 1'000'000;
+  status.started = 1;
+  using Clock = std::chrono::steady_clock;
+  const auto begun = Clock::now();
+  std::jthread core([&](const std::stop_token& over) {
+    while (!over.stop_requested()) {
+      rendezvous->serve();
+      if (status.ticks.load() < 300) {
+        status.wake.add(20'000);
+        status.ticks.store(status.ticks.load() + 1);
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  });
+  Wanted wanted;
+  wanted.seconds = 60;
+  const auto result = attach(station, wanted);
+  const double looked_s = 1e-9 * static_cast<double>((Clock::now() - begun).count());
+  ASSERT_TRUE(result) << result.error();
+  EXPECT_TRUE(result->stopped_ticking);
+  EXPECT_LT(result->seconds, looked_s - 0.9);
+  EXPECT_NE(summary(*result, 100).find("stopped ticking"), std::string::npos);
+  EXPECT_TRUE(nlohmann::json::parse(json_of(*result))["stopped_ticking"].get<bool>());
 }
 
 TEST(Measurement, counts_every_tick_once) {
@@ -1079,6 +1345,54 @@ TEST(CauseOfALateTick, by_counters_alone_is_told_only_where_they_suffice) {
                }),
             Cause::preemption)
       << "an SMI elsewhere in these 20 ms";
+}
+
+TEST(CauseOfALateTick, by_counters_alone_leaves_to_other_ticks_what_is_theirs) {
+  const auto by = [](Episode tick, const auto& change, double share) {
+    tick.usual_share = share;
+    Counters after = at(100.01);
+    change(after);
+    return explain(tick, at(99.99), after).cause;
+  };
+  // Twenty other ticks of 40 us beside one that a bus kept waiting.
+  const auto bus = [](Counters& c) { c.ran_ns = 820'000; };
+  EXPECT_EQ(by(late(10, 485), bus, 0.04), Cause::unknown);
+  EXPECT_EQ(by(late(10, 485), [](Counters& c) { c.ran_ns = 820'000 + 450'000; }, 0.04), Cause::own_computing);
+  EXPECT_NE(by(
+                late(10, 905),
+                [](Counters& c) {
+                  c.ran_ns = 900'000;
+                  c.minor_faults = 1;
+                },
+                0),
+            Cause::page_fault)
+      << "one fault does not take so long";
+  EXPECT_EQ(by(
+                late(10, 905),
+                [](Counters& c) {
+                  c.ran_ns = 900'000;
+                  c.minor_faults = 60;
+                },
+                0),
+            Cause::page_fault);
+}
+
+TEST(CauseOfALateTick, may_be_longer_than_the_time_that_counters_hold) {
+  Episode tick = late(10, 1'005'000);
+  Counters after = at(101.02);
+  after.ran_ns = 1'005'000'000;
+  EXPECT_EQ(explain(tick, at(99.99), after).cause, Cause::own_computing);
+  EXPECT_EQ(explain(tick, at(99.0), after).cause, Cause::unknown) << "nobody looked for a second before it";
+  tick = late(1'000'000, 1'000'005);
+  after.stolen_ms = 990;
+  EXPECT_EQ(cause_of(tick,
+                     kAsleep +
+                         "          <idle>-0       [001] d.h3.   100.999980: sched_waking: "
+                         "comm=punctum-core pid=70 prio=19 target_cpu=001\n" +
+                         runs_from("999985"),
+                     at(99.99), after)
+                .cause,
+            Cause::stolen_time);
 }
 
 TEST(CountersOfAThread, are_read_where_the_kernel_keeps_them) {

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "tests/support/pictures.hpp"
+#include "vision/image/polar_contour.hpp"
 #include "vision/membrane/edge_pattern.hpp"
 #include "vision/membrane/membrane_recoil.hpp"
 

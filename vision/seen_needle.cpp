@@ -319,8 +319,7 @@ void SeenNeedle::learn_from_dent(const NeedlePose& now, const std::optional<doub
     return;
   }
   pushes_unseen_ = 0;
-  const Point by = *ahead_px * now.axis;
-  pipette_.reaches_further(*ahead_px);
+  const Point by = pipette_.reaches_further(*ahead_px) * now.axis;
   by_stage_.jump_with_picture(by);
   motion_.jump_with_picture(by);
   if (last_on_membrane_) {

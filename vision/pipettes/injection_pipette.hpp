@@ -47,8 +47,8 @@ class InjectionPipette {
   [[nodiscard]] NeedlePose as_found(double noise) const;
   // It is known to be elsewhere along its axis than the picture shows.
   void put(const Point& tip);
-  // Its glass reaches further ahead than the picture shows, by that.
-  void reaches_further(double px) noexcept { end_.reaches_further(px); }
+  // Its glass reaches further ahead than the picture shows, by that. Returns how much of it is believed.
+  double reaches_further(double px) noexcept { return end_.reaches_further(px); }
   // No frame was seen for a while, and its tip is known to be there now: what was learnt of the needle itself
   // is kept. False, and to be found anew, unless its shaft lies there.
   [[nodiscard]] bool go_on_at(const GradientField& field, double noise, const Point& tip);

@@ -35,6 +35,9 @@ constexpr int kFurther = 8;
 constexpr double kFarBehind_px = 30;
 constexpr double kSteep = 0.8;  // px along per px across: of a steeper cut the two walls end far apart
 constexpr double kUsualBlur_px = 1.5;
+// Half-widths by which glass may reach ahead unseen: as far as a cut of 27 degrees, sharper than any that is
+// ground.
+constexpr double kMostUnseen = 4;
 constexpr double kExplained = 0.9;  // by its glass, of what is seen of a sharp point in relief
 
 // Of the outermost glass, px.
@@ -137,6 +140,12 @@ bool LearntEnd::learn_outermost(const NeedlePose& needle, const Point& followed)
   glass_ahead_ = (needle.tip - followed).dot(needle.axis);
   unseen_ahead_ = 0;
   return true;
+}
+
+double LearntEnd::reaches_further(double px) noexcept {
+  const double by = std::min(px, kMostUnseen * half_width_at_start_ - unseen_ahead_);
+  unseen_ahead_ += by;
+  return by;
 }
 
 bool LearntEnd::learn_by_glass(const GradientField& field, double noise, NeedlePose& needle,

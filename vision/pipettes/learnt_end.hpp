@@ -60,8 +60,8 @@ class LearntEnd {
   [[nodiscard]] NeedlePose told(NeedlePose followed, double noise) const;
   // The outermost glass over the end that is followed, px.
   [[nodiscard]] double glass_ahead() const noexcept { return glass_ahead_ + unseen_ahead_; }
-  // It reaches further than it is seen, by that.
-  void reaches_further(double px) noexcept { unseen_ahead_ += px; }
+  // It reaches further than it is seen, by that. Returns how much of it is believed.
+  double reaches_further(double px) noexcept;
   [[nodiscard]] bool glass_is_known() const noexcept { return glass_frames_ > 0; }
   // Walls and what lies between them were told apart at the start.
   [[nodiscard]] bool shows_lumen() const noexcept { return lumen_; }

@@ -162,6 +162,19 @@ TEST_F(Needle, that_is_thin_ends_with_the_glass_whether_a_line_closes_it_or_not)
   }
 }
 
+// A membrane that is lit otherwise could tell it again and again.
+TEST_F(Needle, reaches_no_further_unseen_than_the_sharpest_cut_is_long) {
+  Drawing d;
+  approach(d);
+  const double seen = look(d).tip.x;
+  EXPECT_DOUBLE_EQ(needle_.reaches_further(3), 3);
+  EXPECT_NEAR(look(d).tip.x, seen - 3, 0.5);
+  for (int i = 0; i < 10; ++i) {
+    (void)needle_.reaches_further(3);
+  }
+  EXPECT_GT(look(d).tip.x, seen - 8 * kTipRadius);  // four times its width, blurred as it is
+}
+
 // The manipulator has the tip further ahead than what is taken for the end.
 TEST_F(Needle, goes_on_behind_a_speck_as_far_as_its_walls_do) {
   constexpr double kFurther_px = 14;

@@ -196,7 +196,7 @@ INSTANTIATE_TEST_SUITE_P(
                     DrawnCell{"tilted_30", {}, {4, 4, 4, 4, 4}, 30},
                     DrawnCell{"tilted_45", {}, {4, 4, 4, 4, 4}, 45, false, 7},
                     DrawnCell{"on_shaft", {.on_shaft = 6}, {4, 4, 4, 4, 4}},
-                    DrawnCell{"crossed", {.gap_px = -1}, {4, 4, 4, 4, 4}},
+                    DrawnCell{"crossed", {.gap_px = -1}, {4, 4, 4, 4, 4}, 4, false, 1424},
                     DrawnCell{"impurities_60", {.impurities = 60}, {4, 4, 4, 4, 4}, 4, false, 37},
                     DrawnCell{"out_of_focus", {.focus_px = 4}, {4, 4, 4, 4, 4}, 4, true},
                     DrawnCell{"relief", {.relief = true}, {3, 4, 3, 4, 4, 1}, 4, true, 5}),

@@ -189,6 +189,7 @@ std::optional<NeedlePose> with_outer_line(const GradientField& field, double noi
   constexpr int kOfWall_px = 3, kMedium_px = 8;  // from the outer face, inward and outward
   constexpr int kNear_px = 1, kFar_px = 5;       // beyond the face, where the line is looked for
   constexpr double kNoises = 6, kOfWalls = 0.08, kOneSided = 2, kOuter = 1.5;
+  constexpr double kAlike = 0.75, kOfAlike = 0.5;
   constexpr int kParts = 4;        // of the stations; the furthest is out of focus
   constexpr double kOfLine = 0.3;  // of its strength, in each part
   constexpr double kHalfOfLine_px = 1.8;
@@ -242,8 +243,10 @@ std::optional<NeedlePose> with_outer_line(const GradientField& field, double noi
   const Side &found = is_low ? low : high, &other = is_low ? high : low;
   const double smooth_noise = std::max(noise, 0.5) / (2 * field.sigma * std::sqrt(std::numbers::pi));
   const double walls = std::max(std::abs(low.wall), std::abs(high.wall));
-  const double least =
-      std::max(kNoises * smooth_noise / std::sqrt(static_cast<double>(stations)), kOfWalls * walls);
+  // Beside two walls that are alike, as in bright field, a fainter line is their fringe.
+  const bool alike = low.wall * high.wall > kAlike * walls * walls;
+  const double least = std::max(kNoises * smooth_noise / std::sqrt(static_cast<double>(stations)),
+                                (alike ? kOfAlike : kOfWalls) * walls);
   // As far as the light's path rises across the needle it falls again: what is missing of that is a wall,
   // more of the same a fringe.
   const bool is_one = std::abs(found.line) > std::max(least, kOneSided * std::abs(other.line)) &&

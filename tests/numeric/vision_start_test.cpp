@@ -383,7 +383,7 @@ INSTANTIATE_TEST_SUITE_P(
     Cells, RenderedStart,
     testing::Values(RenderedCell{"noise_2", {4, 4, 4, 4, 4}}, RenderedCell{"noise_5", {4, 4, 4, 4, 4}},
                     RenderedCell{"noise_10", {4, 4, 4, 4, 4}}, RenderedCell{"noise_20", {4, 4, 4, 4, 4}},
-                    RenderedCell{"crossed", {5, 5, 5, 5, 5}, {1, 4, 812, 912, 1238}},
+                    RenderedCell{"crossed", {6, 6, 6, 6, 6}, {1, 4, 812, 912, 1238, 1407}},
                     RenderedCell{"halo", {4, 4, 4, 4, 4}}, RenderedCell{"impurities_60", {4, 4, 4, 4, 4}},
                     RenderedCell{"blur", {4, 4, 4, 4, 4}}),
     [](const auto& one) { return std::string(one.param.name); });

@@ -172,17 +172,24 @@ bool LearntEnd::learn_by_glass(const GradientField& field, double noise, NeedleP
     return cut.end.blur <= kMostBlur_px && math::hypot(sd_of(cut, needle.half_width), motion_sd) <=
                                                (cut.end.blur > kSharp_px ? kUnsharpKnown_px : kStartKnown_px);
   };
-  if (const auto cut = lumen_ ? go_to_cut(field, noise, needle) : std::nullopt) {
+  const auto cut = lumen_ ? go_to_cut(field, noise, needle) : std::nullopt;
+  if (cut && known(*cut)) {
     bevel_ = cut->bevel;
     learn_glass(cut->end);
-    return known(*cut);
+    return true;
   }
-  bevel_ = {};
   // Granules ahead of it may go on in line with its walls: then it ends further back.
   const auto end = end_of_glass(field, noise, needle, 0, kFarBehind_px, kStartReach_px, in_relief_);
   if (!end || end->sd > kEndKnown_px) {
+    if (cut) {
+      bevel_ = cut->bevel;
+      learn_glass(cut->end);
+    } else {
+      bevel_ = {};
+    }
     return false;
   }
+  bevel_ = {};
   if (lumen_) {
     learn_glass(*end);
   }

@@ -130,8 +130,24 @@ bool SeenNeedle::search(const ClearedPicture& picture, const FollowedMembrane& o
     start_ =
         pipette_.advance_start(field, noise, clear_at, tries_ < kNeedleAtOnce, mean ? &gathered_ : nullptr);
   } while (at_once && start_ == InjectionPipette::Start::more_to_do);
+  if (start_ == InjectionPipette::Start::found && is_mistaken_again(pipette_.as_found(noise).tip)) {
+    pipette_ = {config_.needle_from, config_.px(config_.c_m)};
+    start_ = InjectionPipette::Start::failed;
+  }
   tries_ += start_ == InjectionPipette::Start::failed ? 1 : 0;
   return start_ == InjectionPipette::Start::found;
+}
+
+// What stayed while the needle moved is a speck. A needle that is not seen cannot be moved inward: in the end
+// it is believed.
+bool SeenNeedle::is_mistaken_again(const Point& end) {
+  constexpr double kSame_px = 5;
+  constexpr int kMostTries = 25;
+  const bool again = mistaken_ && cv::norm(end - *mistaken_) < kSame_px && tries_ < kMostTries;
+  if (!again) {
+    mistaken_.reset();
+  }
+  return again;
 }
 
 NeedlePose SeenNeedle::locate(const ClearedPicture& picture, const FollowedMembrane& outer,
@@ -302,6 +318,7 @@ void SeenNeedle::learn(const ClearedPicture& picture, const NeedlePose& now,
     by_stage_.learn(seen_);
     if (by_stage_.picture_stays()) {
       forget();
+      mistaken_ = now.tip;
       return;
     }
   }

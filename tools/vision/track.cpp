@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <tl/expected.hpp>
@@ -287,8 +288,15 @@ struct Counts {
 
 Counts track_all(Input& input, Output& output) {
   Counts counts;
-  vision::Tracker tracker = input.new_tracker();
-  cv::Mat before;
+  struct Scene {
+    vision::Tracker tracker;
+    cv::Mat last;
+    [[nodiscard]] bool shows(const cv::Mat& grey) const {
+      return vision::similarity(last, grey) >= vision::kSameScene;
+    }
+  };
+  Scene now{input.new_tracker(), {}};
+  std::optional<Scene> before;  // of this one
   for (;;) {
     hal::Frame frame;
     const hal::Status status = input.camera.next(frame, 0);
@@ -309,13 +317,20 @@ Counts track_all(Input& input, Output& output) {
     part.height = input.roi.height;
     const cv::Mat grey(part.height, part.width, CV_8U, const_cast<std::uint8_t*>(part.pixels),
                        static_cast<std::size_t>(part.stride));
-    // Stills of different scenes may share a folder. What was learnt from one does not hold for the next.
-    if (!before.empty() && vision::similarity(before, grey) < vision::kSameScene) {
-      tracker = input.new_tracker();
-      complain(fmt::format("{}: another scene, started afresh", input.camera.name()));
+    // Stills of different scenes may share a folder. What was learnt from one does not hold for the next, but
+    // for the one before where a broken picture lay between.
+    if (!now.last.empty() && !now.shows(grey)) {
+      if (before && before->shows(grey)) {
+        now = std::move(*before);
+        before.reset();
+        complain(fmt::format("{}: the scene before, gone on with", input.camera.name()));
+      } else {
+        before = std::exchange(now, {input.new_tracker(), {}});
+        complain(fmt::format("{}: another scene, started afresh", input.camera.name()));
+      }
     }
-    grey.copyTo(before);
-    const vision::Result& result = tracker.process(part, input.stage_at(t_s));
+    grey.copyTo(now.last);
+    const vision::Result& result = now.tracker.process(part, input.stage_at(t_s));
     output.observations.row(result, input.config, t_s, input.roi.tl());
     counts.outer += result.outer.ok;
     counts.inner += result.inner.ok;

@@ -200,6 +200,43 @@ TEST_F(Track, gives_a_row_with_a_verdict_for_an_unreadable_frame_or_one_of_anoth
   EXPECT_EQ(rows[5][10], "1");
 }
 
+// As after one that cannot be read, which no tracker sees.
+TEST_F(Track, goes_on_after_a_broken_picture_with_what_it_knew) {
+  for (const int k : {1, 2, 3, 5, 6}) {
+    frame(k, 150 + 0.3 * k);
+  }
+  cv::Mat broken(240, 320, CV_8U);
+  const auto rows_after = [&] {
+    testing::internal::CaptureStderr();
+    EXPECT_EQ(track(options_), 0);
+    const bool told = testing::internal::GetCapturedStderr().find("gone on with") != std::string::npos;
+    auto rows = table(options_.out);
+    for (auto& row : rows) {
+      for (std::size_t i = 0; i < row.size(); ++i) {
+        if (rows[0][i].ends_with("_us") && &row != rows.data()) {
+          row[i].clear();
+        }
+      }
+    }
+    rows.erase(rows.begin() + 4);
+    return std::pair(rows, told);
+  };
+  std::ofstream(name(4)) << "no picture";
+  const auto [unread, told_of_none] = rows_after();
+  EXPECT_FALSE(told_of_none);
+  ASSERT_EQ(unread.size(), 6u);
+  for (const bool black : {false, true}) {
+    broken.setTo(0);
+    if (!black) {
+      cv::randu(broken, 0, 256);
+    }
+    cv::imwrite(name(4), broken);
+    const auto [broken_between, told] = rows_after();
+    EXPECT_TRUE(told);
+    EXPECT_EQ(broken_between, unread) << (black ? "black" : "noise");
+  }
+}
+
 TEST_F(Track, exits_with_two_for_no_frame_a_bad_first_frame_or_a_bad_scene) {
   EXPECT_EQ(track(options_), 2);  // an empty folder
   std::ofstream(name(1)) << "this is no picture";

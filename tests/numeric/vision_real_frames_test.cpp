@@ -545,6 +545,24 @@ TEST(SceneChange, sees_one_scene_in_frames_that_show_nothing_but_their_noise) {
   }
 }
 
+// Each row of pixels is then read in another light, and the next frame has its bands elsewhere.
+TEST(SceneChange, sees_one_scene_under_a_lamp_that_flickers) {
+  SKIP_WITHOUT("icsi")
+  const cv::Mat still = cv::imread(data("icsi/icsi_01_img.png"), cv::IMREAD_GRAYSCALE);
+  for (const double bands_px : {60.0, 240.0}) {
+    const auto in_light = [&](double phase) {
+      cv::Mat m = still.clone();
+      for (int y = 0; y < m.rows; ++y) {
+        m.row(y) *= 0.85 + 0.15 * std::sin(2 * CV_PI * y / bands_px + phase);
+      }
+      return m;
+    };
+    for (const double phase : {1.0, 2.0, 3.0}) {
+      EXPECT_GT(similarity(in_light(0), in_light(phase)), kSameScene) << bands_px << ' ' << phase;
+    }
+  }
+}
+
 TEST(SceneChange, tells_stills_of_different_cells_from_frames_of_one_sequence) {
   SKIP_WITHOUT("icsi")
   SKIP_WITHOUT("zebrafish-timelapse")

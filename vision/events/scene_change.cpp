@@ -23,6 +23,10 @@ struct Small {
     const double noise = noise_level(grey), least = 4 * (noise * noise / averaged + kRounding * kRounding);
     constexpr double kNoNoise = 0.1;  // noise_level tells as much of a picture without any
     even = noise > kNoNoise && relief.dot(relief) <= least * size.area();
+    // A lamp that flickers while the camera reads row after row gives each of them another light.
+    for (int y = 0; y < relief.rows; ++y) {
+      relief.row(y) -= cv::mean(relief.row(y));
+    }
   }
 };
 

@@ -173,23 +173,20 @@ bool LearntEnd::learn_by_glass(const GradientField& field, double noise, NeedleP
                                                (cut.end.blur > kSharp_px ? kUnsharpKnown_px : kStartKnown_px);
   };
   const auto cut = lumen_ ? go_to_cut(field, noise, needle) : std::nullopt;
-  if (cut && known(*cut)) {
+  // Granules ahead of it may go on in line with its walls: then it ends further back. Light from aside may
+  // hide one of them, and the cut is then told as well as it can be.
+  const bool as_cut = cut && (known(*cut) || in_relief_ || lit_from_aside(field, needle));
+  const auto end = as_cut ? std::nullopt
+                          : end_of_glass(field, noise, needle, 0, kFarBehind_px, kStartReach_px, in_relief_);
+  if (cut && !(end && end->sd <= kEndKnown_px)) {
     bevel_ = cut->bevel;
     learn_glass(cut->end);
-    return true;
-  }
-  // Granules ahead of it may go on in line with its walls: then it ends further back.
-  const auto end = end_of_glass(field, noise, needle, 0, kFarBehind_px, kStartReach_px, in_relief_);
-  if (!end || end->sd > kEndKnown_px) {
-    if (cut) {
-      bevel_ = cut->bevel;
-      learn_glass(cut->end);
-    } else {
-      bevel_ = {};
-    }
-    return false;
+    return known(*cut);
   }
   bevel_ = {};
+  if (!end || end->sd > kEndKnown_px) {
+    return false;
+  }
   if (lumen_) {
     learn_glass(*end);
   }

@@ -1,5 +1,7 @@
 #include "vision/image/kept_vector.hpp"
 
+#include <malloc.h>
+
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -89,6 +91,10 @@ void prepare() {
     return;
   }
   prepared = true;
+  // What is given back stays with the process: from the kernel it comes page by page, which takes longer than
+  // to search in it.
+  ::mallopt(M_TRIM_THRESHOLD, -1);
+  ::mallopt(M_MMAP_MAX, 0);
   for (std::size_t shelf = 0; kKept && shelf < kSizes; ++shelf) {
     for (std::size_t n = std::min(kAtOnce, kMost / size_of(shelf)); n > 0; --n) {
       give_back(from_heap(size_of(shelf)), size_of(shelf));

@@ -16,6 +16,9 @@ namespace {
 constexpr int kSmallest_px = 32;        // side of a picture in which something can be found
 constexpr double kLeastContrast = 0.5;  // sd of the grey levels
 constexpr double kLeastNoise = 0.3;     // grey levels
+constexpr double kMostWhite = 0.5;      // share of the picture: beside white, edges show too far inside
+constexpr double kMostOfNoise =
+    1.5;  // of the variance that noise gives; of thousands of means it is known to 3 %
 constexpr double kSmoothing_px = 1.2;   // sd of the Gaussian before the gradient
 constexpr int kImpurityLeast_px = 6;    // pixels; fewer are noise
 constexpr double kImpurityKeep_px = 4;  // nearer to a membrane, it belongs to the membrane
@@ -55,21 +58,26 @@ bool has_contrast(const cv::Mat& grey) {
   return false;
 }
 
-// As in the dark: means over some pixels in a row differ as their noise makes them.
-bool shows_noise_alone(const cv::Mat& grey, double noise) {
-  constexpr int kPart_px = 8, kEveryRow = 16;
-  constexpr double kMost = 1.5;  // of the variance that noise gives; of thousands of them it is known to 3 %
-  double sum = 0, squares = 0, n = 0;
+// Of means over some pixels in a row.
+struct PartMeans {
+  double variance = 0;
+  double white = 0;  // share of them
+};
+constexpr int kPart_px = 8;
+PartMeans means_of_parts(const cv::Mat& grey) {
+  constexpr int kEveryRow = 16;
+  double sum = 0, squares = 0, n = 0, white = 0;
   for (int y = 0; y < grey.rows; y += kEveryRow) {
     const std::uint8_t* row = grey.ptr(y);
     for (int x = 0; x + kPart_px <= grey.cols; x += kPart_px) {
       const double mean = static_cast<double>(sums_of(row + x, kPart_px).values) / kPart_px;
       sum += mean;
       squares += mean * mean;
+      white += mean == 255 ? 1 : 0;
       ++n;
     }
   }
-  return n > 0 && squares - sum * sum / n < n * kMost * noise * noise / kPart_px;
+  return {(squares - sum * sum / n) / n, white / n};
 }
 
 // Rows of n pixels; short loops, which the compiler vectorises.
@@ -114,7 +122,12 @@ std::string ClearedPicture::load(const hal::Frame& frame, int width, int height)
     return "no contrast: every pixel is about " + std::to_string(std::lround(cv::mean(grey)[0]));
   }
   noise = std::max(noise_level(grey), kLeastNoise);
-  if (shows_noise_alone(grey, noise)) {
+  const PartMeans parts = means_of_parts(grey);
+  if (parts.white > kMostWhite) {
+    return "overexposed: " + std::to_string(std::lround(100 * parts.white)) +
+           " % of the picture is white; a shorter exposure or less light is needed";
+  }
+  if (parts.variance < kMostOfNoise * noise * noise / kPart_px) {  // as in the dark
     return "nothing but noise round " + std::to_string(std::lround(cv::mean(grey)[0]));
   }
   return {};

@@ -785,6 +785,26 @@ TEST(Tracker, finds_a_needle_again_wherever_along_its_line_it_has_gone) {
   }
 }
 
+// A cell and a needle on a background that is white through and through were once told with a verdict of ok,
+// the tip up to 4 px off.
+TEST(Tracker, refuses_a_picture_most_of_which_is_white) {
+  const cv::Mat m = draw({.tip = 430});
+  cv::Mat bright;
+  Tracker tracker({}, kW, kH);
+  for (const double gain : {1.0, 1.3, 2.5}) {
+    m.convertTo(bright, CV_8U, gain);
+    const Result& r = tracker.process(frame_of(bright));
+    const double white = cv::countNonZero(bright == 255) / static_cast<double>(bright.total());
+    if (white > 0.6) {
+      EXPECT_EQ(r.verdict.rfind("overexposed: ", 0), 0U) << r.verdict;
+      EXPECT_FALSE(r.needle.ok || r.outer.ok || r.inner.ok || r.holder.ok);
+    } else {
+      EXPECT_TRUE(r.needle.ok && r.outer.ok) << gain << ": " << r.verdict;
+    }
+    EXPECT_EQ(white > 0.6, gain == 2.5);
+  }
+}
+
 TEST(Tracker, learns_nothing_from_pictures_taken_in_the_dark) {
   Tracker tracker({}, kW, kH);
   std::uint64_t n = 0;

@@ -103,7 +103,7 @@ class SeenNeedle {
   bool before_gap_ = false;  // it is not known yet whether it is still the same
   TipByStage by_stage_;
   std::optional<Point> mistaken_;  // where something was taken for its end that stayed while it moved
-  NeedlePose seen_;  // as the picture alone tells it
+  NeedlePose seen_;                // as the picture alone tells it
   double on_tip_sd_px_ = 0;
   double wall_px_ = 0, gone_odds_ = 0;
   int pushes_unseen_ = 0;  // frames in a row

@@ -1,13 +1,12 @@
 #!/usr/bin/env python3
 """Films of an injection into a zebrafish egg, made out of real still pictures, with the truth of every frame.
 
-usage: warped_embryos.py OUT_DIR STILLS GLASS EGG SEED NOISE FRAMES [px_per_frame=1.0] [drift=0.0] [flicker=0.0] [shift=10] [from=DEG] [picture=1] [bow=0] [walls=0]
+usage: warped_embryos.py OUT_DIR STILLS GLASS EGG SEED NOISE FRAMES [px_per_frame=1.0] [drift=0.0] [flicker=0.0] [shift=10] [from=DEG] [picture=1] [walls=0]
 
 STILLS: .../zebrafish-timelapse   GLASS: .../pipette-focus   EGG: @EGGS@   FRAMES: 0 = as many as the injection needs.
 NOISE: deviation of fresh Gaussian noise (grey levels).  drift: the egg (with all that surrounds it), px/frame.
 from: side the needle comes from, degrees, 0 right, 90 below; otherwise drawn about the egg's free side.  picture: 1..16.
-bow=1: leaves the pipette's wandering axis as in the focus series (a needle bent by 1-2 px).  walls=1: the walls, too, made
-straight lines (otherwise each is wavy by up to a pixel or so, as the pipette is).
+walls=1: the walls made straight lines (otherwise each is wavy by up to a pixel or so, as the pipette is).
 
 Real: every grey value of egg, neighbours, dirt; the needle's tip and the profile across its walls (log transmission,
 each stretch of the shaft out of the picture in which it is in focus).  Made: the needle's taper (the pipette is a
@@ -144,7 +143,7 @@ class Egg:
 class Needle:
     """Log transmission as a function of the distance outward from the tip and across."""
 
-    def __init__(self, folder, rng, bow, walls):
+    def __init__(self, folder, rng, walls):
         self.tip_width = rng.uniform(5.5, 9.5)
         self.slope = rng.uniform(0.03, 0.055)      # half-width per px outward
         self.strength = rng.uniform(0.7, 1.15)
@@ -169,7 +168,7 @@ class Needle:
         low, part = which.astype(int), which - which.astype(int)
         columns = np.arange(len(s))
         table = layers[low, :, columns] * (1 - part[:, None]) + layers[low + 1, :, columns] * part[:, None]
-        table = table if bow else self.straighten(s, v, half, table, walls)
+        table = self.straighten(s, v, half, table, walls)
         self.s, self.v, self.table = s, v, np.float32(table.T)          # rows v, columns s
         self.table *= smooth_step((3.4 - abs(v)) / 1.6)[:, None].astype(np.float32)
         profile = self.table[:, (s > 160) & (s < 360)].mean(1)
@@ -367,7 +366,7 @@ def main(words):
         print(__doc__.replace('@EGGS@', ', '.join(EGGS)))
         return 0 if words[:1] in (['-h'], ['--help']) else 2
     out, stills, glass, name, seed, noise, frames = *words[:4], int(words[4]), float(words[5]), int(words[6])
-    keys = dict(px_per_frame=1.0, drift=0.0, flicker=0.0, shift=10.0, picture=1.0, bow=0.0, walls=0.0, **{'from': float('nan')})
+    keys = dict(px_per_frame=1.0, drift=0.0, flicker=0.0, shift=10.0, picture=1.0, walls=0.0, **{'from': float('nan')})
     for word in words[7:]:
         key, _, value = word.partition('=')
         if key not in keys:
@@ -383,7 +382,7 @@ def main(words):
         degrees = keys['from']
     angle = np.radians(degrees)
     egg = Egg(stills, name, int(keys['picture']), angle)
-    film = Film(egg, Needle(glass, rng, keys['bow'], keys['walls']), rng, angle, keys['px_per_frame'], keys['drift'], keys['shift'])
+    film = Film(egg, Needle(glass, rng, keys['walls']), rng, angle, keys['px_per_frame'], keys['drift'], keys['shift'])
     truths = []
     for step in film.steps(frames or film.enough):
         grey = film.picture(step)

@@ -323,7 +323,8 @@ Counts track_all(Input& input, Output& output) {
       if (before && before->shows(grey)) {
         now = std::move(*before);
         before.reset();
-        complain(fmt::format("{}: the scene before, gone on with", input.camera.name()));
+        complain(fmt::format("{}: the scene before the last picture again, what was learnt of it holds",
+                             input.camera.name()));
       } else {
         before = std::exchange(now, {input.new_tracker(), {}});
         complain(fmt::format("{}: another scene, started afresh", input.camera.name()));

@@ -35,8 +35,8 @@ constexpr int kFurther = 8;
 constexpr double kFarBehind_px = 30;
 constexpr double kSteep = 0.8;  // px along per px across: of a steeper cut the two walls end far apart
 constexpr double kUsualBlur_px = 1.5;
-// Half-widths by which glass may reach ahead unseen: as far as a cut of 27 degrees, sharper than any that is
-// ground.
+// Half-widths by which glass may reach ahead unseen: the length of a cut of 27 degrees, sharper than is
+// usual.
 constexpr double kMostUnseen = 4;
 constexpr double kExplained = 0.9;  // by its glass, of what is seen of a sharp point in relief
 

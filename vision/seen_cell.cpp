@@ -77,11 +77,14 @@ void SeenCell::take(StartedMembranes&& begun, const Touch& touch, const Result& 
   }
 }
 
+bool SeenCell::is_held(const ClearedPicture& picture) const {
+  return vision::is_held({outermost().centre, median_of(outermost().r)}, picture);
+}
+
 // A bubble, or a cell that lies about, is given up for the one at the mouth of the holding pipette.
 void SeenCell::look_for_a_held_one(const ClearedPicture& picture, const Touch& touch, const Result& result) {
   constexpr int kMostFrames = 200;
-  if (touch.contact || touch.punctured || !picture.holder_face ||
-      is_held({outermost().centre, median_of(outermost().r)}, picture)) {
+  if (touch.contact || touch.punctured || !picture.holder_face || is_held(picture)) {
     held_.reset();
     not_held_ = 0;
     next_look_ = kFirstLook;
@@ -98,7 +101,7 @@ void SeenCell::look_for_a_held_one(const ClearedPicture& picture, const Touch& t
     not_held_ = 0;
     next_look_ = std::min(2 * next_look_, kMostFrames);
     const FollowedMembrane& found = begun->outer.known ? begun->outer : begun->inner;
-    if (found.known && is_held({found.centre, median_of(found.r)}, picture)) {
+    if (found.known && vision::is_held({found.centre, median_of(found.r)}, picture)) {
       take(std::move(*begun), touch, result);
     }
   }
@@ -144,11 +147,11 @@ void SeenCell::see_edge(ClearedPicture& picture) {
 // between did not show what holds it, in which anything may have been taken for its edge.
 void SeenCell::begin(ClearedPicture& picture, const SeenHolder& holder) {
   landmark_.begin();
-  if (!holder.found()) {
+  if (!holder.holds()) {
     see_edge(picture);
   }
-  const Landmark& landmark = holder.found() ? holder.landmark() : landmark_;
-  carried_ = holder.landmark().moved();
+  const Landmark& landmark = holder.holds() ? holder.landmark() : landmark_;
+  carried_ = holder.holds() ? holder.landmark().moved() : std::nullopt;
   jump_ = {};
   const auto by = landmark.jump();
   if (!by || !outermost().known) {
@@ -169,8 +172,8 @@ void SeenCell::begin(ClearedPicture& picture, const SeenHolder& holder) {
   }
 }
 
-void SeenCell::follow(const ClearedPicture& picture, const SeenNeedle& needle, const Touch& touch,
-                      bool holder_found, Result& result, Stopwatch& watch) {
+void SeenCell::follow(const ClearedPicture& picture, const SeenNeedle& needle, const Touch& touch, bool held,
+                      Result& result, Stopwatch& watch) {
   if (config_.method == Method::paper) {
     follow_snakes(picture, result, watch);
     return;
@@ -223,7 +226,7 @@ void SeenCell::follow(const ClearedPicture& picture, const SeenNeedle& needle, c
     result.outer.reason = "not found round the inner one (vision.inner = false follows that alone)";
   }
   const Membrane& outermost_now = outer_.known ? result.outer : result.inner;
-  if (!holder_found && outermost_now.ok) {
+  if (!held && outermost_now.ok) {
     pattern_.learn(picture, outermost_now.contour);
     pattern_centre_ = outermost().centre;
   }
@@ -264,8 +267,8 @@ bool SeenCell::round_as_if_untouched(const ClearedPicture& picture, const Touch&
   return true;
 }
 
-bool SeenCell::measure(const ClearedPicture& picture, const Touch& touch, bool needle_hidden,
-                       bool holder_found, Result& result) {
+bool SeenCell::measure(const ClearedPicture& picture, const Touch& touch, bool needle_hidden, bool held,
+                       Result& result) {
   ahead_of_tip_px_.reset();
   if (inner_.known && result.inner.ok) {
     result.inner_radius_px = mean_radius(result.inner.contour);
@@ -273,7 +276,7 @@ bool SeenCell::measure(const ClearedPicture& picture, const Touch& touch, bool n
   if (!outer_.known || !result.outer.ok) {
     return true;
   }
-  const int fitted = fit_undeformed_membrane(picture, touch, needle_hidden, holder_found, result);
+  const int fitted = fit_undeformed_membrane(picture, touch, needle_hidden, held, result);
   if (result.undeformed && !is_of_the_scene(result.undeformed->r)) {
     give_up(result);
     return false;
@@ -309,7 +312,7 @@ void SeenCell::give_up(Result& result) {
 
 // Returns the number of contour points that tell the undeformed membrane.
 int SeenCell::fit_undeformed_membrane(const ClearedPicture& picture, const Touch& touch, bool needle_hidden,
-                                      bool holder_found, Result& result) {
+                                      bool held, Result& result) {
   const Contour& contour = result.outer.contour;
   const NeedlePose& n = result.needle;
   std::optional<Point> entry;  // if the needle is near
@@ -326,7 +329,7 @@ int SeenCell::fit_undeformed_membrane(const ClearedPicture& picture, const Touch
   if (result.holder.ok) {
     mouth = result.holder.mouth;
   }
-  const auto weights = undeformed_weights(contour, picture, entry, holder_found ? mouth : std::nullopt);
+  const auto weights = undeformed_weights(contour, picture, entry, held ? mouth : std::nullopt);
   const auto now = fit_undeformed(contour, weights);
   if (!now) {
     return 0;

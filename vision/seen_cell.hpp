@@ -42,6 +42,7 @@ class SeenCell {
   // Once per frame, before anything else: it goes where the holding pipette has gone, or where its edge is
   // seen to have gone, which takes the gradient of the whole picture.
   void begin(ClearedPicture& picture, const SeenHolder& holder);
+  [[nodiscard]] bool is_held(const ClearedPicture& picture) const;  // at the mouth of the holding pipette
   // Its edge, where no holding pipette is known.
   [[nodiscard]] const Landmark& landmark() const noexcept { return landmark_; }
   // Once, when another one was found than the one that was touched.
@@ -49,12 +50,12 @@ class SeenCell {
   // at_once: all of the search is done in this frame. False while no membrane is known.
   [[nodiscard]] bool start(const ClearedPicture& picture, const Touch& touch, bool at_once, Result& result);
   // Sets the membranes of the result.
-  void follow(const ClearedPicture& picture, const SeenNeedle& needle, const Touch& touch, bool holder_found,
+  void follow(const ClearedPicture& picture, const SeenNeedle& needle, const Touch& touch, bool held,
               Result& result, Stopwatch& watch);
   // Sets its undeformed membrane, its entry and its gap. needle_hidden: it may touch the cell. False where it
   // is larger or smaller than cells of the scene: then it is none, and given up.
-  [[nodiscard]] bool measure(const ClearedPicture& picture, const Touch& touch, bool needle_hidden,
-                             bool holder_found, Result& result);
+  [[nodiscard]] bool measure(const ClearedPicture& picture, const Touch& touch, bool needle_hidden, bool held,
+                             Result& result);
 
  private:
   [[nodiscard]] std::optional<StartedMembranes> search(const ClearedPicture& picture, bool at_once);
@@ -66,7 +67,7 @@ class SeenCell {
   [[nodiscard]] bool round_as_if_untouched(const ClearedPicture& picture, const Touch& touch,
                                            const Result& result) const;
   [[nodiscard]] int fit_undeformed_membrane(const ClearedPicture& picture, const Touch& touch,
-                                            bool needle_hidden, bool holder_found, Result& result);
+                                            bool needle_hidden, bool held, Result& result);
   [[nodiscard]] bool is_of_the_scene(double r_px) const;
   void give_up(Result& result);
   void measure_gap(int fitted_points, Result& result);

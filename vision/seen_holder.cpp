@@ -53,7 +53,20 @@ HolderPose SeenHolder::locate(ClearedPicture& picture, std::span<const Side> sid
     const Point mouth = holder.ok && !template_given_ ? holder.mouth : tube_->end();
     picture.holder_face = {mouth, tube_->axis, tube_->end_half_width};
   }
+  doubt(holder);
   return holder;
+}
+
+void SeenHolder::compare_with_cell(bool at_mouth, HolderPose& holder) {
+  beside_ = found() && !at_mouth;
+  doubt(holder);
+}
+
+void SeenHolder::doubt(HolderPose& holder) const {
+  if (beside_ && holder.ok) {
+    holder.ok = false;
+    holder.reason = "no cell at its mouth";
+  }
 }
 
 // One picture tells it less surely than all of them.

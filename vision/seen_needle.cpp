@@ -71,6 +71,7 @@ void SeenNeedle::forget() {
   by_stage_.forget();
   tip_on_membrane_ = {};
   landmark_.reset();
+  doubted_ = 0;
 }
 
 // Frames are kept while the needle is missing in noise, or was found in few of them. Whether there are enough
@@ -172,7 +173,19 @@ NeedlePose SeenNeedle::locate(const ClearedPicture& picture, const FollowedMembr
                                                  : 0);
   seen_ = n;
   put_right_by_stage(picture, touch, n);
+  if (n.ok && must_move_first()) {
+    ++doubted_;
+    n.ok = false;
+    n.reason = "it has not moved with the manipulator yet";
+  }
   return n;
+}
+
+// Something else was taken for it twice. It is believed once it is seen to move, or in the end: without it
+// the manipulator may wait.
+bool SeenNeedle::must_move_first() const {
+  constexpr int kMistakes = 2, kMostFrames = 100;
+  return mistakes_ >= kMistakes && !by_stage_.picture_moves() && doubted_ < kMostFrames;
 }
 
 // Since the needle was last where it was expected; none where that is no more than it may drift.
@@ -309,21 +322,24 @@ void SeenNeedle::learn(const ClearedPicture& picture, const NeedlePose& now,
   if (!seen_.ok) {
     return;
   }
-  specks_.learn(picture.field, picture.noise, now, gap_px.value_or(std::numeric_limits<double>::infinity()));
-  if (!gap_px || *gap_px > kEndShows_px) {
-    pipette_.learn(picture.field, seen_, picture.noise,
-                   gap_px.value_or(std::numeric_limits<double>::infinity()));
-  }
-  if (!gap_px || *gap_px > TipOnMembrane::kClearAhead_px) {
-    by_stage_.learn(seen_);
-    if (by_stage_.picture_stays()) {
-      forget();
-      mistaken_ = now.tip;
-      return;
+  const bool clear = !gap_px || *gap_px > TipOnMembrane::kClearAhead_px;
+  const double gap = gap_px.value_or(std::numeric_limits<double>::infinity());
+  if (!must_move_first()) {
+    specks_.learn(picture.field, picture.noise, now, gap);
+    if (gap > kEndShows_px) {
+      pipette_.learn(picture.field, seen_, picture.noise, gap);
+    }
+    if (gap_px && clear) {
+      tip_on_membrane_.learn(picture.field, now);
     }
   }
-  if (gap_px && *gap_px > TipOnMembrane::kClearAhead_px) {
-    tip_on_membrane_.learn(picture.field, now);
+  if (clear) {
+    by_stage_.learn(seen_);
+    if (by_stage_.picture_stays()) {
+      mistakes_ += by_stage_.picture_stays_far() ? 1 : 0;
+      forget();
+      mistaken_ = now.tip;
+    }
   }
 }
 

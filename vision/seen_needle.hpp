@@ -87,6 +87,7 @@ class SeenNeedle {
   [[nodiscard]] bool search(const ClearedPicture& picture, const FollowedMembrane& outer, const Touch& touch,
                             bool at_once);
   [[nodiscard]] bool is_mistaken_again(const Point& end);
+  [[nodiscard]] bool must_move_first() const;
   [[nodiscard]] Point jump_of_landmark(const std::optional<Point>& landmark) const;
   [[nodiscard]] NeedlePose find(const ClearedPicture& picture, const std::optional<Point>& landmark);
   [[nodiscard]] bool stays_or_jumps(const NeedlePose& n, const std::optional<Point>& landmark);
@@ -103,6 +104,8 @@ class SeenNeedle {
   bool before_gap_ = false;  // it is not known yet whether it is still the same
   TipByStage by_stage_;
   std::optional<Point> mistaken_;  // where something was taken for its end that stayed while it moved
+  int mistakes_ = 0;               // such things, far from it
+  int doubted_ = 0;                // frames, since it was found
   NeedlePose seen_;                // as the picture alone tells it
   double on_tip_sd_px_ = 0;
   double wall_px_ = 0, gone_odds_ = 0;

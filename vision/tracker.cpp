@@ -70,6 +70,7 @@ struct Tracker::Impl {
   [[nodiscard]] Vector<Side> holder_sides() const;
   [[nodiscard]] cv::Rect area_to_search(bool starting) const;
   void clear_picture(double needle_margin);
+  void compare_holder_with_cell();
   [[nodiscard]] bool start();
   void reconstruct_surfaces();
 };
@@ -171,7 +172,7 @@ const Result& Tracker::Impl::process(const hal::Frame& frame, const std::optiona
     if (!needle.recognised(picture)) {
       events.forget_puncture(result);
     }
-    const Landmark& landmark = holder.found() ? holder.landmark() : cell.landmark();
+    const Landmark& landmark = holder.holds() ? holder.landmark() : cell.landmark();
     result.needle = needle.locate(picture, cell.outer(), events.touch(), landmark.place(), first_picture);
     result.us.needle = watch.lap_us();
   }
@@ -193,8 +194,11 @@ const Result& Tracker::Impl::process(const hal::Frame& frame, const std::optiona
     result.us.start = watch.lap_us();
   }
   if (found) {
-    cell.follow(picture, needle, events.touch(), holder.found(), result, watch);
-    found = cell.measure(picture, events.touch(), needle.hidden(result.needle), holder.found(), result);
+    cell.follow(picture, needle, events.touch(), holder.holds(), result, watch);
+    found = cell.measure(picture, events.touch(), needle.hidden(result.needle), holder.holds(), result);
+    if (found && config.method == Method::tracker) {
+      compare_holder_with_cell();
+    }
     result.us.measure = watch.lap_us();
   }
   if (found) {
@@ -293,6 +297,17 @@ void Tracker::Impl::clear_picture(double needle_margin) {
   const double strong =
       std::max(5 * picture.gradient_noise, share * std::max(cell.outer().level, cell.inner().level));
   result.impurities = picture.cover_impurities(membranes, strong, 0.45 * median_of(cell.outermost().r));
+}
+
+void Tracker::Impl::compare_holder_with_cell() {
+  if (!(cell.outer().known ? result.outer : result.inner).ok) {
+    return;
+  }
+  const bool held = holder.holds();
+  holder.compare_with_cell(cell.is_held(picture), result.holder);
+  if (held != holder.holds()) {
+    needle.forget_landmark();
+  }
 }
 
 bool Tracker::Impl::start() {

@@ -164,6 +164,7 @@ struct EggFilm {
   const char* egg;
   int seed;
   int frames;  // until some after the puncture
+  double c_m;  // radius of the needle, by the scene
 };
 
 class EggFilms : public Films<EggFilm> {
@@ -180,7 +181,7 @@ TEST_P(EggFilms, of_zebrafish_are_punctured_when_the_chorion_gives_way) {
   VisionConfig config;
   config.pixel_m = 3.25e-6;
   config.h_m = 4e-6;
-  config.c_m = 7.5e-6;
+  config.c_m = GetParam().c_m;
   config.holder.reset();
   config.R_min_m = 400e-6;
   config.R_max_m = 800e-6;
@@ -191,7 +192,8 @@ TEST_P(EggFilms, of_zebrafish_are_punctured_when_the_chorion_gives_way) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Stills, EggFilms, testing::Values(EggFilm{"A", 1, 85}),
+INSTANTIATE_TEST_SUITE_P(Stills, EggFilms,
+                         testing::Values(EggFilm{"A", 1, 85, 7.5e-6}, EggFilm{"I", 2, 70, 14e-6}),
                          [](const auto& of) { return of.param.egg + std::to_string(of.param.seed); });
 
 }  // namespace

@@ -134,7 +134,9 @@ InjectionPipette::Start InjectionPipette::advance_start(const GradientField& fie
       return Start::found;
     }
   } else {
-    reason_ = "what enters through the border is not a straight needle";
+    reason_ = search_.found_too_wide_a_one()
+                  ? "what enters through the border is wider than the needle of the scene (membrane.c_um)"
+                  : "what enters through the border is not a straight needle";
     if (search_.go_to_next_tube()) {
       return Start::more_to_do;
     }

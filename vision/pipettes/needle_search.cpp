@@ -110,6 +110,7 @@ void NeedleSearch::begin_anew() {
   trace_.reset();
   tubes_.clear();
   walls_tried_.reset();
+  too_wide_ = false;
 }
 
 bool NeedleSearch::advance(const GradientField& field, double noise) {
@@ -121,8 +122,9 @@ std::optional<NeedlePose> NeedleSearch::take_straight(const GradientField& field
   NeedlePose needle;
   const double straight = lie_between_walls(field, noise, tube, needle);
   walls_tried_.reset();
-  if (straight < kStraightWalls || needle.half_width > widest_half_width() ||
-      is_wall_of_wide_tube(field, tube, noise)) {
+  const bool too_wide = needle.half_width > widest_half_width();
+  too_wide_ = too_wide_ || (too_wide && straight >= kStraightWalls);
+  if (straight < kStraightWalls || too_wide || is_wall_of_wide_tube(field, tube, noise)) {
     return std::nullopt;
   }
   return needle;

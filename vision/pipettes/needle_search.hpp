@@ -36,6 +36,8 @@ class NeedleSearch {
   // False when there is none.
   [[nodiscard]] bool go_to_next_tube() { return ++tubes_tried_ < tubes_.size(); }
 
+  // In this search something straight was found that is no needle, for its width.
+  [[nodiscard]] bool found_too_wide_a_one() const noexcept { return too_wide_; }
   [[nodiscard]] double widest_half_width() const noexcept { return 2 * radius_px_ + 1; }  // at the tip, px
 
  private:
@@ -57,6 +59,7 @@ class NeedleSearch {
   Vector<TubeTrace> tubes_;  // through those, the most likely one first
   std::size_t tubes_tried_ = 0;
   std::optional<WallsTried> walls_tried_;
+  bool too_wide_ = false;
 };
 
 }  // namespace punctum::vision

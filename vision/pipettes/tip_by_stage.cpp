@@ -17,8 +17,9 @@ constexpr double kFarthest_px = 1e7;          // a number beyond it is no place
 constexpr int kDisagreements = 10;            // frames in a row; then how far off the stage is, is not known
 constexpr int kStageMemory = 30;              // frames
 // A camera that is late shows a needle that moves fast where it was.
-constexpr double kResting_px = 0.5;             // per frame
-constexpr double kMoved_px = 4, kStayed = 0.3;  // along the axis, from rest to rest; share of it
+constexpr double kResting_px = 0.5;  // per frame
+constexpr double kLatest_frames = 8;
+constexpr double kMoved_px = 4, kStayed = 0.3;  // further than it may be late; share of it
 
 double squared(double x) { return x * x; }
 
@@ -31,7 +32,8 @@ void TipByStage::begin(const std::optional<Point>& stage) {
     moved_ = *stage - *stage_;
     if (cv::norm(*moved_) > kFastest_px) {  // it was placed anew
       moved_.reset();
-      rest_.reset();
+      at_rest_.reset();
+      in_motion_.reset();
       frames_ = 0;
     }
   }
@@ -46,15 +48,18 @@ void TipByStage::jump_with_picture(const Point& by) {
   off_ += by;
   variance_ += squared(kUncertain_px);
   disagreements_ = 0;
-  if (rest_) {
-    rest_->tip += by;
+  for (auto* from : {&at_rest_, &in_motion_}) {
+    if (*from) {
+      (*from)->tip += by;
+    }
   }
 }
 
 void TipByStage::after_gap() {
   constexpr double kDrift_px = 1;
   stage_.reset();
-  rest_.reset();
+  at_rest_.reset();
+  in_motion_.reset();
   disagreements_ = 0;
   variance_ += squared(kDrift_px);
 }
@@ -143,18 +148,32 @@ void TipByStage::learn(const NeedlePose& seen) {
 }
 
 void TipByStage::compare(const NeedlePose& seen) {
-  if (!moved_ || cv::norm(*moved_) > kResting_px) {
+  if (!moved_) {
     return;
   }
-  const Rest now{*stage_, seen.tip};
-  if (!rest_) {
-    rest_ = now;
+  const Compared now{*stage_, seen.tip, cv::norm(*moved_)};
+  if (now.fastest <= kResting_px) {  // a speck on it goes with it aside
+    const Point way = at_rest_ ? now.stage - at_rest_->stage : Point();
+    picture_stays_ = stays(at_rest_, now, way.dot(seen.axis) * seen.axis, 0) || picture_stays_;
   }
-  const double moved = (now.stage - rest_->stage).dot(seen.axis);
-  if (std::abs(moved) > kMoved_px) {
-    picture_stays_ = std::abs((now.tip - rest_->tip).dot(seen.axis)) < kStayed * std::abs(moved);
-    rest_ = now;
+  const Point way = in_motion_ ? now.stage - in_motion_->stage : Point();
+  picture_stays_far_ = stays(in_motion_, now, way, kLatest_frames) || picture_stays_far_;
+}
+
+// way: of the manipulator, as far as it counts. late: frames, at most.
+bool TipByStage::stays(std::optional<Compared>& from, const Compared& now, const Point& way, double late) {
+  if (!from) {
+    from = now;
   }
+  from->fastest = std::max(from->fastest, now.fastest);
+  const double far = cv::norm(way), moved = far - late * from->fastest;
+  if (moved <= kMoved_px) {
+    return false;
+  }
+  const bool stays = (now.tip - from->tip).dot(way) < kStayed * moved * far;
+  picture_moves_ = !stays;
+  from = now;
+  return stays;
 }
 
 }  // namespace punctum::vision

@@ -29,24 +29,30 @@ class TipByStage {
   void after_gap();
   void forget();  // all but where the stage is
   // The manipulator has moved the needle, and what is seen as its tip stayed: it is something else.
-  [[nodiscard]] bool picture_stays() const { return picture_stays_; }
+  [[nodiscard]] bool picture_stays() const { return picture_stays_ || picture_stays_far_; }
+  // Also over a way on which a speck on it would have been left behind.
+  [[nodiscard]] bool picture_stays_far() const { return picture_stays_far_; }
+  // It has moved with the manipulator, as far as that tells where it is.
+  [[nodiscard]] bool picture_moves() const { return picture_moves_ || !stage_; }
 
  private:
+  struct Compared {
+    Point stage, tip;
+    double fastest;  // of the manipulator since then, px per frame
+  };
   void compare(const NeedlePose& seen);
+  [[nodiscard]] bool stays(std::optional<Compared>& from, const Compared& now, const Point& way, double late);
   [[nodiscard]] bool far_apart(const NeedlePose& seen) const;
 
-  struct Rest {
-    Point stage, tip;
-  };
   std::optional<Point> stage_, moved_;
-  Point off_;                 // of the stage: tip in the picture minus stage, px
-  double variance_ = 0;       // of off_ along the axis, px^2
-  double constant_sd_ = 0;    // of the picture that off_ was learnt from
-  double scatter_ = 0;        // variance of the stage from frame to frame, px^2
-  int frames_ = 0;            // that it was learnt from
-  int disagreements_ = 0;     // frames in a row
-  std::optional<Rest> rest_;  // the last one
-  bool picture_stays_ = false;
+  Point off_;               // of the stage: tip in the picture minus stage, px
+  double variance_ = 0;     // of off_ along the axis, px^2
+  double constant_sd_ = 0;  // of the picture that off_ was learnt from
+  double scatter_ = 0;      // variance of the stage from frame to frame, px^2
+  int frames_ = 0;          // that it was learnt from
+  int disagreements_ = 0;   // frames in a row
+  std::optional<Compared> at_rest_, in_motion_;
+  bool picture_stays_ = false, picture_stays_far_ = false, picture_moves_ = false;  // since it was found
   bool jumped_ = false;  // the manipulator, since both agreed
 };
 

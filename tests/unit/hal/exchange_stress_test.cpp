@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstring>
 #include <iostream>
@@ -78,7 +79,8 @@ struct Seen {
 void read_newest(const Ring& ring, const std::atomic<bool>& stop, Seen& seen) {
   Sample s;
   std::uint64_t last = 0;
-  while (!stop.load()) {
+  for (bool last_round = false; !last_round;) {
+    last_round = stop.load();  // the writer is done: what it left is there to be read
     std::uint64_t index = 0;
     const Read r = ring.newest(s, index);
     if (r == Read::overrun) {
@@ -111,7 +113,8 @@ void follow(const Ring& ring, const std::atomic<bool>& stop, Seen& seen) {
 
 void read_the_edge(const Ring& ring, const std::atomic<bool>& stop, Seen& seen) {
   Sample s;
-  while (!stop.load()) {  // the oldest one, which the writer is about to overwrite
+  for (bool last_round = false; !last_round;) {  // the oldest one, which the writer is about to overwrite
+    last_round = stop.load();
     const std::uint64_t head = ring.head();
     if (head < Ring::kSize) {
       continue;
@@ -129,7 +132,7 @@ void read_the_edge(const Ring& ring, const std::atomic<bool>& stop, Seen& seen) 
 
 void expect_clean(const std::vector<Seen>& all) {
   for (const Seen& s : all) {
-    EXPECT_GT(s.good, 0U);
+    EXPECT_GT(s.good + s.overrun, 0U);  // the edge is overwritten at once where a writer is never still
     EXPECT_EQ(s.torn, 0U);
     EXPECT_EQ(s.wrong, 0U);
     EXPECT_EQ(s.backwards, 0U);
@@ -161,6 +164,7 @@ TEST(SeqRing, readers_of_a_busy_ring_never_see_a_torn_sample) {
   }
   EXPECT_EQ(ring->head(), pushed);
   expect_clean(seen);
+  EXPECT_GT(seen[0].good, 0U);
   EXPECT_EQ(seen[1].good + seen[1].lost, pushed) << "a follower accounts for all it lost";
 }
 
@@ -247,6 +251,7 @@ TEST(SeqRing, a_writer_killed_in_the_middle_of_a_sample_harms_no_reader_and_the_
     r.join();
   }
   expect_clean(seen);
+  EXPECT_GT(std::min(seen[0].good, seen[1].good), 0U) << "the writer's last sample is there";
   EXPECT_GT(half_written, 0) << "no writer was caught in the middle";
   std::cout << "writers killed within a sample: " << half_written << " of 118, samples " << ring->head()
             << "\n";
@@ -303,16 +308,23 @@ TEST(CommandQueue, a_killed_producer_leaves_whole_commands_and_the_next_one_goes
         }
       }
     }
+    std::uint64_t expected = 0;
+    Sample s;
+    const auto look = [&] {
+      if (!s.whole() || s.author != author || s.number != expected++) {
+        ++bad;
+      }
+      ++taken;
+    };
+    while (!queue->try_pop(s)) {
+      std::this_thread::yield();  // on a busy machine the producer may start late
+    }
+    look();
     const auto until =
         std::chrono::steady_clock::now() + std::chrono::microseconds(2000 + mix(author) % 5000);
-    std::uint64_t expected = 0;
     const auto drain = [&] {
-      Sample s;
       while (queue->try_pop(s)) {
-        if (!s.whole() || s.author != author || s.number != expected++) {
-          ++bad;
-        }
-        ++taken;
+        look();
         if (std::chrono::steady_clock::now() > until) {
           return;
         }
@@ -323,15 +335,12 @@ TEST(CommandQueue, a_killed_producer_leaves_whole_commands_and_the_next_one_goes
     }
     ::kill(child, SIGKILL);
     ::waitpid(child, nullptr, 0);
-    Sample s;
     while (queue->try_pop(s)) {
-      if (!s.whole() || s.author != author || s.number != expected++) {
-        ++bad;
-      }
+      look();
     }
   }
   EXPECT_EQ(bad, 0U);
-  EXPECT_GT(taken, 0U);
+  EXPECT_GT(taken, 59U) << "one of each producer, and what followed";
 }
 
 TEST(CommandQueue, counters_that_make_no_sense_empty_the_queue_instead_of_running_wild) {

@@ -176,6 +176,32 @@ TEST_F(StageTip, tells_that_the_picture_stays_where_the_needle_is_moved_on) {
   ADD_FAILURE() << "never told";
 }
 
+// The edge of another cell, or a fibre, is taken for a needle; the real one comes without a rest.
+TEST_F(StageTip, tells_so_of_what_lies_anywhere_while_the_needle_comes) {
+  for (const Point& axis : {Point(-1, 0), Point(0, -1), Point(0.8, 0.6)}) {
+    TipByStage told;
+    std::normal_distribution<double> noise(0, 0.5);
+    int when = 0;
+    for (int k = 0; k < 40 && !told.picture_stays(); ++k) {
+      told.begin(Point(460 - k, 103));
+      NeedlePose seen = seen_at({300 + noise(random_), 200 + noise(random_)}, 0.9);
+      seen.axis = axis;
+      told.learn(seen);
+      when = k;
+    }
+    EXPECT_TRUE(told.picture_stays()) << axis;
+    EXPECT_GE(when, 12) << axis << ": a camera may be late";
+  }
+}
+
+TEST_F(StageTip, does_not_tell_so_of_a_needle_that_a_late_camera_shows) {
+  for (int k = 0; k < 100; ++k) {
+    told_.begin(Point(460 - k, 103));
+    told_.learn(seen_at({500.0 - std::max(0, k - 8), 100}, 0.25));
+    EXPECT_FALSE(told_.picture_stays()) << k;
+  }
+}
+
 TEST_F(StageTip, does_not_tell_so_of_a_needle_that_is_seen_late_or_thinly) {
   std::normal_distribution<double> noise(0, 0.5);
   double one_ago = x_, two_ago = x_;  // where a camera that is two frames late still sees it

@@ -339,7 +339,11 @@ void SeenNeedle::learn(const ClearedPicture& picture, const NeedlePose& now,
       mistakes_ += by_stage_.picture_stays_far() ? 1 : 0;
       forget();
       mistaken_ = now.tip;
+      return;
     }
+  }
+  if (const auto further = pipette_.round_end()) {
+    go_further(now, *further);
   }
 }
 
@@ -352,7 +356,12 @@ void SeenNeedle::learn_from_dent(const NeedlePose& now, const std::optional<doub
     return;
   }
   pushes_unseen_ = 0;
-  const Point by = pipette_.reaches_further(*ahead_px) * now.axis;
+  go_further(now, *ahead_px);
+}
+
+// Its outermost glass lies further ahead than it is told.
+void SeenNeedle::go_further(const NeedlePose& now, double px) {
+  const Point by = pipette_.reaches_further(px) * now.axis;
   by_stage_.jump_with_picture(by);
   motion_.jump_with_picture(by);
   if (last_on_membrane_) {

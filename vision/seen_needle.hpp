@@ -91,6 +91,7 @@ class SeenNeedle {
   [[nodiscard]] Point jump_of_landmark(const std::optional<Point>& landmark) const;
   [[nodiscard]] NeedlePose find(const ClearedPicture& picture, const std::optional<Point>& landmark);
   [[nodiscard]] bool stays_or_jumps(const NeedlePose& n, const std::optional<Point>& landmark);
+  void go_further(const NeedlePose& now, double px);
   void put_right_by_membrane(const ClearedPicture& picture, const FollowedMembrane& outer, NeedlePose& n);
   void put_right_by_stage(const ClearedPicture& picture, const Touch& touch, NeedlePose& n);
   void forget();

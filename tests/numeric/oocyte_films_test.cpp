@@ -176,7 +176,7 @@ class EggFilms : public Films<EggFilm> {
 };
 
 // Of the eggs that are looked for here: others, and what goes wrong in them, are in vision/MEASURED.md. The
-// pale end of the glass is not seen, by which contact is late.
+// glass was melted round: its walls seem to end 5 px before it does.
 TEST_P(EggFilms, of_zebrafish_are_punctured_when_the_chorion_gives_way) {
   VisionConfig config;
   config.pixel_m = 3.25e-6;
@@ -188,7 +188,7 @@ TEST_P(EggFilms, of_zebrafish_are_punctured_when_the_chorion_gives_way) {
   for (const bool posed : {false, true}) {
     const Story s = follow(config, GetParam().frames, posed);
     EXPECT_EQ(s.lost, 0);
-    expect_in_order(s, 8, 3);
+    expect_in_order(s, 3, 3);
   }
 }
 

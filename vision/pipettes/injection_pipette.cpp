@@ -486,6 +486,9 @@ void InjectionPipette::learn(const GradientField& field, const NeedlePose& needl
   if (!alone) {
     return;
   }
+  if (free_px > kAlone_px + RoundEnd::kReach_px) {
+    end_.look_for_round_end(field, needle);
+  }
   cv::Mat here = kept_picture(template_.size(), CV_32F);
   cv::getRectSubPix(field.smooth, template_.size(),
                     cv::Point2f(static_cast<float>(followed.tip.x - field.area.x - tip_in_template_.x +

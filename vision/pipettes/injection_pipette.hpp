@@ -48,6 +48,7 @@ class InjectionPipette {
   // It is known to be elsewhere along its axis than the picture shows.
   void put(const Point& tip);
   // Its glass reaches further ahead than the picture shows, by that. Returns how much of it is believed.
+  [[nodiscard]] std::optional<double> round_end() const { return end_.round_end(); }
   double reaches_further(double px) noexcept { return end_.reaches_further(px); }
   // No frame was seen for a while, and its tip is known to be there now: what was learnt of the needle itself
   // is kept. False, and to be found anew, unless its shaft lies there.

@@ -142,6 +142,14 @@ bool LearntEnd::learn_outermost(const NeedlePose& needle, const Point& followed)
   return true;
 }
 
+void LearntEnd::look_for_round_end(const GradientField& field, const NeedlePose& told) {
+  if (in_relief_ || !lumen_ || ends_apart() || unseen_ahead_ > 0 || !round_end_.add(field, told)) {
+    round_end_.forget();
+  }
+}
+
+std::optional<double> LearntEnd::round_end() const { return round_end_.ahead(); }
+
 double LearntEnd::reaches_further(double px) noexcept {
   const double by = std::min(px, kMostUnseen * half_width_at_start_ - unseen_ahead_);
   unseen_ahead_ += by;
@@ -164,6 +172,7 @@ bool LearntEnd::learn_by_glass(const GradientField& field, double noise, NeedleP
     needle.tip = end_by_walls;
   }
   glass_ahead_ = unseen_ahead_ = glass_scatter_ = glass_blur_ = 0;
+  round_end_.forget();
   glass_frames_ = 0;
   followed_ = false;
   lumen_ = needle.half_width >= kLeastLumen_px;

@@ -13,6 +13,7 @@
 #include "vision/pipettes/needle_end.hpp"
 #include "vision/pipettes/needle_pose.hpp"
 #include "vision/pipettes/needle_shape.hpp"
+#include "vision/pipettes/round_end.hpp"
 #include "vision/pipettes/sharp_point.hpp"
 #include "vision/pipettes/thin_end.hpp"
 
@@ -60,6 +61,10 @@ class LearntEnd {
   [[nodiscard]] NeedlePose told(NeedlePose followed, double noise) const;
   // The outermost glass over the end that is followed, px.
   [[nodiscard]] double glass_ahead() const noexcept { return glass_ahead_ + unseen_ahead_; }
+  // A frame in which nothing lies within the reach of RoundEnd.
+  void look_for_round_end(const GradientField& field, const NeedlePose& told);
+  // By which its outermost glass lies ahead of what is told, where it is round.
+  [[nodiscard]] std::optional<double> round_end() const;
   // It reaches further than it is seen, by that. Returns how much of it is believed.
   double reaches_further(double px) noexcept;
   [[nodiscard]] bool glass_is_known() const noexcept { return glass_frames_ > 0; }
@@ -119,11 +124,12 @@ class LearntEnd {
   int point_frames_ = 0;            // that bevel_.point_ahead was learnt from
   double half_width_at_start_ = 0;  // px
   double glass_ahead_ = 0;          // of the end that is followed: the outermost glass, px
-  double unseen_ahead_ = 0;         // of that: glass which only a membrane tells, px
+  double unseen_ahead_ = 0;         // of that: glass which only a membrane or its round end tells, px
   int glass_frames_ = 0;            // that it was learnt from
   double glass_scatter_ = 0;        // variance of where the end that is followed seems to be from it, px^2
   double glass_blur_ = 0;           // px
-  ThinEnd thin_end_;                // tells the same of a needle whose lumen is not seen
+  RoundEnd round_end_;
+  ThinEnd thin_end_;     // tells the same of a needle whose lumen is not seen
   double end_line_ = 0;  // that tells the end with light along the needle, grey levels; 0: none does
   double cut_sd_ = 0;    // of the end in the last frame, where its cut or a line told it, px
 };

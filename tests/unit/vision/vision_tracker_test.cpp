@@ -54,6 +54,7 @@ struct Drawing {
   double inner_dent = -1;  // px; < 0: 0.9 of the outer membrane's
   bool granules = false;   // in the ooplasm, where a dimple's sides may be
   double ooplasm = 34;     // grey levels darker than the space round it
+  double round_end = 0;    // px ahead of `tip`, to which its glass goes on, in a pale line
   std::vector<Speck> specks = {};
 };
 
@@ -90,6 +91,10 @@ cv::Mat draw(const Drawing& d) {
           if (u < w) {
             g += u > 0.6 * w ? -48 : 8;
           }
+        }
+        if (d.needle && s <= 0 && s > -d.round_end) {
+          const double off = std::hypot(s / d.round_end, u / kNeedle) - 1;
+          g -= off < 0 && off > -0.35 ? 14 : 0;
         }
         if (d.holder && p.x < kCentre.x - kR - 1 && std::abs(p.y - kCentre.y) < 52) {  // holding pipette
           const double wall = 52 - std::abs(p.y - kCentre.y), face = kCentre.x - kR - 1 - p.x;
@@ -738,6 +743,25 @@ TEST(Tracker, says_that_a_needle_is_wider_than_that_of_the_scene) {
   const Result& seen = tracker.process(frame_of(draw({.tip = 430}), 0));
   EXPECT_EQ(seen.verdict,
             "needle: what enters through the border is wider than the needle of the scene (membrane.c_um)");
+}
+
+// Melted round, as glass is that was held at a flame: its dark walls end 4 px before it does.
+TEST(Tracker, sees_how_far_a_round_end_reaches) {
+  for (const bool by_stage : {false, true}) {
+    constexpr double kRound_px = 4;
+    Tracker tracker({}, kW, kH);
+    double first = 0, last = 0;
+    unsigned k = 0;
+    for (double glass = 440; glass > 400; glass -= 1, ++k) {
+      const Drawing drawn{.tip = glass + kRound_px, .seed = k + 1, .round_end = kRound_px};
+      const Result& seen = tracker.process(frame_of(draw(drawn), k),
+                                           by_stage ? std::optional(Point(glass, kCentre.y)) : std::nullopt);
+      ASSERT_TRUE(seen.needle.ok) << glass << seen.verdict;
+      (k == 0 ? first : last) = seen.needle.tip.x - glass;
+    }
+    EXPECT_GT(first, 2) << "or there is nothing to learn";
+    EXPECT_LT(std::abs(last), 0.8) << by_stage;
+  }
 }
 
 // A fibre, or the edge of another cell. It may be found again wherever it lies, and is claimed twice.

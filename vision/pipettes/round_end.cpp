@@ -12,10 +12,10 @@ namespace punctum::vision {
 
 namespace {
 
-constexpr double kStep_px = 0.5;
+constexpr double kPlace_px = 0.5;
 constexpr double kFrom_px = -2, kMedium_px = 4;  // of the tip; the last of the reach, which show the medium
-constexpr auto kPlaces = static_cast<std::size_t>((RoundEnd::kReach_px - kFrom_px) / kStep_px) + 1;
-constexpr auto kMedium = static_cast<std::size_t>(kMedium_px / kStep_px);
+constexpr auto kPlaces = static_cast<std::size_t>((RoundEnd::kReach_px - kFrom_px) / kPlace_px) + 1;
+constexpr auto kMedium = static_cast<std::size_t>(kMedium_px / kPlace_px);
 constexpr std::array kMiddle = {-0.2, -0.1, 0.0, 0.1,
                                 0.2};  // half-widths: further aside the end has gone back
 // The walls, behind what bends together.
@@ -67,7 +67,7 @@ void RoundEnd::Mean::add(const GradientField& field, const NeedlePose& needle) {
   for (std::size_t k = 0; k < kPlaces; ++k) {
     double grey = 0;
     for (const double u : kMiddle) {
-      grey += field.grey(needle.at(-(kFrom_px + kStep_px * static_cast<double>(k)), u * half_width)) /
+      grey += field.grey(needle.at(-(kFrom_px + kPlace_px * static_cast<double>(k)), u * half_width)) /
               static_cast<double>(kMiddle.size());
     }
     across[k] += part * (grey - across[k]);
@@ -78,7 +78,7 @@ std::optional<double> RoundEnd::Mean::line() const {
   constexpr int kLeastFrames = 4;
   constexpr double kDark = 0.12,
                    kClear = 4;  // of what the walls are darker by; times what the medium scatters
-  constexpr double kLeast_px = 1, kMost = 1.8;  // ahead; half-widths ahead
+  constexpr double kNearest_px = 1, kMost = 1.8;  // ahead; half-widths ahead
   if (frames < kLeastFrames || walls <= 0) {
     return std::nullopt;
   }
@@ -91,9 +91,9 @@ std::optional<double> RoundEnd::Mean::line() const {
   const double least = std::max(kDark * walls, kClear * scatter);
   for (std::size_t k = kPlaces - kMedium; k-- > 1;) {
     if (level - across[k] > least && across[k] <= across[k + 1] && across[k] <= across[k - 1]) {
-      const double line = kFrom_px + kStep_px * (static_cast<double>(k) +
-                                                 vertex_offset(-across[k - 1], -across[k], -across[k + 1]));
-      if (line < kLeast_px || line > kMost * half_width) {
+      const double line = kFrom_px + kPlace_px * (static_cast<double>(k) +
+                                                  vertex_offset(-across[k - 1], -across[k], -across[k + 1]));
+      if (line < kNearest_px || line > kMost * half_width) {
         return std::nullopt;
       }
       return line;

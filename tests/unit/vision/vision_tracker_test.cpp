@@ -8,6 +8,7 @@
 #include <cstring>
 #include <ctime>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 #include <random>
 #include <string>
 #include <tuple>
@@ -19,6 +20,7 @@
 #include "tools/vision/live_tracker.hpp"
 #include "vision/overlay.hpp"
 #include "vision/pipettes/end_line.hpp"
+#include "vision/pipettes/round_end.hpp"
 #include "vision/pipettes/still_specks.hpp"
 #include "vision/tracker.hpp"
 
@@ -762,6 +764,33 @@ TEST(Tracker, sees_how_far_a_round_end_reaches) {
     EXPECT_GT(first, 2) << "or there is nothing to learn";
     EXPECT_LT(std::abs(last), 0.8) << by_stage;
   }
+}
+
+// As far as a speck lies ahead of the tip that goes with the needle, or is left behind by 0.4 px per frame.
+std::optional<double> round_end_by_speck(double left_behind_px) {
+  RoundEnd end;
+  for (int k = 0; k < 14; ++k) {
+    const Point tip(450 - k, kCentre.y);
+    const double ahead = 7 - left_behind_px * k;
+    const cv::Mat picture = draw(
+        {.tip = tip.x, .seed = static_cast<unsigned>(k) + 1, .specks = {{{tip.x - ahead, tip.y}, 2, -40}}});
+    GradientField field;
+    field.compute(picture, {0, 0, kW, kH}, 1.2);
+    NeedlePose needle;
+    needle.tip = tip;
+    needle.axis = {-1, 0};
+    needle.half_width = kNeedle + 1;
+    needle.taper = 0.03;
+    EXPECT_TRUE(end.add(field, needle));
+  }
+  return end.ahead();
+}
+
+TEST(RoundEnd, is_not_what_the_needle_comes_nearer_to) {
+  const auto with_it = round_end_by_speck(0);
+  ASSERT_TRUE(with_it);
+  EXPECT_NEAR(*with_it, 7 + 0.17 * (kNeedle + 1), 0.7);
+  EXPECT_FALSE(round_end_by_speck(0.4));
 }
 
 // A fibre, or the edge of another cell. It may be found again wherever it lies, and is claimed twice.
